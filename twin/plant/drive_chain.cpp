@@ -13,17 +13,25 @@ namespace
 // A first-order approach to rest never ends: below this rim speed a wheel counts as standing.
 constexpr double kStandstill_mps = 1e-3;
 
-// Piecewise-linear table, odd in `duty` (-1..1), held beyond its end.
-double RimSpeed(const Base &base, double duty)
+// Piecewise-linear table, odd in a duty (-1..1), held beyond its end; of so many wheels.
+Wheels RimSpeeds(const Base &base, const Wheels &duty, int wheels)
 {
-    const double pct = std::min(100 * std::abs(duty), base.duty_pct.back());
-    size_t i = 1;  // counted without a branch: duties come in no order that could be foreseen
+    Wheels pct, rim_mps{};
+    std::array<int64_t, kMaxWheels> place{};  // counted without a branch: duties come in no order
+    for (size_t w = 0; w < kMaxWheels; ++w)
+        pct[w] = std::min(100 * std::abs(duty[w]), base.duty_pct.back());
     for (size_t k = 1; k + 1 < base.duty_pct.size(); ++k)
-        i += pct > base.duty_pct[k];
-    const double part = (pct - base.duty_pct[i - 1]) / (base.duty_pct[i] - base.duty_pct[i - 1]);
-    const double low = base.wheel_speed_mps[i - 1], high = base.wheel_speed_mps[i];
-    const double rim_mps = low + part * (high - low);
-    return duty < 0 ? -rim_mps : rim_mps;
+        for (size_t w = 0; w < kMaxWheels; ++w)
+            place[w] += pct[w] > base.duty_pct[k];
+    for (size_t w = 0; w < static_cast<size_t>(wheels); ++w)
+    {
+        const double *from_pct = &base.duty_pct[static_cast<size_t>(place[w])];
+        const double *mps = &base.wheel_speed_mps[static_cast<size_t>(place[w])];
+        const double part = (pct[w] - from_pct[0]) / (from_pct[1] - from_pct[0]);
+        const double size_mps = mps[0] + part * (mps[1] - mps[0]);
+        rim_mps[w] = duty[w] < 0 ? -size_mps : size_mps;
+    }
+    return rim_mps;
 }
 
 struct Relaxed
@@ -34,10 +42,8 @@ struct Relaxed
 // First-order approach of `target` over `dt_s`, exact: v' = (target - v) / tau.
 Relaxed Approach(double v, double target, double tau_s, double dt_s, Decays &decays)
 {
-    if (tau_s <= 0)
-        return {target, target};
-    const double decay = decays.Over(dt_s, tau_s);
-    return {target + (v - target) * decay, target + (v - target) * (1 - decay) * tau_s / dt_s};
+    const Decay &decay = decays.Over(dt_s, tau_s);
+    return {target + (v - target) * decay.end, target + (v - target) * decay.mean};
 }
 
 // The same while slowing down no faster than `max_decel_mps2`: linear first, then first-order.
@@ -64,21 +70,21 @@ Relaxed Relax(double v, double target, double tau_s, double max_decel_mps2, doub
 // Nothing limits how fast wheels slow down, and all lag alike.
 bool RelaxAlike(const WheelSignals &s)
 {
-    bool alike = s.tau_s[0] > 0;
+    bool alike = true;
     for (size_t k = 0; k < kMaxWheels; ++k)
         alike &= (s.tau_s[k] == s.tau_s[0]) & (s.max_decel_mps2[k] == kNoLimit);
     return alike;
 }
 
 // As Approach(), of all wheels at once; those that a robot has not stand and are told to.
-void ApproachAlike(const WheelSignals &s, Decays &decays, Wheels &mean_mps, Wheels &end_mps)
+void ApproachAlike(const Wheels &rim_mps, const Wheels &target_mps, const Decay &decay,
+                   Wheels &mean_mps, Wheels &end_mps)
 {
-    const double tau_s = s.tau_s[0], dt_s = s.dt_s, decay = decays.Over(dt_s, tau_s);
     for (size_t k = 0; k < kMaxWheels; ++k)
     {
-        const double target = s.target_mps[k], away = s.rim_mps[k] - target;
-        end_mps[k] = target + away * decay;
-        mean_mps[k] = target + away * (1 - decay) * tau_s / dt_s;
+        const double target = target_mps[k], away = rim_mps[k] - target;
+        end_mps[k] = target + away * decay.end;
+        mean_mps[k] = target + away * decay.mean;
     }
 }
 
@@ -118,13 +124,6 @@ bool IsSameEverywhere(const BoundEffect &effect)
 {
     const Card &card = effect.spec().card;
     return card.needs != Needs::kRoom && card.family != Family::kFormula && effect.StateSize() == 0;
-}
-
-GroundSignals SignalsOf(const RobotFacts &robot, const Twist &twist, bool moves, const Pose2 &pose,
-                        const Direction &ahead, double t_s, double dt_s)
-{
-    return {robot,          t_s,   dt_s,         moves,        pose.x_m,         pose.y_m,
-            pose.theta_rad, ahead, twist.vx_mps, twist.vy_mps, twist.omega_radps};
 }
 
 }  // namespace
@@ -201,10 +200,7 @@ WheelMotion DriveChain::Target(const Wheels &command) const
     WheelMotion target;
     switch (base_.drive)
     {
-        case Drive::kDuty:
-            for (int k = 0; k < robot_.wheels; ++k)
-                target.rim_mps[k] = RimSpeed(base_, command[k]);
-            break;
+        case Drive::kDuty: target.rim_mps = RimSpeeds(base_, command, robot_.wheels); break;
         case Drive::kWheelSpeed:
             for (int k = 0; k < robot_.wheels; ++k)
                 target.rim_mps[k] = command[k] * robot_.wheel_radius_m;
@@ -220,20 +216,25 @@ WheelMotion DriveChain::Target(const Wheels &command) const
 WheelMotion DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
                                     RobotState &state) const
 {
+    if (duty_.empty())
+        return DrivePart({robot_, t_s, command.battery_V, dt_s, command.value}, state);
     WheelMotion mean;
     for (double done_s = 0; done_s < dt_s;)
     {
         DutySignals duty{robot_, t_s + done_s, command.battery_V, dt_s - done_s, command.value};
         Run(duty_, duty, state);
-        DrivePart(duty, dt_s, state, mean);
+        const WheelMotion part = DrivePart(duty, state);
+        const double share = duty.dt_s / dt_s;
+        for (size_t k = 0; k < kMaxWheels; ++k)
+            mean.rim_mps[k] += part.rim_mps[k] * share;
+        mean.steering_rad += part.steering_rad * share;
         done_s += duty.dt_s;
     }
     return mean;
 }
 
-// The part of a step of `whole_s` in which the duties stay the same; adds its share to `mean`.
-void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
-                           WheelMotion &mean) const
+// The same over a part of a step in which the duties stay the same.
+WheelMotion DriveChain::DrivePart(const DutySignals &duty, RobotState &state) const
 {
     if (state.told != duty.duty)
     {
@@ -242,35 +243,56 @@ void DriveChain::DrivePart(const DutySignals &duty, double whole_s, RobotState &
         state.asked_mps = target.rim_mps;
         state.asked_steering_rad = target.steering_rad;
     }
+    WheelMotion mean;
+    Wheels &mean_mps = mean.rim_mps, end_mps{};
+    if (wheel_.empty())
+        ApproachAlike(state.rim_mps, state.asked_mps,
+                      state.decays.Over(duty.dt_s, base_.motor_lag_s), mean_mps, end_mps);
+    else
+        TurnWheels(duty, state, mean_mps, end_mps);
+    Wheels ratio{1, 1, 1, 1};
+    if (!rolling_.empty())
+    {
+        RollSignals roll{robot_,   duty.t_s, duty.dt_s,      duty.duty,
+                         mean_mps, end_mps,  state.wheel_rad};
+        Run(rolling_, roll, state);
+        ratio = roll.radius_ratio;
+    }
+    const double rad_per_mps = duty.dt_s / robot_.wheel_radius_m;
+    for (size_t k = 0; k < kMaxWheels; ++k)
+    {
+        state.rim_mps[k] = end_mps[k];
+        state.wheel_rad[k] += mean_mps[k] * rad_per_mps;
+        mean_mps[k] *= ratio[k];
+    }
+    if (kinematics_.steers())
+    {
+        const Relaxed steering = Approach(state.steering_rad, state.asked_steering_rad,
+                                          base_.steering_lag_s, duty.dt_s, state.decays);
+        state.steering_rad = steering.end;
+        mean.steering_rad = steering.mean;
+    }
+    return mean;
+}
+
+// Rim speeds over that part with the effects on wheels.
+void DriveChain::TurnWheels(const DutySignals &duty, RobotState &state, Wheels &mean_mps,
+                            Wheels &end_mps) const
+{
     WheelSignals s{robot_,    duty.t_s,      duty.dt_s,       duty.battery_V,
                    duty.duty, state.rim_mps, state.wheel_rad, state.asked_mps};
     s.tau_s.fill(base_.motor_lag_s);
     Run(wheel_, s, state);
-
-    Wheels mean_mps{}, end_mps{};
     if (RelaxAlike(s))
-        ApproachAlike(s, state.decays, mean_mps, end_mps);
-    else
-        for (int k = 0; k < robot_.wheels; ++k)
-        {
-            const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
-                                      s.max_decel_mps2[k], s.dt_s, state.decays);
-            mean_mps[k] = rim.mean;
-            end_mps[k] = rim.end;
-        }
-    const double part = duty.dt_s / whole_s, rad_per_mps = duty.dt_s / robot_.wheel_radius_m;
-    RollSignals roll{robot_, duty.t_s, duty.dt_s, duty.duty, mean_mps, end_mps, state.wheel_rad};
-    Run(rolling_, roll, state);
+        return ApproachAlike(s.rim_mps, s.target_mps, state.decays.Over(s.dt_s, s.tau_s[0]),
+                             mean_mps, end_mps);
     for (int k = 0; k < robot_.wheels; ++k)
     {
-        state.rim_mps[k] = end_mps[k];
-        state.wheel_rad[k] += mean_mps[k] * rad_per_mps;
-        mean.rim_mps[k] += mean_mps[k] * roll.radius_ratio[k] * part;
+        const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
+                                  s.max_decel_mps2[k], s.dt_s, state.decays);
+        mean_mps[k] = rim.mean;
+        end_mps[k] = rim.end;
     }
-    const Relaxed steering = Approach(state.steering_rad, state.asked_steering_rad,
-                                      base_.steering_lag_s, duty.dt_s, state.decays);
-    state.steering_rad = steering.end;
-    mean.steering_rad += steering.mean * part;
 }
 
 // First-order (Ornstein-Uhlenbeck) velocity noise, mean over a step taken as its value: steps are
@@ -303,18 +325,6 @@ Rolling DriveChain::Roll(const WheelMotion &motion) const
                         [](double v) { return std::abs(v) > kStandstill_mps; })};
 }
 
-// With the base's gains.
-Twist DriveChain::Geared(const Rolling &rolling) const
-{
-    Twist twist = rolling.twist;
-    twist.vx_mps *= base_.forward_gain * theta_a1_;
-    twist.vy_mps *= base_.sideways_gain * theta_a1_;
-    twist.omega_radps *= base_.yaw_gain * theta_a2_;
-    if (kinematics_.steers())
-        twist.vy_mps += kinematics_.SidewaysOfTurning(twist.omega_radps);
-    return twist;
-}
-
 Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
                           RobotState &state, Random *random) const
 {
@@ -323,7 +333,7 @@ Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double
         Disturb(twist, dt_s, state, *random);
     if (!ground_.empty())
     {
-        GroundSignals s = SignalsOf(robot_, twist, rolling.moves, state.pose, ahead, t_s, dt_s);
+        GroundSignals s = BeforeGround(twist, rolling.moves, state.pose, ahead, t_s, dt_s);
         Run(ground_, s, state);
         twist = {s.vx_mps, s.vy_mps, s.omega_radps};
     }
@@ -331,12 +341,6 @@ Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double
     state.vy_mps = twist.vy_mps;
     state.omega_radps = twist.omega_radps;
     return twist;
-}
-
-GroundSignals DriveChain::BeforeGround(const Rolling &rolling, const Pose2 &pose,
-                                       const Direction &ahead, double t_s, double dt_s) const
-{
-    return SignalsOf(robot_, Geared(rolling), rolling.moves, pose, ahead, t_s, dt_s);
 }
 
 void DriveChain::Observe(Pose2 &pose, double &t_s) const

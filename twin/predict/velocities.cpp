@@ -70,20 +70,22 @@ std::vector<double> PredictVelocities(const std::vector<Model> &models, const Tr
             usable.push_back(k);
     const std::vector<size_t> before = BeforeEach(track, usable);
     std::vector<double> velocities(3 * models.size() * poses.size(), 0.0);
-    const auto predict = [&](size_t b, const Recording *known) {
+    const auto predict = [&](size_t b, const Recording *known, bool alike) {
         const DriveChain chain(models[b]);
         std::vector<Sample> measured;
         measured.reserve(usable.size());
         for (const size_t k : usable)
             measured.push_back(Measured(chain, track, k));
-        const bool shared = known && known->IsAt(measured);
-        Recording own = shared ? Recording{} : Record(chain, track, measured);
+        const auto plan = PlanOf(track, measured, known ? known->plan : nullptr);
+        const bool shared = alike && plan == known->plan;
+        Recording own = shared ? Recording{} : Record(chain, plan);
         const Recording &recording = shared ? *known : own;
         RobotState state = chain.Start({});
         const auto go = [&](size_t event, const Pose2 &start) {
             Course course(start);
-            const size_t from = event > 0 ? recording.reached[event - 1] : 0;
-            Move(chain, recording, from, recording.reached[event], course, state);
+            const std::vector<size_t> &reached = recording.plan->reached;
+            Move(chain, recording, event > 0 ? reached[event - 1] : 0, reached[event], course,
+                 state);
             return course.pose();
         };
         size_t next = 0;  // event, where effects remember the way there
@@ -107,10 +109,9 @@ std::vector<double> PredictVelocities(const std::vector<Model> &models, const Tr
     };
     if (models.empty())
         return velocities;
-    const Recording first = predict(0, nullptr);
-    InParallel(models.size() - 1, [&](size_t b) {
-        predict(b + 1, DriveAlike(models[b + 1], models[0]) ? &first : nullptr);
-    });
+    const Recording first = predict(0, nullptr, false);
+    InParallel(models.size() - 1,
+               [&](size_t b) { predict(b + 1, &first, DriveAlike(models[b + 1], models[0])); });
     return velocities;
 }
 

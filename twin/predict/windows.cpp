@@ -99,8 +99,8 @@ std::vector<std::vector<double>> Remembered(const DriveChain &chain,
     for (size_t e = 0; e < measured.size(); ++e)
     {
         Course course(measured[e > 0 ? e - 1 : 0].pose);
-        Move(chain, recording, done, recording.reached[e], course, state);
-        done = recording.reached[e];
+        Move(chain, recording, done, recording.plan->reached[e], course, state);
+        done = recording.plan->reached[e];
         remembered.push_back(state.effect_state);
     }
     return remembered;
@@ -138,7 +138,7 @@ private:
         RobotState state = chain.Start({});
         Course course({});
         size_t done = 0;
-        for (const size_t reached : recording.reached)
+        for (const size_t reached : recording.plan->reached)
         {
             Move(chain, recording, done, reached, course, state);
             path.push_back(course.pose());
@@ -169,8 +169,8 @@ private:
         size_t window = 0, step = 0;
         for (size_t event = 0; event < measured.size(); ++event)
         {
-            for (; step < recording.reached[event]; ++step)
-                MoveAll(recording.steps[step], walkers, signals);
+            for (; step < recording.plan->reached[event]; ++step)
+                MoveAll(recording.plan->steps[step], recording.rolled[step], walkers, signals);
             for (; window < windows.starts.size() && events.At(windows.starts[window]) == event;
                  ++window)
                 walkers.push_back({Course(measured[event].pose),
@@ -181,12 +181,13 @@ private:
     }
 
     // `signals` is room for those of the walkers.
-    void MoveAll(const WheelStep &step, std::vector<Walker> &walkers,
+    void MoveAll(const Plan::Step &step, const Rolling &rolling, std::vector<Walker> &walkers,
                  std::vector<GroundSignals> &signals) const
     {
+        const Twist geared = chain.Geared(rolling);
         signals.clear();
         for (const Walker &walker : walkers)
-            signals.push_back(chain.BeforeGround(step.rolling, walker.course.pose(),
+            signals.push_back(chain.BeforeGround(geared, rolling.moves, walker.course.pose(),
                                                  walker.course.ahead(), step.t_s, step.dt_s));
         chain.ActOnGround(std::span(signals), [&](size_t i) { return walkers[i].memory.data(); });
         for (size_t i = 0; i < walkers.size(); ++i)
@@ -275,7 +276,7 @@ std::vector<double> PredictWindows(const Model &model, const Track &track,
     const Events events(windows);
     const DriveChain chain(model);
     const auto measured = MeasuredAt(chain, track, events);
-    const Recording recording = Record(chain, track, measured);
+    const Recording recording = Record(chain, PlanOf(track, measured, nullptr));
     std::vector<double> predicted(3 * ends.size(), kNaN);
     Prediction{chain, windows, events, measured, recording, predicted.data()}.Write();
     return predicted;
@@ -299,13 +300,16 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
         awaited[firsts[b]] |= firsts[b] != b;
     }
     std::vector<Recording> recordings(models.size());
+    std::shared_ptr<const Plan> plan;
+    if (!models.empty())
+        plan = PlanOf(track, MeasuredAt(DriveChain(models[0]), track, events), nullptr);
     std::vector<double> predicted(models.size() * 3 * ends.size(), kNaN);
     const auto predict = [&](size_t b) {
         const DriveChain chain(models[b]);
         const auto measured = MeasuredAt(chain, track, events);
         const Recording &first = recordings[firsts[b]];
-        const bool shared = first.IsAt(measured);
-        Recording recording = shared ? Recording{} : Record(chain, track, measured);
+        const bool shared = first.plan && first.plan->IsAt(measured);
+        Recording recording = shared ? Recording{} : Record(chain, PlanOf(track, measured, plan));
         Prediction{chain,
                    windows,
                    events,

@@ -43,10 +43,25 @@ public:
     Rolling Roll(const WheelMotion &motion) const;
     Twist OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
                   RobotState &state, Random *random) const;
+    // With the base's gains: the velocity that effects of the ground find.
+    Twist Geared(const Rolling &rolling) const
+    {
+        Twist twist = rolling.twist;
+        twist.vx_mps *= base_.forward_gain * theta_a1_;
+        twist.vy_mps *= base_.sideways_gain * theta_a1_;
+        twist.omega_radps *= base_.yaw_gain * theta_a2_;
+        if (kinematics_.steers())
+            twist.vy_mps += kinematics_.SidewaysOfTurning(twist.omega_radps);
+        return twist;
+    }
     // The second without noise, of several robots whose wheels move alike: their signals before the
     // effects of the ground, and these. memory(i) is what effects remember of robot i.
-    GroundSignals BeforeGround(const Rolling &rolling, const Pose2 &pose, const Direction &ahead,
-                               double t_s, double dt_s) const;
+    GroundSignals BeforeGround(const Twist &geared, bool moves, const Pose2 &pose,
+                               const Direction &ahead, double t_s, double dt_s) const
+    {
+        return {robot_,         t_s,   dt_s,          moves,         pose.x_m,          pose.y_m,
+                pose.theta_rad, ahead, geared.vx_mps, geared.vy_mps, geared.omega_radps};
+    }
     template <class Memory>
     void ActOnGround(std::span<GroundSignals> robots, Memory memory) const
     {
@@ -69,6 +84,8 @@ public:
     bool IsHomogeneous() const { return homogeneous_; }
     // Some formula has had no finite value so far.
     bool IsSilent() const;
+    // No effect on the ground at all.
+    bool IsBare() const { return ground_.empty(); }
     // Some effect on the ground has a state.
     bool RemembersOnGround() const { return remembers_on_ground_; }
 
@@ -85,9 +102,9 @@ private:
     template <class On, class S>
     static void Run(const std::vector<Bound<On>> &stage, S &signals, RobotState &state);
     WheelMotion Target(const Wheels &command) const;
-    void DrivePart(const DutySignals &duty, double whole_s, RobotState &state,
-                   WheelMotion &mean) const;
-    Twist Geared(const Rolling &rolling) const;
+    WheelMotion DrivePart(const DutySignals &duty, RobotState &state) const;
+    void TurnWheels(const DutySignals &duty, RobotState &state, Wheels &mean_mps,
+                    Wheels &end_mps) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;

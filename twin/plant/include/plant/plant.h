@@ -35,25 +35,32 @@ struct Command
 
 constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
 
-// exp(-dt / tau) of late: commands that come evenly ask for the same few again and again.
+// What is left of a first-order lag after a step, 1 at its begin: exp(-dt / tau) at its end, and
+// the mean meanwhile.
+struct Decay
+{
+    double dt_s = 0, tau_s = 0, end = 1, mean = 1;
+};
+
+// Decays of late: commands that come evenly ask for the same few again and again.
 class Decays
 {
 public:
-    double Over(double dt_s, double tau_s)
+    const Decay &Over(double dt_s, double tau_s)
     {
         const uint64_t mixed = std::bit_cast<uint64_t>(dt_s) * 0x9E3779B97F4A7C15;
         Decay &decay = known_[mixed >> (64 - kBits)];
         if (dt_s != decay.dt_s || tau_s != decay.tau_s)
-            decay = {dt_s, tau_s, std::exp(-dt_s / tau_s)};
-        return decay.value;
+        {
+            const bool lags = tau_s > 0;
+            const double end = lags ? std::exp(-dt_s / tau_s) : 0;
+            decay = {dt_s, tau_s, end, lags ? (1 - end) * tau_s / dt_s : 0};
+        }
+        return decay;
     }
 
 private:
-    struct Decay
-    {
-        double dt_s = 0, tau_s = 0, value = 1;
-    };
-    static constexpr int kBits = 5;
+    static constexpr int kBits = 6;
     std::array<Decay, 1 << kBits> known_;
 };
 
