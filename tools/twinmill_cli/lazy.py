@@ -5,6 +5,7 @@ The help of a command needs its options alone. What else the command needs takes
 and its module imports that below `if working():`.
 """
 
+import gc
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,7 @@ from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup, TyperOption
+from typer.core import TyperCommand, TyperGroup
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 
@@ -22,17 +23,6 @@ _working = True
 def working() -> bool:
     """Whether a command's module is imported to work, and not to show its help alone."""
     return _working
-
-
-class CommandGroup(TyperGroup):
-    """A group of commands whose --help is quick."""
-
-    def get_help_option(self, ctx: typer.Context) -> TyperOption | None:
-        """Typer's, but false and not None unless given: Typer checks None with pydantic."""
-        option = super().get_help_option(ctx)
-        if option is not None:
-            option.default = False
-        return option
 
 
 class LazyCommand(TyperCommand):
@@ -51,7 +41,10 @@ class LazyCommand(TyperCommand):
     def command(self) -> TyperCommand | TyperGroup:
         """The subcommand itself."""
         app = typer.Typer()
-        import_module(self.module).register(app)
+        gc.disable()  # see __init__.py
+        module = import_module(self.module)
+        gc.enable()
+        module.register(app)
         for command in app.registered_commands:
             # Typer reads all annotations; what a command returns is a type of the library.
             command.callback.__annotations__.pop("return", None)

@@ -6,9 +6,10 @@ import sys
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from twinmill_cli.ending import leave
-from twinmill_cli.lazy import CommandGroup, LazyCommand
+from twinmill_cli.lazy import LazyCommand
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
@@ -177,7 +178,7 @@ COMMANDS = (
 )
 
 
-class Commands(CommandGroup):
+class Commands(TyperGroup):
     """All of them."""
 
     def __init__(self, **options: Any) -> None:

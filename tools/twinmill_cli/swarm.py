@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 
 from twinmill.defaults import URL
-from twinmill_cli.lazy import CommandGroup, working
+from twinmill_cli.lazy import working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
 from twinmill_cli.output import AsJson, deliver, print_object
 
@@ -47,7 +47,6 @@ Behavior = Annotated[str, typer.Option("--behavior", "-b", help="Select it first
 def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
     swarm = typer.Typer(
-        cls=CommandGroup,
         help="Start, stop and watch the robots on the network, or those of twin_run.",
         no_args_is_help=True,
     )

@@ -3,6 +3,7 @@
 
 import math
 import re
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -11,6 +12,7 @@ from typer.core import TyperArgument, TyperCommand, TyperOption
 _display_type = TyperOption.display_type_rich
 _argument_type = TyperArgument.display_type_rich
 _process_value = TyperOption.process_value
+_argument_value = TyperArgument.process_value
 _parse_args = TyperCommand.parse_args
 
 
@@ -28,8 +30,44 @@ def _plain(shown: str | None) -> str | None:
     return shown and re.sub(r"<list\[(.*)\]>|<(\w+) range>", r"<\1\2>", shown).lower()
 
 
+class _Plain:
+    """What a word of the command line is where any word will do, as a text or path; or a flag.
+
+    Typer asks pydantic, which takes twice as long to import as NumPy.
+    """
+
+    def __init__(self, kind: type) -> None:
+        self.kind = kind
+
+    def coerce(self, value: Any, param: TyperOption | TyperArgument, ctx: typer.Context) -> Any:
+        """The value; of several words all."""
+        many = param.multiple or param.nargs == -1
+        if many:
+            return [self.kind(one) for one in value or ()]
+        return None if value is None else self.kind(value)
+
+
+# By the annotation, as Typer tells it; of `bool` are flags alone.
+PLAIN = {bool: bool, str: str, Path: Path, list[str]: str, list[Path]: Path}
+
+
+def _without_pydantic(param: TyperOption | TyperArgument) -> None:
+    """Before its first value: parameters of which any word will do."""
+    kind, info = PLAIN.get(param.type_descriptor.annotation), param.type_descriptor.parameter_info
+    checked = info.parser or info.exists or info.resolve_path or not info.file_okay
+    if kind and not (checked or not info.dir_okay or info.writable):
+        param._runtime_param = _Plain(kind)
+
+
+def _given(argument: TyperArgument, ctx: typer.Context, value: Any) -> Any:
+    """Typer's, but without pydantic where that is not needed."""
+    _without_pydantic(argument)
+    return _argument_value(argument, ctx, value)
+
+
 def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
     """Typer's, but NaN and infinity are refused: NaN passes every range."""
+    _without_pydantic(option)
     found = _process_value(option, ctx, value)
     for number in found if isinstance(found, list | tuple) else [found]:
         odd = isinstance(number, float) and not math.isfinite(number)
@@ -52,3 +90,4 @@ TyperCommand.parse_args = _each_once
 TyperOption.display_type_rich = _type_shown
 TyperArgument.display_type_rich = _of_argument
 TyperOption.process_value = _finite
+TyperArgument.process_value = _given
