@@ -24,6 +24,7 @@ from twinmill.diagnosis.moments import Events, Moment, events_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import COUPLING, PLACE, TIME, Term
+from twinmill.fitting.boosting import squares
 from twinmill.fitting.compare import GOOD
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
@@ -352,7 +353,7 @@ def _verdict(
         return Rest(0.0, False, [], left_over=left_over, old=old)
     best, coefficient = _best_term(terms, products, groups[0].group)
     own = np.array([t == best for t in terms])
-    takes = float(products.held_out(own)[0] / max(total, 1e-9))
+    takes = float(products.held_out(own) / max(total, 1e-9))
     return Rest(
         0.0,
         False,
@@ -450,7 +451,7 @@ def _without_redundant(
             kept += [] if products.holds(group.own, kept[0].own) else [group]
             continue
         names = {d.group for d in [*kept, group]}
-        together, _ = products.held_out(np.array([t.group in names for t in terms]))
+        together = products.held_out(np.array([t.group in names for t in terms]))
         if not kept or together > (1 + SETTINGS.beside) * gain:
             kept, gain = [*kept, group], together
     return kept
@@ -521,7 +522,7 @@ class Products:
         )
         self.moments, self.across = across[:, 0], across[:, 1:]
         self.along = self.across.sum(0)
-        self.inside = np.array([basis[p].T @ basis[p] for p in self.parts])
+        self.inside = squares(basis, self.parts)
         self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
         more = self.along * (self.inside @ self.along - 2 * self.across)
         self.energy = square + more.sum(1)
@@ -533,12 +534,40 @@ class Products:
         """Of some (T,) columns with each other."""
         some = self.own[own]
         rows = self.weight * self.columns.some(some)
-        blocks = np.array([rows[p].T @ rows[p] for p in self.parts])
-        along = self.along[:, some]
-        crossed = along.T @ (self.across[:, :, some] - self.inside @ along / 2)
-        blocks -= crossed + crossed.swapaxes(1, 2)
-        blocks *= self.seen[own] * self.seen[own][:, None]
-        return Grams(blocks, np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)]))
+        blocks = squares(rows, self.parts)
+        self._project(blocks, own, self.across[:, :, some], self.inside)
+        return Grams(blocks, self._by_fold(blocks))
+
+    def _folds(self, own: np.ndarray) -> np.ndarray:
+        """(FOLDS, k, k) of the same, without blocks: of many columns those fill the memory."""
+        some = self.own[own]
+        rows = self.weight * self.columns.some(some)
+        found = np.zeros((FOLDS, len(some), len(some)))
+        for b, p in enumerate(self.parts):
+            found[self.fold[b]] += rows[p].T @ rows[p]
+        across, inside = self._by_fold(self.across[:, :, some]), self._by_fold(self.inside)
+        self._project(found, own, across, inside)
+        return found
+
+    def _by_fold(self, blocks: np.ndarray) -> np.ndarray:
+        """(FOLDS, ...) sums of (B, ...)."""
+        return np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)])
+
+    def _project(
+        self, grams: np.ndarray, own: np.ndarray, across: np.ndarray, inside: np.ndarray
+    ) -> None:
+        """Takes what is free out of (B, k, k) products of columns.
+
+        Args:
+            grams: to be changed.
+            own: (T,) whose they are.
+            across: (B, P, k) of what is free with them.
+            inside: (B, P, P) of what is free with itself.
+        """
+        along = self.along[:, self.own[own]]
+        crossed = along.T @ (across - inside @ along / 2)
+        grams -= crossed + crossed.swapaxes(1, 2)
+        grams *= self.seen[own] * self.seen[own][:, None]
 
     def only(self, own: np.ndarray) -> "Products":
         """The same of some (T,) columns."""
@@ -550,14 +579,14 @@ class Products:
     def holds(self, many: np.ndarray, few: np.ndarray) -> bool:
         """Whether many columns make up a few of them (nearly) whole."""
         either = many | few
-        gram, many, few = self.grams(either).folds.sum(0), many[either], few[either]
+        gram, many, few = self._folds(either).sum(0), many[either], few[either]
         inside = gram[np.ix_(many, many)] + 1e-9 * self.energy.sum() * np.eye(many.sum())
         across = gram[np.ix_(many, few)]
         made = np.sum(across * np.linalg.solve(inside, across))
         return bool(many.sum() > few.sum() and made > HOLDS * np.trace(gram[np.ix_(few, few)]))
 
     def each_held_out(self, flips: int = 0, ridge: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) and (F, T): what `held_out` gives for each column alone."""
+        """(T,) and (F, T): what `together_held_out` gives for each column alone."""
         energy, moments = self.energy, self.moments
         scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + ridge))
         signs = _signs(flips, len(energy))
@@ -572,21 +601,20 @@ class Products:
             gain += 2 * size * judged - size**2 * energy[test].sum(0)
         return gain[0], gain[1:]
 
-    def held_out(
-        self, own: np.ndarray, flips: int = 0, ridge: float = 1.0
-    ) -> tuple[float, np.ndarray]:
-        """Fall of the cost by these columns on blocks not fitted to, and (F,) what chance brings.
-
-        Chance: random signs of what each block still scatters after the columns are fitted to all.
-        """
+    def held_out(self, own: np.ndarray) -> float:
+        """Fall of the cost by these columns on blocks not fitted to."""
         places = np.flatnonzero(own)[None]
-        gains, nulls = self.together_held_out(places, [self.grams(own)], flips, ridge)
-        return float(gains[0]), nulls[0]
+        grams = Grams(np.zeros((0, own.sum(), own.sum())), self._folds(own))
+        gains, _ = self.together_held_out(places, [grams], 0, 1.0)
+        return float(gains[0])
 
     def together_held_out(
         self, places: np.ndarray, grams: Sequence[Grams], flips: int, ridge: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) and (N, F) the same of N sets of columns, (N, k) `places`, with their products."""
+        """(N,) fall by each of N sets of columns, (N, k) `places`, and (N, F) what chance brings.
+
+        Chance: random signs of what each block still scatters after the columns are fitted to all.
+        """
         moments = np.moveaxis(self.moments[:, places], 1, 0)  # (N, B, k)
         folds = np.array([g.folds for g in grams])  # (N, FOLDS, k, k)
         whole = folds.sum(1) + ridge * np.eye(places.shape[1])  # columns are in typical strengths

@@ -105,7 +105,7 @@ def rival_of(formulas: Formulas, name: str, less: Trial, whole: Trial) -> Rival 
         if with_role(name, "moment") and formulas.terms[k].is_step:
             continue  # the same, at a moment that is not fitted
         both = products.only(np.isin(np.arange(1 + len(gains)), [0, 1 + k]))
-        beside = both.held_out(np.ones(2, bool), 0)[0] - gains[k]
+        beside = both.held_out(np.ones(2, bool)) - gains[k]
         outdoes = gains[k] > SETTINGS.outdoes * own and beside < SETTINGS.kept * own
         if outdoes or beside < SETTINGS.nothing_beside * own:
             return Rival(formulas.terms[k], bool(outdoes))
