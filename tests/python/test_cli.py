@@ -424,6 +424,20 @@ def test_a_diagnosis_begins_without_the_statistics_that_its_end_needs():
     assert not set(done.stdout.split()) & {"scipy.stats", "scipy.optimize"}
 
 
+def test_words_that_need_no_check_are_taken_without_pydantic():
+    """It takes as long to import as the library itself."""
+    code = (
+        "import sys\n"
+        "from twinmill_cli.main import run\n"
+        "try:\n"
+        "    run(['diagnose', 'no such log', '--model', 'turbopi.toml', '--json'])\n"
+        "except ValueError as error:\n"
+        "    print(str(error).split(':')[0], 'pydantic' in sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "no such log False\n"
+
+
 @pytest.mark.parametrize(
     ("typed", "completed"),
     [

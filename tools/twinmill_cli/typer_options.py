@@ -30,7 +30,7 @@ def _plain(shown: str | None) -> str | None:
     return shown and re.sub(r"<list\[(.*)\]>|<(\w+) range>", r"<\1\2>", shown).lower()
 
 
-class _Plain:
+class _Word:
     """What a word of the command line is where any word will do, as a text or path; or a flag.
 
     Typer asks pydantic, which takes twice as long to import as NumPy.
@@ -40,23 +40,23 @@ class _Plain:
         self.kind = kind
 
     def coerce(self, value: Any, param: TyperOption | TyperArgument, ctx: typer.Context) -> Any:
-        """The value; of several words all."""
+        """The value, or all of several; None, or an empty tuple, where none is given."""
         many = param.multiple or param.nargs == -1
-        if many:
-            return [self.kind(one) for one in value or ()]
-        return None if value is None else self.kind(value)
+        if value is None:
+            return () if many else None
+        return [self.kind(one) for one in value] if many else self.kind(value)
 
 
 # By the annotation, as Typer tells it; of `bool` are flags alone.
-PLAIN = {bool: bool, str: str, Path: Path, list[str]: str, list[Path]: Path}
+WORDS = {bool: bool, str: str, Path: Path, list[str]: str, list[Path]: Path}
 
 
 def _without_pydantic(param: TyperOption | TyperArgument) -> None:
     """Before its first value: parameters of which any word will do."""
-    kind, info = PLAIN.get(param.type_descriptor.annotation), param.type_descriptor.parameter_info
+    kind, info = WORDS.get(param.type_descriptor.annotation), param.type_descriptor.parameter_info
     checked = info.parser or info.exists or info.resolve_path or not info.file_okay
     if kind and not (checked or not info.dir_okay or info.writable):
-        param._runtime_param = _Plain(kind)
+        param._runtime_param = _Word(kind)
 
 
 def _given(argument: TyperArgument, ctx: typer.Context, value: Any) -> Any:
