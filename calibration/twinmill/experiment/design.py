@@ -20,7 +20,7 @@ from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import base_parameters, catalogue
+from twinmill.model.parameters import base_parameters, catalogue_of
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import Windows, score
@@ -377,7 +377,8 @@ class _Outlook:
         floors = [*(f for _, f in driven), *(driven[0][1] for _ in planned)]
         scores += [max(1.0, self.usual, *scores) for _ in planned]
         matter = relevance(logs, floors, scores, self.fisher, grams=grams, richer=self.wanted)
-        entries = [catalogue()[candidate_effects[i].name] for i in self.wanted]
+        cards = catalogue_of(state.logs[0].model)
+        entries = [cards[candidate_effects[i].name] for i in self.wanted]
         return margins, power(
             margins,
             np.array([len(e["parameters"]) for e in entries]),

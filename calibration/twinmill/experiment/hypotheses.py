@@ -15,7 +15,7 @@ from twinmill.model.parameters import (
     Parameter,
     all_effect_parameters,
     beginning_at_a_moment,
-    catalogue,
+    catalogue_of,
 )
 from twinmill.predict.modelled_log import ModelledLog
 
@@ -113,20 +113,21 @@ def candidate_effects(
     without = [s.white_errors() for s in logs]
     found = [(candidate, candidate.columns(logs, without)) for candidate, _ in shown]
     tested = screen(logs, state.free, found).found
+    cards = catalogue_of(logs[0].model)
     return [
         CandidateEffect(
-            t.candidate, _whole(t.candidate.effect, asked.fitted), max(t.excess, usual**2)
+            t.candidate, _whole(cards[t.candidate.effect], asked.fitted), max(t.excess, usual**2)
         )
         for t in tested
     ]
 
 
-def _whole(effect: str, fitted: dict[str, dict[str, float]]) -> Candidate:
-    """The one step from neutral to the effect's strength."""
-    parameters = catalogue()[effect]["parameters"]
-    values = fitted.get(effect, {})
+def _whole(card: dict, fitted: dict[str, dict[str, float]]) -> Candidate:
+    """The one step from neutral to the effect's strength, by its card of such a robot."""
+    parameters = card["parameters"]
+    values = fitted.get(card["name"], {})
     return Candidate(
-        effect,
+        card["name"],
         tuple(p["name"] for p in parameters),
         tuple(p["neutral"] for p in parameters),
         (tuple(values.get(p["name"], p["default"]) for p in parameters),),

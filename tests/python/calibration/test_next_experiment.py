@@ -14,15 +14,17 @@ from twinmill.data.log import read_log
 from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
-from twinmill.experiment.design import Limits, Plan, check, design
+from twinmill.experiment.design import Limits, Plan, check, design, with_effect
+from twinmill.experiment.hypotheses import State, candidate_effects
 from twinmill.experiment.information import CLOCKS, FisherInformation
 from twinmill.experiment.moves import AXES, duty_axes, family
 from twinmill.experiment.played import Rows, csv_text, rows_of
 from twinmill.experiment.power import ALPHA, named_apart
 from twinmill.experiment.relevance import Relevance
-from twinmill.fitting.fit import fit
+from twinmill.fitting.fit import base_names, fit
+from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import Parameter
+from twinmill.model.parameters import Parameter, base_parameters
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_run
 
@@ -158,6 +160,31 @@ def designed(run_log, measure, model_file, tmp_path_factory) -> Designed:
     return Designed(
         model, milling, before, design(before, model, Limits(20, (2.0, 1.5), 0.8), print)
     )
+
+
+def test_what_is_in_question_of_wheels_is_so_of_the_robots_own(measure, model_file):
+    """A robot of two wheels has no rear ones, whatever effects of wheels may have elsewhere."""
+    legs = np.random.default_rng(7).choice((-100, -50, 0, 50, 100), (25, 2))
+    sides_pct = np.tile(np.repeat(legs, round(0.8 / COMMAND_S), axis=0), 2)
+    two = model_file(
+        ('"mecanum"', '"differential"'), ("half_wheelbase_m = 0.059", "half_wheelbase_m = 0")
+    )
+    (own,) = open_measurements([measure(seed=7, script_pct=sides_pct)], two)
+    log = own.modelled()
+    free = base_parameters(own.model, base_names(own.model, [own], ()))
+    asked = SimpleNamespace(fitted={})
+    state = State([log], free, [own.floor.rms])
+    found = {e.name: e for e in candidate_effects([log], log, state=state, asked=asked, usual=1.0)}
+    assert {"wheel_gain", "wheel_eccentricity"} <= set(found)
+    for effect in found.values():
+        richer = with_effect(own.model, effect)
+        own_names = {
+            q["name"].split(".")[1]
+            for q in richer.values()
+            if q["name"].startswith(f"{effect.name}.")
+        }
+        assert own_names == set(effect.whole.names)
+    assert set(found["wheel_gain"].whole.names) == {"fl", "fr"}
 
 
 def at_steps(rows: Rows) -> np.ndarray:
