@@ -215,6 +215,38 @@ def test_a_clock_that_was_set_within_the_log_is_told_with_time_and_step(robot, b
     assert ("later" if by_s > 0 else "sooner") in f.evidence
 
 
+@pytest.mark.parametrize("by_s", [0.06, 0.12, -0.3, 0.4])
+def test_commands_that_act_later_from_a_moment_on_are_no_clock(robot, by_s):
+    """What the robot does at 30 s it does `by_s` later; each pose is stamped when it was taken.
+
+    It is neither a drift, which would be mended by a rate, nor a clock that was set, which leaves
+    the poses' beat broken.
+    """
+    t_s = robot.pose_t_s
+    done_s = np.where(t_s > 30, t_s - by_s, t_s)
+    late = [np.interp(done_s, t_s, column) for column in robot.pose.T]
+    (f,) = _findings([_with_pose(robot, *late)])
+    assert not f.fatal and "--pose-clock-ppm" not in f.remedy
+    than = "later" if by_s > 0 else "sooner"
+    assert f.what.startswith(f"the robot follows its commands {than} from about ")
+    assert abs(float(f.what.split("about ")[1].split(" s")[0]) - 30) <= 3
+    assert abs(float(f.evidence.split("come ")[1].split(" s")[0]) - abs(by_s)) <= 0.02
+
+
+def test_a_step_too_long_to_be_told_by_a_diagnosis_parts_the_log(robot):
+    t_s = robot.pose_t_s
+    late = [np.interp(np.where(t_s > 30, t_s - 0.8, t_s), t_s, c) for c in robot.pose.T]
+    (f,) = _findings([_with_pose(robot, *late)])
+    assert f.fatal and "follows its commands later" in f.what and "logs of their own" in f.remedy
+
+
+@pytest.mark.parametrize("ppm", [-2500, 4000])
+def test_clocks_that_run_apart_fast_are_no_step(robot, ppm):
+    (f,) = _findings([replace(robot, pose_t_s=robot.pose_t_s * (1 + 1e-6 * ppm))])
+    assert f.what == "the two clocks run apart" and not f.fatal
+    assert float(f.evidence.split(" ")[1]) == pytest.approx(ppm, rel=0.1)
+
+
 @pytest.mark.parametrize("noise_m", [0.0, 0.0004, 0.003])
 def test_poses_that_do_not_move_although_commands_do_are_named(robot, noise_m):
     still = np.full(robot.pose.shape, 0.3)

@@ -25,9 +25,8 @@ def lost_commands(robot: RobotLog) -> np.ndarray:
     if len(t_s) < FEWEST:
         return holes
     steps_s = np.diff(t_s)
-    beat_s = float(np.median(steps_s))
-    longest_s = max(HOLE_S, HOLE_BEATS * beat_s)
-    if np.mean(np.abs(steps_s - beat_s) < EVEN * beat_s) < BEAT:
+    longest_s = max(HOLE_S, HOLE_BEATS * float(np.median(steps_s)))
+    if not keeps_beat(t_s):
         return holes
     if not _says_again(robot, longest_s):
         return holes
@@ -39,6 +38,15 @@ def lost_commands(robot: RobotLog) -> np.ndarray:
         if robot.command[k].any() or not _stands(robot, begin_s, end_s)
     ]
     return np.array(found).reshape(-1, 2)
+
+
+def keeps_beat(t_s: np.ndarray) -> bool:
+    """Whether stamps come at a beat, and not when something changes."""
+    steps_s = np.diff(t_s)
+    if not len(steps_s):
+        return False
+    beat_s = float(np.median(steps_s))
+    return bool(np.mean(np.abs(steps_s - beat_s) < EVEN * beat_s) >= BEAT)
 
 
 def words(robot: RobotLog, lost_s: np.ndarray) -> str:

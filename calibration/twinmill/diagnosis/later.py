@@ -63,15 +63,26 @@ def later_from(own: Opened, model: native.Model) -> tuple[Later, np.ndarray] | N
     if len(before) <= 2 * FEWEST:
         return None
     k = FEWEST + int((before + after)[inside].argmin())
-    first, then = squares[:, k].argmin(), (squares[:, -1] - squares[:, k]).argmin()
-    later_s = float(shifts_s[then] - shifts_s[first])
+    first_s = _best(shifts_s, squares[:, k])
+    then_s = _best(shifts_s, squares[:, -1] - squares[:, k])
+    later_s = then_s - first_s
     most = LEAVES * float(squares[:, -1].min())
     if abs(later_s) < LEAST_S or (before + after)[k] > most:
         return None
     late, errors = model.copy(), []
-    for shift_s in (shifts_s[first], shifts_s[then]):
+    for shift_s in (first_s, then_s):
         late.set(CLOCK, clock_s + shift_s)
         errors.append(data.errors(late))
     track = data.measurement.track
     found = Later(data.measurement.log_name, track.robot_id, float(data.start_s[k + 1]), later_s)
     return found, np.where(np.arange(len(before))[:, None, None] <= k, *errors)
+
+
+def _best(shifts_s: np.ndarray, squares: np.ndarray) -> float:
+    """Where (S,) squared errors are least, between the shifts by a parabola."""
+    k = int(squares.argmin())
+    if not 0 < k < len(shifts_s) - 1:
+        return float(shifts_s[k])
+    left, middle, right = squares[k - 1 : k + 2]
+    bend = left - 2 * middle + right
+    return float(shifts_s[k] + (STEP_S * 0.5 * (left - right) / bend if bend > 0 else 0.0))

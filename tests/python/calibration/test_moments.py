@@ -119,7 +119,13 @@ def test_numbers_that_gain_nothing_are_not_written(squares, verdict, gained):
 
 @pytest.mark.parametrize(
     ("later_s", "other_m", "told"),
-    [(0.15, 0.0, True), (-0.1, 0.0, True), (0.0, 0.0, False), (0.15, 0.05, False)],
+    [
+        (0.15, 0.0, True),
+        (-0.1, 0.0, True),
+        (0.24, 0.0, True),
+        (0.0, 0.0, False),
+        (0.15, 0.05, False),
+    ],
 )
 def test_commands_that_act_later_from_a_moment_on_are_one_change(
     later_s, other_m, told, monkeypatch

@@ -8,16 +8,15 @@ or a heading that is a few degrees off are left to the diagnosis.
 
 import twinmill_native as native
 
+from twinmill.data.checks.clocks import check_drift
 from twinmill.data.checks.commands import (
-    CheckedTrack,
     body_by_command,
     check_commands,
-    check_drift,
     check_drive,
     check_exchange,
     check_foreign,
 )
-from twinmill.data.checks.finding import InputFinding
+from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.series import check_commanded, check_length, check_poses, check_track
 from twinmill.data.track import Track
 
@@ -86,6 +85,6 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
             if any(f.fatal for f in wrong):
                 continue
             found += check_foreign(checked, search, explained)
-            if not checked.track.same_clock:
+            if not checked.track.same_clock and not wrong:
                 found += check_drift(checked, search, explained)
     return found

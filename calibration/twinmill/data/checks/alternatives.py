@@ -20,6 +20,7 @@ from twinmill.data.checks.motion import (
     Felt,
     Motion,
 )
+from twinmill.data.checks.settings import CHECKS
 
 NEGLIGIBLE = 1e-4  # share of the largest channel's squared speed: no unit is told from it
 LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the wheels' lever
@@ -28,6 +29,7 @@ ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, 
 POSE_SIGNS = ((1, False), (-1, True), (-1, False), (1, True))  # of headings; mirrored
 TRIED = 4  # lags and shifts
 LATES_S = np.arange(EARLY_S, LATE_S + STEP_S / 2, STEP_S)
+NEAR_S = np.arange(-0.06, 0.061, 0.03)  # about a shift that was found
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,20 @@ class Explained:
     late_s: float
 
 
+def far_better(best: Explained, own: Explained) -> bool:
+    """Whether an alternative explains so much more that it is no matter of physics.
+
+    Where it leaves next to nothing, its gain by stretch differs only as the motion does: a robot
+    that turns in a few stretches gains there alone by a sign of the turn.
+    """
+    if best.left > CHECKS.far_better * own.left or own.left - best.left < CHECKS.good:
+        return False
+    gained = own.by_block - best.by_block
+    clear = best.left < min(CHECKS.good, CHECKS.clear * own.left)
+    sure = CHECKS.clear_sure if clear else CHECKS.sure
+    return gained.sum() > sure * gained.std() * np.sqrt(len(gained))
+
+
 @dataclass(frozen=True)
 class Jump:
     """The columns as they are, at one shift up to a time and at another one from there on.
@@ -125,6 +141,11 @@ class Jump:
     before_s: float
     after_s: float
     explained: Explained
+
+    @property
+    def by_s(self) -> float:
+        """How much later poses come from there on; negative if sooner."""
+        return self.after_s - self.before_s
 
 
 class Search:
@@ -274,8 +295,14 @@ class Search:
             )
         return found
 
-    def at_rate(self, own: Explained, rate: float) -> Explained:
-        """The columns as they are, with clocks that run apart by `rate` (seconds per second)."""
+    def at_rate(self, own: Explained, rate: float, near_s: np.ndarray = NEAR_S) -> Explained:
+        """The columns as they are, with clocks that run apart by `rate` (seconds per second).
+
+        Args:
+            own: the columns at one shift, which is that of the middle of the log.
+            rate: of the clocks.
+            near_s: shifts about that one, which are tried.
+        """
         body = self.motion.body_mps()
         speeds = self._speeds(body, 1)
         total = self._sums(np.sum(speeds**2, axis=1))
@@ -286,7 +313,7 @@ class Search:
             rows = self.motion.at((begin_s, shapes[:, 1]), late_s, rate)
             return self._explained(rows.T @ rows, rows.T @ speeds)
 
-        late_s = max(own.late_s - middle_s + np.arange(-0.06, 0.061, 0.03), key=explained)
+        late_s = max(own.late_s - middle_s + near_s, key=explained)
         rows = self.motion.at(self.felt[own.lag_s], late_s, rate)
         left, gain = self._left(
             self.wheels[None], self._by_block(rows, rows), self._by_block(rows, speeds), total

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands against poses: kind, signs, columns, axes, units, drifting clocks, exchanged names."""
+"""Commands against poses: kind, signs, columns, axes, units, exchanged names."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import twinmill_native as native
@@ -9,10 +9,12 @@ import twinmill_native as native
 from twinmill.data.checks.alternatives import (
     Explained,
     Search,
+    far_better,
     pose_alternatives,
     wheel_alternatives,
 )
-from twinmill.data.checks.finding import InputFinding
+from twinmill.data.checks.clocks import FAR_S, stepped
+from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.settings import CHECKS
@@ -20,7 +22,6 @@ from twinmill.data.checks.words import described
 from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
-FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
 OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
 DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
 UNITS = (  # measured over commanded speed, and what it says
@@ -71,19 +72,6 @@ def columns_in_use(body: np.ndarray) -> int:
     return 3 if not np.any(body[:, 3]) else 4
 
 
-@dataclass(frozen=True)
-class CheckedTrack:
-    """One robot's track and what its commands do by the model's wheels, (3, 4)."""
-
-    label: str
-    track: Track
-    body: np.ndarray
-
-    def finding(self, what: str, evidence: str, remedy: str, fatal: bool = True) -> InputFinding:
-        """An `InputFinding` with the name of this log and the number of this robot."""
-        return InputFinding(what, evidence, remedy, fatal, self.label, self.track.robot_id)
-
-
 def check_drive(track: Track, model: native.Model, label: str) -> list[InputFinding]:
     """A finding where the commands are of another kind than the model is driven by."""
     told = track.command_kind
@@ -132,7 +120,7 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     found = search.best(wheel_alternatives(columns_in_use(checked.body)) + poses)
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
-    for mistake in (_in_room, _shifted, _jumped):
+    for mistake in (_in_room, _shifted, stepped):
         if mistaken := mistake(checked, search, own, best):
             return [mistaken]
     if not far_better(best, own):
@@ -200,44 +188,6 @@ def _shifted(
         "stamp both with one clock, or import anew with "
         f"--pose-shift-s={0.1 - far.late_s:.1f}; what is then left of the shift is searched",
     )
-
-
-def _jumped(
-    checked: CheckedTrack, search: Search, own: Explained, best: Explained
-) -> InputFinding | None:
-    """One clock that was set within the log, where that explains more than any other mistake.
-
-    Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
-    """
-    if checked.track.command_kind == "wheel_speed":
-        return None
-    far = Search(search.motion, search.wheels, search.felt, FAR_S)
-    jump = far.jump(own, CHECKS.fewest_blocks // 2)
-    by_s = jump.after_s - jump.before_s
-    better = far_better(jump.explained, own) and jump.explained.left < best.left
-    if abs(by_s) < CHECKS.least_jump_s or not better:
-        return None
-    return checked.finding(
-        "a clock was set within the log",
-        f"the commands explain {1 - own.left:.0%} of the motion as it is stamped, and "
-        f"{1 - jump.explained.left:.0%} if poses from about {jump.t_s:.0f} s on come "
-        f"{abs(by_s):.1f} s {'later' if by_s > 0 else 'sooner'} than those before",
-        "import what lies before and after that time as logs of their own",
-    )
-
-
-def far_better(best: Explained, own: Explained) -> bool:
-    """Whether an alternative explains so much more that it is no matter of physics.
-
-    Where it leaves next to nothing, its gain by stretch differs only as the motion does: a robot
-    that turns in a few stretches gains there alone by a sign of the turn.
-    """
-    if best.left > CHECKS.far_better * own.left or own.left - best.left < CHECKS.good:
-        return False
-    gained = own.by_block - best.by_block
-    clear = best.left < min(CHECKS.good, CHECKS.clear * own.left)
-    sure = CHECKS.clear_sure if clear else CHECKS.sure
-    return gained.sum() > sure * gained.std() * np.sqrt(len(gained))
 
 
 def _is_bias(e: Explained) -> bool:
@@ -329,45 +279,6 @@ def check_foreign(checked: CheckedTrack, search: Search, own: Explained) -> list
         fatal=False,
     )
     return [replace(told, cut_s=tuple(found))]
-
-
-RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
-
-
-def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
-    """Clocks that run apart, by the rate at which the commands explain the motion best.
-
-    Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
-    """
-    if checked.track.command_kind == "wheel_speed":
-        return []
-    span_s = float(np.ptp(search.motion.t_s))
-    if own.left > CHECKS.drift_left or span_s < CHECKS.drift_span_s:
-        return []
-    by_block = np.array([search.at_rate(own, 1e-6 * rate).by_block for rate in RATES_PPM])
-    left = by_block.sum(axis=1)
-    k = int(np.clip(left.argmin(), 1, len(left) - 2))
-    near = slice(k - 1, k + 2)
-    rate = _vertex(RATES_PPM[near], left[near])
-    without = [_vertex(RATES_PPM[near], left[near] - block[near]) for block in by_block.T]
-    std = float(np.sqrt((len(without) - 1) * np.var(without)))  # jackknife, Efron and Stein 1981
-    if not (np.isfinite(std) and abs(rate) > max(CHECKS.least_ppm, CHECKS.drift_sure * std)):
-        return []
-    return [
-        checked.finding(
-            "the two clocks run apart",
-            f"by {rate:.0f} +- {std:.0f} ppm, {abs(rate) * span_s / 1000:.0f} ms over the log",
-            "stamp both with one clock or keep them in step (chrony, NTP), or import anew with "
-            f"--pose-clock-ppm={rate:.0f}",
-            fatal=False,
-        )
-    ]
-
-
-def _vertex(x: tuple, y: np.ndarray) -> float:
-    """Place of the least value by the parabola through three points; NaN if it has none."""
-    square, slope, _ = np.polyfit(x, y, 2)
-    return float(-slope / (2 * square)) if square > 0 else np.nan
 
 
 def check_exchange(

@@ -3,6 +3,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from twinmill.data.track import Track
+
 
 @dataclass(frozen=True)
 class InputFinding:
@@ -33,3 +37,16 @@ class InputFinding:
         robot = f" R{self.robot_id:02d}" if self.robot_id >= 0 else ""
         where = f"{self.log_name}{robot}: " if self.log_name or robot else ""
         return f"{where}{self.what}: {self.evidence}; {self.remedy}."
+
+
+@dataclass(frozen=True)
+class CheckedTrack:
+    """One robot's track and what its commands do by the model's wheels, (3, 4)."""
+
+    label: str
+    track: Track
+    body: np.ndarray
+
+    def finding(self, what: str, evidence: str, remedy: str, fatal: bool = True) -> InputFinding:
+        """An `InputFinding` with the name of this log and the number of this robot."""
+        return InputFinding(what, evidence, remedy, fatal, self.label, self.track.robot_id)

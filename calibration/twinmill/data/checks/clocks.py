@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Poses that come later or sooner against the commands within a log: by a step, or more and more.
+
+A clock that is set, clocks that run apart and commands that act later from a moment on shift the
+same thing. A step and a straight line are told apart by how well each explains the motion, and
+whose step it is by the beat of the stamps: a clock that is set leaves a gap or an overlap in it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from twinmill.data.checks.alternatives import Explained, Jump, Search, far_better
+from twinmill.data.checks.finding import CheckedTrack, InputFinding
+from twinmill.data.checks.motion import BLOCK_S
+from twinmill.data.checks.settings import CHECKS
+from twinmill.data.lost_commands import keeps_beat
+
+FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
+FINE_S = np.arange(-0.06, 0.06 + 1e-9, 0.01)  # about a shift of the coarse search
+RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
+OWN_CLOCKS = "stamp both with one clock or keep them in step (chrony, NTP)"
+LOOK = "look at what sent the commands, its buffers and its link"
+
+
+def stepped(
+    checked: CheckedTrack, search: Search, own: Explained, best: Explained
+) -> InputFinding | None:
+    """A step of the poses against the commands, where it explains more than any other mistake.
+
+    Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
+    """
+    if checked.track.command_kind == "wheel_speed":
+        return None
+    far = Search(search.motion, search.wheels, search.felt, FAR_S)
+    jump = far.jump(own, CHECKS.fewest_blocks // 2)
+    better = far_better(jump.explained, own) and jump.explained.left < best.left
+    if abs(jump.by_s) < CHECKS.least_jump_s or not better:
+        return None
+    step = _refined(search, own, jump)
+    rate, std = _rate(search, own)
+    if _gained(_drifted(search, own, rate), step.explained) < -CHECKS.step_sure:
+        return _of_drift(checked, _in_words(search, rate, std), rate)
+    return _of_step(checked, own, step)
+
+
+def _refined(search: Search, own: Explained, jump: Jump) -> Jump:
+    """The same step on a finer grid of shifts."""
+    near_s = np.unique(np.round([jump.before_s + FINE_S, jump.after_s + FINE_S], 3))
+    fine = Search(search.motion, search.wheels, search.felt, near_s)
+    return fine.jump(own, CHECKS.fewest_blocks // 2)
+
+
+def _of_step(checked: CheckedTrack, own: Explained, jump: Jump) -> InputFinding:
+    """Whose step it is, by the beats of both series; a shorter one a diagnosis tells."""
+    explained = (
+        f"the commands explain {1 - own.left:.1%} of the motion as it is stamped, and "
+        f"{1 - jump.explained.left:.1%} if poses from about {jump.t_s:.0f} s on come "
+        f"{abs(jump.by_s):.2f} s {_sooner_or_later(jump)} than those before"
+    )
+    apart = "import what lies before and after that time as logs of their own"
+    if _beat_breaks(checked, jump):
+        return checked.finding("a clock was set within the log", explained, apart)
+    far = abs(jump.by_s) > CHECKS.acting_later_s
+    return checked.finding(
+        f"the robot follows its commands {_sooner_or_later(jump)} from about {jump.t_s:.0f} s on",
+        f"{explained}, and the beat of the poses has no gap or overlap there, so that their clock "
+        "was not set",
+        f"{LOOK}, or whether the clock that stamps them was set" + (f"; {apart}" if far else ""),
+        fatal=far,
+    )
+
+
+def _beat_breaks(checked: CheckedTrack, jump: Jump) -> bool:
+    """Whether stamps of poses or commands skip about the time of a step, or overlap."""
+    track = checked.track
+    if _skips(track.pose_t_s, jump.t_s, jump.by_s):
+        return True
+    return keeps_beat(track.command_t_s) and _skips(track.command_t_s, jump.t_s, -jump.by_s)
+
+
+def _skips(t_s: np.ndarray, at_s: float, by_s: float) -> bool:
+    """Whether as many stamps as come in a step of the clock are missing about a time, or too many.
+
+    A step back that is sorted by stamps has both clocks' rows one beside the other.
+    """
+    first, last = np.searchsorted(t_s, (at_s - BLOCK_S - abs(by_s), at_s + BLOCK_S + abs(by_s)))
+    within = t_s[first:last]
+    if len(within) < 2:
+        return True
+    missing_s = np.ptp(within) - (len(within) - 1) * float(np.median(np.diff(t_s)))
+    return bool(missing_s * np.sign(by_s) > CHECKS.skips * abs(by_s))
+
+
+def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+    """Clocks that run apart, by the rate at which the commands explain the motion best.
+
+    A step is told as one where it explains more, and neither is where both explain as much.
+    """
+    if checked.track.command_kind == "wheel_speed":
+        return []
+    span_s = float(np.ptp(search.motion.t_s))
+    if own.left > CHECKS.drift_left or span_s < CHECKS.drift_span_s:
+        return []
+    rate, std = _rate(search, own)
+    if not abs(rate) > max(1e-6 * CHECKS.least_ppm, CHECKS.drift_sure * std):
+        return []
+    jump = _refined(search, own, search.jump(own, CHECKS.fewest_blocks // 2))
+    steps = _gained(_drifted(search, own, rate), jump.explained)
+    if steps > CHECKS.step_sure:
+        return [_of_step(checked, own, jump)]
+    drift = _in_words(search, rate, std)
+    if steps < -CHECKS.step_sure:
+        return [_of_drift(checked, drift, rate)]
+    return [
+        checked.finding(
+            "the two clocks run apart, or the robot follows its commands "
+            f"{_sooner_or_later(jump)} from about {jump.t_s:.0f} s on",
+            f"{drift}, or {1e3 * abs(jump.by_s):.0f} ms in one step: both explain the motion alike",
+            f"{OWN_CLOCKS} and log again, which rules the first out; or {LOOK}",
+            fatal=False,
+        )
+    ]
+
+
+def _of_drift(checked: CheckedTrack, drift: str, rate: float) -> InputFinding:
+    return checked.finding(
+        "the two clocks run apart",
+        drift,
+        f"{OWN_CLOCKS}, or import anew with --pose-clock-ppm={1e6 * rate:.0f}",
+        fatal=False,
+    )
+
+
+def _in_words(search: Search, rate: float, std: float) -> str:
+    over_s = abs(rate) * float(np.ptp(search.motion.t_s))
+    return f"by {1e6 * rate:.0f} +- {1e6 * std:.0f} ppm, {1e3 * over_s:.0f} ms over the log"
+
+
+def _sooner_or_later(jump: Jump) -> str:
+    return "later" if jump.by_s > 0 else "sooner"
+
+
+def _rate(search: Search, own: Explained) -> tuple[float, float]:
+    """At which clocks that run apart explain the motion best, and its standard error; NaN: none."""
+    rates = 1e-6 * np.array(RATES_PPM)
+    by_block = np.array([search.at_rate(own, rate).by_block for rate in rates])
+    left = by_block.sum(axis=1)
+    k = int(np.clip(left.argmin(), 1, len(left) - 2))
+    near = slice(k - 1, k + 2)
+    without = [_vertex(rates[near], left[near] - block[near]) for block in by_block.T]
+    std = float(np.sqrt((len(without) - 1) * np.var(without)))  # jackknife, Efron and Stein 1981
+    return (_vertex(rates[near], left[near]), std) if np.isfinite(std) else (np.nan, np.nan)
+
+
+def _drifted(search: Search, own: Explained, rate: float) -> Explained:
+    """A drift as fine as a step is, at the lag that suits it; without a rate, the best of none."""
+    rate = np.nan_to_num(rate)
+    found = []
+    for lag_s in search.felt:
+        shifted = replace(own, lag_s=lag_s, late_s=own.late_s + own.lag_s - lag_s)
+        found.append(search.at_rate(shifted, rate, FINE_S))
+    return min(found, key=lambda e: e.left)
+
+
+def _gained(drift: Explained, step: Explained) -> float:
+    """By how many standard errors over stretches a step explains more than a drift."""
+    gained = drift.by_block - step.by_block
+    return float(gained.sum() / max(gained.std() * np.sqrt(len(gained)), 1e-12))
+
+
+def _vertex(x: np.ndarray, y: np.ndarray) -> float:
+    """Place of the least value by the parabola through three points; NaN if it has none."""
+    square, slope, _ = np.polyfit(x, y, 2)
+    return float(-slope / (2 * square)) if square > 0 else np.nan
