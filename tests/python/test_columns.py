@@ -226,6 +226,53 @@ def test_rows_out_of_order_and_repeated_stamps_are_put_right_and_said(imported):
     assert any("1 rows repeat a stamp" in w for w in warnings)
 
 
+STAMPS_S = np.round(0.02 * np.arange(200), 2)  # of poses; a command is told each half second
+TOLD_S = 0.5 * np.arange(8)
+
+
+def _tables(stamps_s=STAMPS_S, told_s=TOLD_S):
+    """Poses that move by 1 mm a frame, and another velocity each time."""
+    poses = [f"{t:.10g},4,{0.001 * k:g},0,0" for k, t in enumerate(stamps_s)]
+    told = [f"{t:.10g},4,{0.01 * k:g},0,0" for k, t in enumerate(told_s)]
+    return [POSES.splitlines()[0], *poses], ["t_s,robot_id,vx_mps,vy_mps,omega_radps", *told]
+
+
+def _text(lines):
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("stamp_s", [-1.5, 91.5, 1e15])
+def test_a_damaged_stamp_is_named_by_its_row_and_left_out(imported, stamp_s):
+    """A sign, a digit before it, or all of it: 1e15 s are no unit of all the others."""
+    told_s, stamps_s = TOLD_S.copy(), STAMPS_S.copy()
+    told_s[3] = stamps_s[50] = stamp_s
+    poses, commands = _tables(stamps_s, told_s)
+    robot, warnings = imported(_text(poses), _text(commands))
+    np.testing.assert_allclose(robot.pose_t_s, np.delete(STAMPS_S, 50), atol=1e-6)
+    np.testing.assert_allclose(robot.command_t_s, np.delete(TOLD_S, 3), atol=1e-6)
+    for name, row in (("c.csv", 5), ("p.csv", 52)):
+        (said,) = (w for w in warnings if w.startswith(name))
+        assert f"row {row} (" in said and "damaged; left out" in said
+
+
+def test_a_first_and_a_last_command_that_are_held_for_long_are_kept(imported):
+    told_s = np.concatenate([[-30.0], TOLD_S, [40.0]])
+    poses, commands = _tables(told_s=told_s)
+    robot, warnings = imported(_text(poses), _text(commands))
+    assert len(robot.command_t_s) == len(told_s)
+    assert not any("damaged" in w for w in warnings)
+
+
+def test_rows_that_are_written_twice_count_once(imported):
+    """Stamps that stand twice with equal values are no jitter about a beat twice as fast."""
+    poses, commands = _tables()
+    twice = [poses[0], *(row for row in poses[1:] for _ in range(2))]
+    robot, warnings = imported(_text(twice), _text(commands))
+    np.testing.assert_allclose(robot.pose_t_s, STAMPS_S, atol=1e-6)
+    assert any("200 rows repeat another's stamp and values" in w for w in warnings)
+    assert not any("jitter" in w for w in warnings)
+
+
 def test_signs_drift_and_shift_are_taken_out(imported):
     robot, _ = imported(flips=frozenset({"y_m", "fl_pct"}))
     np.testing.assert_allclose(robot.pose[:, 1], [0, -0.25, -0.5])
@@ -301,10 +348,12 @@ def test_a_mapping_that_makes_no_sense_is_refused_in_a_sentence(imported, tmp_pa
         imported(mapping=tmp_path / "m.toml")
 
 
+@pytest.mark.parametrize("marked", [True, False])
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "cp1252", "utf-8-sig"])
-def test_files_of_other_programs_encodings_are_read(tmp_path, encoding):
-    """As Motive, Excel and Windows' editor save them, with their marks."""
-    mark = {"utf-16-le": b"\xff\xfe", "utf-16-be": b"\xfe\xff"}.get(encoding, b"")
+def test_files_of_other_programs_encodings_are_read(tmp_path, encoding, marked):
+    """As Motive, Excel and Windows' editor save them, with their marks or none."""
+    marks = {"utf-16-le": b"\xff\xfe", "utf-16-be": b"\xfe\xff"}
+    mark = marks.get(encoding, b"") if marked else b""
     text = POSES.replace("theta_rad", "Winkel (°)")
     (tmp_path / "p.csv").write_bytes(mark + text.encode(encoding))
     (tmp_path / "c.csv").write_bytes(mark + COMMANDS.encode(encoding))

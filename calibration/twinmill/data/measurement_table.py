@@ -33,6 +33,7 @@ LOST = ("", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a los
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
 UNNAMED = "column_{}"  # what columns are called in a file that does not name them
 BEGINNING_BYTES = 65536  # tell the encoding
+MOSTLY = 0.9
 NEAR = 0.5  # likeness of names from which one is proposed for the other
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
@@ -60,10 +61,17 @@ def open_text(path: Path) -> Iterator[TextIO]:
 
 
 def _encoding(binary: io.BufferedReader) -> str:
-    """By the first bytes: UTF-16 has a mark, and what is no UTF-8 is Windows' Western encoding."""
+    """By the first bytes: what is no Unicode is Windows' Western encoding.
+
+    UTF-16 has a mark, or every second byte of the digits is zero.
+    """
     beginning = binary.peek()[:BEGINNING_BYTES]
     if beginning.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return "utf-16"
+    for encoding, first in (("utf-16-le", 1), ("utf-16-be", 0)):
+        high = beginning[first::2]
+        if high.count(0) > MOSTLY * len(high) and not beginning[1 - first :: 2].count(0):
+            return encoding
     try:
         codecs.getincrementaldecoder("utf-8")().decode(beginning)
     except UnicodeDecodeError:

@@ -18,6 +18,7 @@ from twinmill.data.importers.series import (
     PoseSeries,
     quaternion_from_heading,
 )
+from twinmill.data.importers.stamps import sound_rows
 from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import Table, is_number
 from twinmill.model.mixing import duties_from_inputs
@@ -77,7 +78,7 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
         LogError: as read_table; a wrong value, with its row.
     """
     table = columns.read(path, OF_POSES)
-    utime_us, (ids, notes) = _utime_us(table), _robot_ids(table, columns)
+    table, utime_us, ids, notes = _stamped(table, columns)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
     orientation = _orientation(table)
@@ -115,7 +116,7 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
     table = columns.read(path, OF_COMMANDS)
     kind, world = _kind(table), table.has(*WORLD)
     table = _complete(table, kind)
-    utime_us, (ids, notes) = _utime_us(table), _robot_ids(table, columns)
+    table, utime_us, ids, notes = _stamped(table, columns)
     inputs = (
         np.column_stack([_input(table, name) for name in INPUTS])
         if kind == "duty" and table.has(*INPUTS)
@@ -155,7 +156,7 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
         LogError: as read_table; a wrong value, with its row.
     """
     table = columns.read(path, OF_DETECTIONS)
-    utime_us, (ids, notes) = _utime_us(table), _robot_ids(table, columns)
+    table, utime_us, ids, notes = _stamped(table, columns)
     seen = table.flags("seen")
     table.refuse((seen != 0) & (seen != 1), "seen", seen, "must be 0 or 1")
     more = {
@@ -329,8 +330,14 @@ def _numbered(table: str, names: list[str], columns: Columns) -> tuple[dict[str,
     return numbers, [f"{table}: '{name}' is robot {numbers[name]:.0f}." for name in words]
 
 
-def _utime_us(table: Table) -> np.ndarray:
-    t_s = table.seconds("t_s")
+def _stamped(table: Table, columns: Columns) -> tuple[Table, np.ndarray, np.ndarray, list[str]]:
+    """The table without rows of no moment, (rows,) utime_us and robot_id, and what was done."""
+    t_s, (ids, notes) = table.seconds("t_s"), _robot_ids(table, columns)
+    table, kept = sound_rows(table, t_s, ids)
+    return table, _utime_us(table, t_s[kept]), ids[kept], notes
+
+
+def _utime_us(table: Table, t_s: np.ndarray) -> np.ndarray:
     largest = np.abs(t_s).max()
     if largest > LATEST_S:
         unit = next((u for u, top in SINCE_1970.items() if largest < top), "ns")
