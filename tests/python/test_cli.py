@@ -328,6 +328,7 @@ def test_wrong_command_line_is_exit_code_two(twinmill, arguments):
         ("import", "a", "--pose-shift-s"),
         ("optitrack", "--heading-offset-deg"),
         ("claims", "--odd-turn"),
+        ("next", "a", "--duration-s"),  # of a range, below which a NaN is not
     ],
 )
 def test_an_option_that_is_no_finite_number_is_refused_by_name(twinmill, arguments, value):

@@ -15,6 +15,7 @@ from twinmill.diagnosis import diagnose as whole
 from twinmill.diagnosis import explain as explaining
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
+from twinmill.fitting.fit import fit
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 
@@ -81,6 +82,15 @@ def test_a_diagnosis_of_the_motion_is_told_whole_when_cameras_are_stopped(opened
     found = diagnose(*opened, stoppable=True)
     assert found.sentence.startswith("Stopped before the cameras were looked at. So far: ")
     assert found.finding("coasting").certainty == "sure" and found.to_json()["stopped"]
+
+
+@pytest.mark.parametrize("stage", ["ScoreFit.fit", "comparison", "HeldOut.of", "of_few_commands"])
+def test_a_fit_that_is_stopped_at_any_stage_writes_nothing(opened, tmp_path, monkeypatch, stage):
+    """A file of which no JSON tells is what a script takes for one that is right."""
+    monkeypatch.setattr(f"twinmill.fitting.fit.{stage}", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        fit(*opened, tmp_path / "fitted.toml", "test")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("stage", ["_polished", "_with_found", "comparison"])

@@ -66,14 +66,34 @@ def _given(argument: TyperArgument, ctx: typer.Context, value: Any) -> Any:
 
 
 def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
-    """Typer's, but NaN and infinity are refused: NaN passes every range."""
+    """Typer's, but NaN and infinity are refused as such: NaN passes some ranges, and no others."""
     _without_pydantic(option)
-    found = _process_value(option, ctx, value)
-    for number in found if isinstance(found, list | tuple) else [found]:
+    try:
+        found = _process_value(option, ctx, value)
+    except typer.BadParameter:
+        _refuse_odd(option, ctx, list(map(_as_number, _each(value))))
+        raise
+    _refuse_odd(option, ctx, _each(found))
+    return found
+
+
+def _each(value: Any) -> list:
+    return list(value) if isinstance(value, list | tuple) else [value]
+
+
+def _as_number(text: Any) -> Any:
+    """The number that a text is; another one as it stands."""
+    try:
+        return float(text)
+    except (TypeError, ValueError):
+        return text
+
+
+def _refuse_odd(option: TyperOption, ctx: typer.Context, values: list) -> None:
+    for number in values:
         odd = isinstance(number, float) and not math.isfinite(number)
         if odd and number != option.default:
             raise typer.BadParameter(f"{number} is no finite number.", ctx=ctx, param=option)
-    return found
 
 
 def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> list[str]:

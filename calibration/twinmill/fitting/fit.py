@@ -162,7 +162,10 @@ def fit(
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
     estimates = found.shared_estimates()
     clock = common_clock(found)
-    write_child(
+    heldout = HeldOut.of(found)
+    few = of_few_commands(judged(opened))
+    notes = (few,) if few else ()
+    write_child(  # last, so that Ctrl-C leaves no file of which nothing is told
         model_file,
         Fitted(
             model=with_estimates(model, estimates),
@@ -178,9 +181,6 @@ def fit(
         command,
         force=force,
     )
-    heldout = HeldOut.of(found)
-    few = of_few_commands(judged(opened))
-    notes = (few,) if few else ()
     return FitResult(before, after, heldout, estimates, clock.get(CLOCK), Path(out), notes)
 
 
