@@ -52,6 +52,29 @@ def test_jump_and_jump_back_leaves_one_segment(driven, length):
     assert track.segment.max() == 0
 
 
+@pytest.mark.parametrize("beside_m", [0.0, 0.04])
+def test_a_while_in_which_the_tracker_turned_the_robot_is_left_out(driven, beside_m):
+    """Its front was taken for its back for 1.5 s, about its middle or beside it."""
+    robot = driven()
+    robot.pose[600:780] += [beside_m, 0, np.pi]
+    robot.pose[:, 2] = np.angle(np.exp(1j * robot.pose[:, 2]))
+    track = make_track(robot)
+    assert (track.segment[600:780] < 0).all() and track.segment.max() == 1
+    (said,) = (note for note in track.notes if "tracker" in note)
+    assert said.startswith("from 5.000 to 6.492 s") and "180 degrees" in said
+    assert not any("jumps" in note or "not tracked" in note for note in track.notes)
+
+
+def test_a_heading_that_steps_for_good_is_told_as_that(driven):
+    robot = driven()
+    robot.pose[600:, 2] += 0.3
+    track = make_track(robot)
+    assert track.segment.max() == 1
+    (said,) = track.notes
+    assert "at 4.99" in said and "the heading steps by 17 degrees" in said
+    assert "the place does not" in said and "jumps" not in said
+
+
 def test_a_pose_that_is_left_out_leaves_no_trace(driven):
     """A camera's glitch far off the floor, and the same frame lost."""
     far, lost = driven(), driven()

@@ -13,6 +13,7 @@ LOSSY_GAP_S = 0.25  # and for captures that lose frames all the time; a pick-up 
 JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
 JUMP_SIGMA = 8  # times the noise of a camera that is worse than that
 JUMP_FACTOR = 3  # times as fast as just before or after: no wheels do that between two frames
+UNDONE = 2  # times the noise of a turn, by which a turn back may miss
 BESIDE = 3  # steps that tell how fast the robot is just before, or just after
 FAST_S = 0.5  # over which speeds are told where stamps jitter
 MARGIN_S = 0.1  # frames beside a pick-up show the hand or half a marker body
@@ -35,7 +36,8 @@ def find_segments(
     """
     limits = _Limits.of(robot, usable, *usual)
     usable = usable & ~_excursions(robot, usable, limits, notes)
-    index, begins = _cuts(robot, usable, limits, notes)
+    turned = _turned_by_tracker(robot, usable, limits, notes)
+    index, begins = _cuts(robot, usable, limits, notes, turned=turned)
     return _segments(robot, index, begins, notes)
 
 
@@ -108,15 +110,23 @@ def _beside(speed: np.ndarray) -> np.ndarray:
     return np.maximum(medians[: len(speed)], medians[BESIDE + 1 :])
 
 
-def _jumps(robot: RobotLog, index: np.ndarray, limits: _Limits) -> np.ndarray:
-    """(len(index) - 1,) bool: steps between these poses that the robot cannot make."""
+def _jumps(robot: RobotLog, index: np.ndarray, limits: _Limits) -> tuple[np.ndarray, np.ndarray]:
+    """(len(index) - 1,) bool each: steps and turns between these poses that no robot makes."""
     dt_s = np.diff(robot.pose_t_s[index])
-    step = np.diff(robot.pose[index], axis=0)
-    moved_m = np.hypot(step[:, 0], step[:, 1])
-    turn_rad = np.nan_to_num(np.abs(np.remainder(step[:, 2] + np.pi, 2 * np.pi) - np.pi))
-    return (moved_m > limits.possible(0, moved_m / dt_s, dt_s)) | (
-        turn_rad > np.minimum(limits.possible(1, turn_rad / dt_s, dt_s), np.pi)
+    step = np.diff(robot.pose[index, :2], axis=0)
+    moved_m, turn_rad = np.hypot(*step.T), np.abs(_turns_rad(robot, index))
+    return moved_m > limits.possible(0, moved_m / dt_s, dt_s), turn_rad > np.minimum(
+        limits.possible(1, turn_rad / dt_s, dt_s), np.pi
     )
+
+
+def _turns_rad(robot: RobotLog, index: np.ndarray) -> np.ndarray:
+    """(len(index) - 1,) turns between these poses, the short way round; 0 without headings."""
+    return np.nan_to_num(_short_way(np.diff(robot.pose[index, 2])))
+
+
+def _short_way(angle_rad: np.ndarray) -> np.ndarray:
+    return np.remainder(angle_rad + np.pi, 2 * np.pi) - np.pi
 
 
 def _excursions(
@@ -125,14 +135,13 @@ def _excursions(
     """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
     outlier = np.zeros(len(usable), bool)
     index = np.flatnonzero(usable)
-    jumps = np.flatnonzero(_jumps(robot, index, limits))
+    jumps = np.flatnonzero(np.logical_or(*_jumps(robot, index, limits)))
     position = 0
     while position + 1 < len(jumps):
         before, after = index[jumps[position]], index[jumps[position + 1] + 1]
         ends = np.array([before, after])
-        back = (
-            robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot)
-            and not _jumps(robot, ends, limits)[0]
+        back = robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot) and not np.any(
+            _jumps(robot, ends, limits)
         )
         if back:
             outlier[before + 1 : after] = True
@@ -145,27 +154,73 @@ def _excursions(
     return outlier
 
 
-def _cuts(
+def _turned_by_tracker(
     robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool."""
+) -> np.ndarray:
+    """(N,) bool: poses between a turn that no robot makes and the next one, which undoes it.
+
+    A tracker that takes other markers for those of the front has the robot turned for a while, so
+    that it seems to drive backwards. What lasts for most of the track may be the right heading.
+    """
+    turned = np.zeros(len(usable), bool)
     index = np.flatnonzero(usable)
+    turns_rad, t = _turns_rad(robot, index), robot.pose_t_s[index]
+    jumps = np.flatnonzero(_jumps(robot, index, limits)[1])
+    position = 0
+    while position + 1 < len(jumps):
+        first, last = jumps[position], jumps[position + 1]
+        undone = abs(_short_way(turns_rad[first] + turns_rad[last])) < UNDONE * limits.noise[1]
+        if not undone or t[last] - t[first] > np.ptp(t) / 2:
+            position += 1
+            continue
+        turned[index[first + 1 : last + 1]] = True
+        notes.append(
+            f"from {t[first + 1]:.3f} to {t[last]:.3f} s the tracker has the robot turned by "
+            f"{np.degrees(abs(turns_rad[first])):.0f} degrees, from one pose to the next and back; "
+            "left out."
+        )
+        position += 2
+    return turned
+
+
+def _cuts(
+    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str], *, turned: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool.
+
+    Of poses that the tracker turned, (N,) bool, all was said.
+    """
+    index = np.flatnonzero(usable & ~turned)
     t = robot.pose_t_s[index]
-    jump = _jumps(robot, index, limits)
+    moves, turns = _jumps(robot, index, limits)
+    jump = moves | turns
     gap = np.diff(t) > _gap_s(robot)
     lost = gap & (np.diff(index) > 1)
     keep = np.ones(len(index), bool)
     for k in np.flatnonzero(jump | gap):
-        moved_m = np.hypot(*(robot.pose[index[k + 1], :2] - robot.pose[index[k], :2]))
-        what = "not tracked" if lost[k] else "no poses" if gap[k] else "the robot jumps"
-        notes.append(
-            f"cut at {t[k]:.3f} s: {what} for {t[k + 1] - t[k]:.3f} s, then {moved_m:.3f} m away."
-        )
+        if not turned[index[k] + 1]:
+            notes.append(_of_cut(robot, index[k : k + 2], gap=gap[k], lost=lost[k], moves=moves[k]))
         if jump[k] or lost[k]:
             keep &= (t < t[k] - MARGIN_S) | (t > t[k + 1] + MARGIN_S)
     begins = np.concatenate([[0], np.cumsum(jump | gap)])[: len(index)]
     index, begins = index[keep], begins[keep]
     return index, np.diff(begins, prepend=-1) > 0
+
+
+def _of_cut(robot: RobotLog, ends: np.ndarray, *, gap: bool, lost: bool, moves: bool) -> str:
+    """A sentence on a cut between two poses; where the robot does not move it only turns."""
+    begin_s, end_s = robot.pose_t_s[ends]
+    if not (gap or moves):
+        turn_deg = np.degrees(_turns_rad(robot, ends)[0])
+        return (
+            f"cut at {begin_s:.3f} s: the heading steps by {turn_deg:.0f} degrees from one pose to "
+            "the next, and the place does not: the tracker's body was turned or made anew, so "
+            "import what lies before and after as logs of their own, each with its "
+            "--heading-offset-deg."
+        )
+    moved_m = np.hypot(*(robot.pose[ends[1], :2] - robot.pose[ends[0], :2]))
+    what = "not tracked" if lost else "no poses" if gap else "the robot jumps"
+    return f"cut at {begin_s:.3f} s: {what} for {end_s - begin_s:.3f} s, then {moved_m:.3f} m away."
 
 
 def _segments(
