@@ -268,6 +268,21 @@ TEST(Equation, AddsNothingWhereItHasNoValue)
     }
 }
 
+// tan t passes all bounds at pi / 2, by calculus; it had been as if there were no formula then.
+TEST(Equation, IsNotSilentWhereItsStateGrowsWithoutBound)
+{
+    for (const double step_s : {0.005, 0.02, 0.025, 0.05})
+    {
+        Player one(WithFormula("vx_mps", "p0*s", {0.01}, "s*s + 1"), step_s);
+        Player two(WithFormula("vx_mps", "p0*s", {0.01}, "r", {}, "s*s*s + 1"), step_s);
+        for (Player *player : {&one, &two})
+        {
+            player->Play(kForward, 5);
+            EXPECT_GT(player->state.pose.x_m, 1e9) << step_s;
+        }
+    }
+}
+
 TEST(Equation, SaysWhatIsWrongAndWhere)
 {
     const struct

@@ -88,6 +88,27 @@ def test_a_swarm_has_settled_since_its_groups_parted():
     assert parted_s + 1.25 - 5 - 0.1 <= rows[0, -1] <= parted_s + 1.25 - 5 + 1.1
 
 
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+@pytest.mark.parametrize(
+    ("texts", "says"),
+    [
+        ('formula = "p0*s"\nstate_rate = "5*s + 1"', "grows without bound"),
+        ('formula = "p0*s"\nstate_rate = "s*s + 1"', "grows without bound"),
+        ('formula = "p0/(0*vx)"', "no finite value"),
+    ],
+)
+def test_a_swarm_whose_model_runs_away_has_no_class(tmp_path: Path, plant, texts, says):
+    """The states are (e^5t - 1) / 5 and tan t, by calculus; x / 0 is no number."""
+    known = Path(__file__).parents[2] / "twin/models"
+    text = (known / ("paper.toml" if plant == "planar" else "turbopi/turbopi.toml")).read_text()
+    effect = f'\n[[effect]]\nname = "equation"\nadds_to = "vx_mps"\np0 = 1\n{texts}\n'
+    (tmp_path / "m.toml").write_text(text + effect)
+    asked = request(["n=3"], model=str(tmp_path / "m.toml"), seeds=1, duration_s=20, plant=plant)
+    with pytest.raises(ValueError, match=says):
+        sweep(asked, tmp_path / "s")
+    assert not (tmp_path / "s" / "sweep.parquet").exists()
+
+
 AHEAD = [40, 0, 40, 0]  # inputs of a robot that drives straight whatever it sees
 
 

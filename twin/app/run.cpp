@@ -20,6 +20,7 @@
 #include "show.h"
 #include "summary.h"
 #include "swarm/bodies.h"
+#include "swarm/bounds.h"
 #include "swarm/metrics.h"
 #include "swarm/robots.h"
 #include "swarm/species.h"
@@ -35,15 +36,8 @@ using Clock = std::chrono::steady_clock;
 constexpr double kMaxStep_s = 0.0055;
 // Distractors lie this many spreads of the start away.
 constexpr double kRing = 1.5;
-// Further than any robot drives in the longest run: the model's numbers make it run away.
-constexpr double kFarthest_m = 1e9;
 // A fixed date, so that a log depends on nothing but its options: 2023-11-14 22:13:20 UTC.
 constexpr int64_t kLogEpoch_us = 1'700'000'000'000'000;
-
-// Below this, in m/s and rad/s, a robot stands.
-constexpr double kStands = 1e-3;
-// A formula that has no value at rest has one within this time of driving.
-constexpr double kTried_s = 1;
 
 volatile std::sig_atomic_t g_stop = 0;
 
@@ -185,7 +179,7 @@ public:
                 KeepPace(swarm.TimeS());
                 publisher.PublishPoses(swarm);
             }
-            Check(swarm);
+            bounds_.Check(swarm);
             Observe(swarm);
             begin_ += ToClock(views.Show(swarm));
             if (views.Closed())
@@ -202,32 +196,6 @@ public:
     }
 
 private:
-    // Throws std::runtime_error in one sentence if a robot is nowhere, or drives without a part of
-    // its model; NaN compares false.
-    void Check(const Swarm &swarm)
-    {
-        driven_s_.resize(static_cast<size_t>(swarm.Size()));
-        for (int robot = 0; robot < swarm.Size(); ++robot)
-        {
-            const RobotState &state = swarm.State(robot);
-            const Pose2 &pose = state.pose;
-            double &driven_s = driven_s_[static_cast<size_t>(robot)];
-            driven_s += std::hypot(state.vx_mps, state.vy_mps, state.omega_radps) > kStands
-                            ? swarm.PeriodS()
-                            : 0;
-            if (driven_s > kTried_s && swarm.IsSilent(robot))
-                throw std::runtime_error("robot " + std::to_string(robot) + " has driven for " +
-                                         std::to_string(driven_s) +
-                                         " s and a formula of its model has had no finite value; "
-                                         "correct the formula");
-            if (!(std::hypot(pose.x_m, pose.y_m) < kFarthest_m))
-                throw std::runtime_error(
-                    "robot " + std::to_string(robot) + " is out of any room after " +
-                    std::to_string(swarm.TimeS()) +
-                    " s: the model grows without bound; correct its formulas and numbers");
-        }
-    }
-
     void Observe(const Swarm &swarm)
     {
         if (!show_ || !progress_.IsDue(WallS()))
@@ -250,7 +218,7 @@ private:
             std::chrono::duration<double>(duration_s));
     }
 
-    std::vector<double> driven_s_;
+    Bounds bounds_;
     Clock::time_point begin_ = Clock::now();
     std::optional<double> duration_s_;
     double realtime_factor_;

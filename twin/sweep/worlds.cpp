@@ -9,6 +9,7 @@
 
 #include "fw/config.h"
 #include "swarm/bodies.h"
+#include "swarm/bounds.h"
 #include "swarm/robots.h"
 #include "swarm/swarm.h"
 #include "sweep/batch.h"
@@ -62,11 +63,13 @@ Outcome RunFull(const World &world, double duration_s, const PlantMaker &make)
     const StepCount count = CountSteps(swarm.PeriodS(), duration_s);
     MetricWindow window(std::numeric_limits<double>::infinity());
     History history;
+    Bounds bounds;
     Outcome outcome{{}, std::numeric_limits<double>::infinity()};
     std::vector<RobotState> states(cell.tables.size());
     for (int step = 0; step < count.steps; ++step)
     {
         swarm.Step();
+        bounds.Check(swarm);
         if (!count.Samples(step))
             continue;
         for (size_t i = 0; i < states.size(); ++i)

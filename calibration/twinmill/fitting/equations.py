@@ -8,10 +8,11 @@ import twinmill_native as native
 
 from twinmill.model.model_file import ModelError
 from twinmill.model.parameters import effect_names, words
-from twinmill.predict.datasets import ErrorDataset, errors_of
+from twinmill.predict.datasets import ErrorDataset, Trajectory, errors_of
 
 EQUATION = "equation"
 GROWN = 1e9  # errors, in what is usual of them: nothing that drives is so far off
+FAR = 1e4  # m or rad, within the longest prediction: nothing drives or turns so fast
 NOTHING = 1e-9  # of errors: what is rounded off
 
 
@@ -36,7 +37,11 @@ def finite(data: ErrorDataset, model: native.Model) -> bool:
     """Whether a model predicts something, and nothing that is beyond all bounds."""
     with np.errstate(all="ignore"):
         rows = errors_of(data, model)
-    return bool(np.isfinite(rows).all() and np.abs(rows).max(initial=0.0) < GROWN)
+        far = 0.0
+        if isinstance(data, Trajectory):  # errors of headings are taken the short way round
+            poses = data.windows.predicted(data.measurement, model)
+            far = np.abs(np.nan_to_num(poses)).max(initial=0.0)
+    return bool(np.isfinite(rows).all() and np.abs(rows).max(initial=0.0) < GROWN and far < FAR)
 
 
 def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[str]:

@@ -4,9 +4,11 @@
 import numpy as np
 import pytest
 
+from twinmill.diagnosis.diagnose import diagnose
 from twinmill.filters import filtered
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import tables
@@ -37,9 +39,9 @@ def adding(log, one_clock_base, tmp_path):
 def written(one_clock_base, tmp_path):
     """The base with a formula that was put in by hand."""
 
-    def make(formula, **rates) -> ModelFile:
+    def make(formula, adds_to="vx_mps", **rates) -> ModelFile:
         path = tmp_path / "by_hand.toml"
-        texts = {"name": "equation", "adds_to": "vx_mps", "formula": formula, **rates}
+        texts = {"name": "equation", "adds_to": adds_to, "formula": formula, **rates}
         lines = [f'{key} = "{text}"' for key, text in texts.items()]
         path.write_text("\n".join([one_clock_base.text, "[[effect]]", *lines, "p0 = 1.0", ""]))
         return ModelFile.load(str(path))
@@ -47,19 +49,33 @@ def written(one_clock_base, tmp_path):
     return make
 
 
-# The solutions are e^(100 t), and e^(10 t) and e^(-10 t): within ten seconds beyond all bounds.
+# The solutions are e^(100 t), e^(10 t) and e^(-10 t), and tan t: within ten seconds, and for the
+# last after pi/2 of them, beyond all bounds.
 @pytest.mark.parametrize(
     ("rates", "says"),
     [
         ({"state_rate": "100*s + 1"}, r"its state s grows .*ds/dt = 100\*s \+ 1"),
         ({"state_rate": "r", "second_rate": "100*s + vx"}, r"its states s and r grow"),
+        ({"state_rate": "s*s + 1"}, r"its state s grows .*ds/dt = s\*s \+ 1"),
     ],
 )
-def test_a_state_that_grows_is_named(rates, says, adding, written, log):
+def test_a_state_that_grows_is_named(rates, says, adding, written, log, tmp_path, recwarn):
     with pytest.raises(ModelError, match=says):
         adding("p0*s", **rates)
+    by_hand = written("p0*s", **rates)
     with pytest.raises(ModelError, match=says):
-        compare([log], written("p0*s", **rates))
+        compare([log], by_hand)
+    with pytest.raises(ModelError, match=says):
+        fit([log], by_hand, tmp_path / "fitted.toml", "")
+    with pytest.raises(ModelError, match=says):
+        diagnose([log], by_hand)
+    assert not (tmp_path / "fitted.toml").exists() and not recwarn.list
+
+
+def test_a_turn_that_grows_is_named(written, log):
+    """Headings are compared the short way round: errors of turns have a bound, and turns none."""
+    with pytest.raises(ModelError, match="its state s grows"):
+        compare([log], written("p0*s", adds_to="omega_radps", state_rate="s*s + 1"))
 
 
 def test_a_state_that_comes_back_is_taken(written, log):

@@ -74,7 +74,7 @@ constexpr Card kCard = {
         "cos tan asin acos atan atan2 sinh cosh tanh and more of muParser; a ? b : c; _pi",
     .leaves_out =
         "more than two states; where the formula has no finite value, nothing is added, and where "
-        "a rate has none, s and r stay",
+        "a rate has none, s and r stay; one that grows beyond all bounds stays at 1e12",
     .measure = "whatever drive varies the quantities in the formula; what it resembles is its own",
     .reference = "muParser (the parser); the formula is the user's",
     .family = Family::kFormula,

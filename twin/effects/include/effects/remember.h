@@ -3,12 +3,21 @@
 #ifndef EFFECTS_REMEMBER_H
 #define EFFECTS_REMEMBER_H
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
 
 namespace twin
 {
+
+// A state that grows without bound stays here: where what follows from it is asked, that is told.
+constexpr double kBeyond = 1e12;
+
+inline double Bounded(double state, double rate)
+{
+    return std::isnan(state) ? std::copysign(kBeyond, rate) : std::clamp(state, -kBeyond, kBeyond);
+}
 
 // Takes `state` through a step by its rate of change, rate(state), and returns its mean over the
 // step. Exact where the rate is linear in the state and all else is held (the exponential Euler
@@ -25,8 +34,8 @@ double Remember(double &state, double dt_s, Rate rate)
     const double z = slope * dt_s;
     const bool small = std::abs(z) < kSmall;
     const double grown = small ? 1 + z / 2 : std::expm1(z) / z;
-    state = before + now * dt_s * grown;
-    return before + now * dt_s * (small ? 0.5 + z / 6 : (grown - 1) / z);
+    state = Bounded(before + now * dt_s * grown, now);
+    return Bounded(before + now * dt_s * (small ? 0.5 + z / 6 : (grown - 1) / z), now);
 }
 
 using TwoStates = std::array<double, 2>;
@@ -64,8 +73,12 @@ TwoStates Remember(TwoStates &states, double dt_s, Rates rates)
         const double mean = ((f_high + f_low) / 2.0).real();
         const double slope = ((f_high - f_low) / (2.0 * apart)).real();
         return TwoStates{
-            before[0] + dt_s * (mean * now[0] + slope * ((a - middle) * now[0] + b * now[1])),
-            before[1] + dt_s * (mean * now[1] + slope * (c * now[0] + (d - middle) * now[1]))};
+            Bounded(
+                before[0] + dt_s * (mean * now[0] + slope * ((a - middle) * now[0] + b * now[1])),
+                now[0]),
+            Bounded(
+                before[1] + dt_s * (mean * now[1] + slope * (c * now[0] + (d - middle) * now[1])),
+                now[1])};
     };
     const std::complex<double> at_high = SecondPhi(high), at_low = SecondPhi(low);
     states = moved(1.0 + high * at_high, 1.0 + low * at_low);

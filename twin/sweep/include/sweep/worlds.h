@@ -28,7 +28,8 @@ std::unique_ptr<Plant> MakePlanarBodies(const std::vector<Model> &models,
                                         const std::vector<Pose2> &starts, uint64_t seed);
 
 // Runs each world for `duration_s`; outcomes in the same order. They depend on nothing but the
-// world and the duration. Throws std::invalid_argument in one sentence if a swarm cannot be made.
+// world and the duration. Throws std::invalid_argument in one sentence if a swarm cannot be made,
+// or is out of bounds.
 std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s, Path path);
 
 // The same in another plant, by the full path.
