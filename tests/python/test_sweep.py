@@ -106,7 +106,7 @@ def test_a_swarm_whose_model_runs_away_has_no_class(tmp_path: Path, plant, texts
     asked = request(["n=3"], model=str(tmp_path / "m.toml"), seeds=1, duration_s=20, plant=plant)
     with pytest.raises(ValueError, match=says):
         sweep(asked, tmp_path / "s")
-    assert not (tmp_path / "s" / "sweep.parquet").exists()
+    assert not (tmp_path / "s").exists()
 
 
 AHEAD = [40, 0, 40, 0]  # inputs of a robot that drives straight whatever it sees

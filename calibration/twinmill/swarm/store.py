@@ -63,6 +63,12 @@ class Store:
         """Writes one part of the table, so that a sweep that is cut off can go on."""
         self._write(self._part(number), pa.table(columns))
 
+    def leave_empty(self) -> None:
+        """Removes what the folder says of itself, if no part was kept."""
+        if not any(self._part(0).parent.iterdir()):
+            self._part(0).parent.rmdir()
+            self._manifest.unlink()
+
     def finish(self, request: Request, count: int) -> None:
         """Joins all parts and removes them."""
         table = pa.concat_tables([pq.read_table(self._part(number)) for number in range(count)])

@@ -113,9 +113,13 @@ def run_missing(
         todo = {} if store.result.exists() else {k: parts[k] for k in store.missing(len(parts))}
         tell(request.world_count - sum(map(len, todo.values())))
         run = run_on_dask(request, todo, dask) if dask else run_here(request, todo, workers)
-        for number, columns in run:
-            store.keep(number, columns)
-            tell(len(parts[number]))
+        try:
+            for number, columns in run:
+                store.keep(number, columns)
+                tell(len(parts[number]))
+        except ValueError:  # its worlds cannot be run
+            store.leave_empty()
+            raise
         if not store.result.exists():
             store.finish(request, len(parts))
     return len(parts) - len(todo)
