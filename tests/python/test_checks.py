@@ -240,6 +240,15 @@ def test_a_step_too_long_to_be_told_by_a_diagnosis_parts_the_log(robot):
     assert f.fatal and "follows its commands later" in f.what and "logs of their own" in f.remedy
 
 
+def test_what_is_as_much_a_step_as_a_drift_is_neither_surely(robot):
+    """From 20 to 40 of 60 s it comes to be 100 ms later: half way between the two."""
+    t_s = robot.pose_t_s
+    done_s = t_s - np.interp(t_s, [20, 40], [0, 0.1])
+    (f,) = _findings([_with_pose(robot, *(np.interp(done_s, t_s, c) for c in robot.pose.T))])
+    assert not f.fatal and "run apart, or the robot follows its commands later" in f.what
+    assert "--pose-clock-ppm" not in f.remedy
+
+
 @pytest.mark.parametrize("ppm", [-2500, 4000])
 def test_clocks_that_run_apart_fast_are_no_step(robot, ppm):
     (f,) = _findings([replace(robot, pose_t_s=robot.pose_t_s * (1 + 1e-6 * ppm))])
