@@ -114,16 +114,21 @@ def seen_once(done: Search, name: str, less: Trial | None) -> list[str] | None:
 
 
 def instead_over_time(done: Search, name: str) -> list[str]:
-    """Effects that change with the time as one does that is of no moment, and might do more.
+    """Effects that do the same as one that changes with the time, or with the speed.
 
-    They end at their bound, and something is left beside the one that was found: with a larger
-    size, or in another form, they may leave less.
+    A drive that goes through its speeds one after the other takes one for the other. Where
+    something is left beside the one that was found, its form may be wrong. So it is beside another
+    of the time that ended at its bound, and would do more with a larger size.
     """
-    if not _is_timed(name) or with_role(name, "moment") or done.last.held_score < SETTINGS.level:
+    if done.last.held_score < SETTINGS.level:
         return []
+    same = _same(done, name)
+    slow, curves = [n for n in same if _is_slow(n)], [n for n in same if bends_speed(n)]
+    if not _is_slow(name):
+        return slow if bends_speed(name) else []
     named = [(t, t.names[0]) for t in done.round_of(name).trials]
     bounded = {n for t, n in named if any(e.at_bound for e in estimates_of(t, n))}
-    return [n for n in _same(done, name) if n in bounded and _is_timed(n)]
+    return [*curves, *(n for n in slow if n in bounded)]
 
 
 def instead_of_moment(done: Search, name: str) -> list[str]:
@@ -138,7 +143,7 @@ def instead_of_moment(done: Search, name: str) -> list[str]:
     anywhere = _is_even(done.last, name) and _in_a_place_of_its_own(done.last, name)
     placed = [n for n in (catalogue() if anywhere else _same(done, name)) if with_role(n, "place")]
     bounded = _same(done, name, SETTINGS.same_in_time, at_bound=SETTINGS.same_at_bound)
-    timed = [n for n in bounded if _is_timed(n) and not with_role(n, "moment")]
+    timed = [n for n in bounded if _is_slow(n)]
     for_good = [n for n in catalogue() if with_role(n, "moment") and not lasts_for_a_while(n)]
     return [*placed, *timed, *(for_good if _may_not_end(done.last, name) else ())]
 
@@ -781,6 +786,11 @@ def _rubs(effect: str) -> bool:
 def _is_timed(effect: str) -> bool:
     """Whether it changes with the time that the robot has been driving."""
     return bool(BY[TIME] & _acts_by(effect))
+
+
+def _is_slow(effect: str) -> bool:
+    """Whether it changes all the time that the robot has been driving, from no moment on."""
+    return _is_timed(effect) and not with_role(effect, "moment")
 
 
 # Effects of which a second one may be the rest of the first in another form: what they act by.

@@ -1252,13 +1252,24 @@ def test_two_curves_of_the_speed_over_the_command_may_be_one():
 
 
 @pytest.mark.parametrize(
-    ("left", "at_bound", "found"),
-    [(1.15, True, ["heat_gain"]), (1.15, False, []), (1.0, True, [])],
+    ("one", "other", "left", "at_bound", "found"),
+    [
+        ("battery_sag", "heat_gain", 1.15, True, True),
+        ("battery_sag", "heat_gain", 1.15, False, False),
+        ("battery_sag", "heat_gain", 1.0, True, False),
+        ("speed_curve", "heat_gain", 1.07, False, True),
+        ("heat_gain", "speed_curve", 1.07, False, True),
+        ("speed_curve", "heat_gain", 1.0, False, False),
+        ("speed_curve", "floor_tilt", 1.07, False, False),
+    ],
 )
-def test_heat_that_might_do_more_stands_beside_a_battery_that_sags(
-    left, at_bound, found, monkeypatch
+def test_what_goes_with_the_time_stands_beside_what_does_the_same(
+    one, other, left, at_bound, found, monkeypatch
 ):
-    """In a drive sorted by its commands voltage and heat run alike: heat at its bound had lost."""
+    """In a drive sorted by its commands the voltage, the heat and the speed run alike.
+
+    Heat at its bound had been a battery that sags, surely, heat on rollers a curve of the speed.
+    """
 
     def trial(name, score, bound=False):
         return SimpleNamespace(
@@ -1267,12 +1278,10 @@ def test_heat_that_might_do_more_stands_beside_a_battery_that_sags(
 
     monkeypatch.setattr(doubts, "estimates_of", lambda one, _: one.own)
     monkeypatch.setattr(doubts, "in_common", lambda *_: 0.9)
-    sag, heat = trial("battery_sag", left), trial("heat_gain", 1.05 * left, at_bound)
-    this = SimpleNamespace(
-        before=trial("", 1.94), accepted=sag, trials=[sag, heat, trial("dead_zone", left, True)]
-    )
-    done = SimpleNamespace(last=sag, round_of=lambda _: this)
-    assert instead_over_time(done, "battery_sag") == found
+    taken, beside = trial(one, left), trial(other, 1.05 * left, at_bound)
+    this = SimpleNamespace(before=trial("", 1.94), accepted=taken, trials=[taken, beside])
+    done = SimpleNamespace(last=taken, round_of=lambda _: this)
+    assert instead_over_time(done, one) == ([other] if found else [])
 
 
 def test_a_stretch_in_which_the_model_is_right_is_not_told():
