@@ -122,6 +122,7 @@ class Form:
         sizes: of the shapes' values; empty until `sized`.
         command_unit: of the command u, where a shape names it.
         damping: written {d} in a state that swings, 1 where it no longer would.
+        figures: fitted constants that the shapes have as figures.
     """
 
     adds_to: str
@@ -135,6 +136,7 @@ class Form:
     sizes: tuple[float, ...] = ()
     command_unit: str = ""
     damping: float = 0.0
+    figures: int = 0
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -155,6 +157,11 @@ class Form:
     def names_time(self) -> bool:
         """It holds of one run: no other shares its moments."""
         return "t" in names_in([*self.texts, *self.rates])
+
+    @property
+    def recurs(self) -> bool:
+        """It is there for a part of each period, by the clock."""
+        return self.group == TIME and bool(self.figures)
 
     @property
     def rates(self) -> tuple[str, ...]:
@@ -182,7 +189,7 @@ class Form:
     @property
     def numbers(self) -> int:
         """Fitted ones, constants among them."""
-        return len(self.shapes) + len(self.searched)
+        return len(self.shapes) + len(self.searched) + self.figures
 
     @property
     def strengths(self) -> np.ndarray:
@@ -575,20 +582,11 @@ def _swings(to: str, shapes: tuple[str, ...], state: State) -> list[Form]:
     ]
 
 
-def on_and_off(wave: Form, numbers: np.ndarray, levels: Sequence[float]) -> list[Form]:
-    """A wave of time sharpened: there while the wave, or its opposite, is above a level.
-
-    Args:
-        wave: with its constant.
-        numbers: (2,) of its cosine and sine.
-        levels: -1 to 1.
-    """
-    phase = float(np.arctan2(numbers[0], numbers[1]))
-    found = []
-    for turned in (phase, phase - np.copysign(np.pi, phase)):
-        inside = f"sin({wave.constant:.4g}*t + {turned:.3f})"
-        found += [Form(wave.adds_to, (f"({inside} > {a:g})",), wave.group) for a in levels]
-    return found
+def on_and_off(rate_radps: float, angle_rad: float, part: float) -> Form:
+    """There while a wave of the time is high, for a part of each period."""
+    angle_rad = (angle_rad + np.pi) % (2 * np.pi) - np.pi
+    inside = f"sin({rate_radps:.4g}*t + {angle_rad:.3f})"
+    return Form("motion", (f"({inside} > {np.cos(np.pi * part):.3g})",), TIME, figures=3)
 
 
 def joined(forms: Sequence[Form]) -> dict[str, str]:

@@ -6,8 +6,9 @@ forms, the one of fewest numbers among those that predict left-out stretches of 
 well; then terms beside it, as long as they help. What was chosen is judged on the other half, which
 neither chose nor fitted it: by an F test, and by the chance of so large a fall under random signs
 of blocks (both exact for what they assume; the larger chance counts). So one formula is tested a
-half, however many were tried, and both halves together count twice (Bonferroni), or four times
-where a second one is tested that was chosen at larger weights. Of two that are
+half, however many were tried, and both halves together count twice (Bonferroni), four times
+where a second one is tested that was chosen at larger weights, or six times where a third one is
+tested that comes and goes by the clock. Of those that are
 proven, the one that gains more on both halves is told.
 """
 
@@ -36,12 +37,12 @@ from twinmill.diagnosis.forms import (
     Form,
     Motion,
     from_library,
-    on_and_off,
     own_forms,
     sized,
 )
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_telling import TRIED, stability, told
+from twinmill.diagnosis.recurring import Recurring
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME, Term
 from twinmill.fitting.opening import Opened
@@ -55,7 +56,7 @@ HEAVY = 4.0  # times the weight of rows, where nothing is proven at their own
 MOST_TERMS = 3
 ALL_SIGNS = 12  # up to so many blocks all signs are tried ...
 DRAWN = 4095  # ... of more so many
-LEVELS = (-0.7, -0.35, 0.0, 0.35, 0.7)  # of a wave that is sharpened
+NEAR = 10  # best forms: where one of these is of time, all that comes by the clock is tried
 
 
 def formula_of(
@@ -89,27 +90,49 @@ def formula_of(
     forms = [*from_library(terms, command_unit), *sized(own, motions)]
     pool = Pool(forms, rows.raw(forms))
     other = rows.of_all(rival) if len(rival) else None
+    clock = Recurring(rows)
     half = np.arange(len(rows.parts)) % 2 == 0
-    proofs = [proof for own in (half, ~half) if (proof := _proven(rows, pool, own, other))]
+    found: list[Proof] = []
+    for chooses in (half, ~half):
+        found += _proven(rows, pool, chooses, rival=other, clock=clock)
+    return _borne_out(rows, pool, clock, found)
+
+
+def _borne_out(
+    rows: Evidence, pool: Pool, clock: Recurring, proofs: Sequence[Proof]
+) -> Formula | None:
+    """Of what was proven the one that gains most on both halves, of those that resamplings bear."""
     for proof in sorted(proofs, key=lambda p: -_net(rows, p)):
+        first = proof.chosen.forms[0]
         rows.weighed(proof.scale)
-        again = stability(rows, pool, proof.chosen.forms[0])
+        again = stability(rows, _with(pool, proof) if first.recurs else pool, first)
         if again >= SETTINGS.formula_again:
-            whole = _completed(rows, pool, proof)
-            return told(rows, whole, len(forms), again)
+            tried = len(pool.forms) + (clock.tried if first.recurs else 0)
+            return told(rows, _completed(rows, pool, proof, clock), tried, again)
     return None
 
 
-def _completed(rows: Evidence, pool: Pool, proof: Proof) -> Proof:
+def _with(pool: Pool, proof: Proof) -> Pool:
+    """With the first form of a proof, which is not among those of a pool."""
+    first = proof.chosen.forms[0]
+    return Pool([*pool.forms, first], np.hstack([pool.raw, proof.chosen.raw[:, :1]]))
+
+
+def _completed(rows: Evidence, pool: Pool, proof: Proof, clock: Recurring) -> Proof:
     """With the form that has a proven one as a part, where both halves together ask for it.
 
-    One of two parts of a direction may be too small to be seen in one half.
+    One of two parts of a direction may be too small to be seen in one half. Of what comes and goes
+    by the clock both halves together tell the period best.
     """
+    own, every = proof.chosen.forms[0], np.ones(len(rows.parts), bool)
+    if own.recurs:
+        better, raw = clock.best(every), proof.chosen.raw[:, 1:]
+        forms = (*better.forms, *proof.chosen.forms[1:])
+        chosen = replace(proof.chosen, forms=forms, raw=np.hstack([better.raw, raw]))
+        return replace(proof, chosen=chosen)
     if len(proof.chosen.forms) > 1:
         return proof
-    own = proof.chosen.forms[0]
     more = [k for k, f in enumerate(pool.forms) if _has(f, own)]
-    every = np.ones(len(rows.parts), bool)
     if not more:
         return proof
     nothing = Chosen((), np.zeros((len(rows.stretch), 0)), 0.0)
@@ -134,40 +157,96 @@ def _net(rows: Evidence, proof: Proof) -> float:
     return float(sums.held_out(every)[0]) - SETTINGS.each * proof.chosen.numbers
 
 
-def _proven(rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None) -> Proof | None:
-    """Chooses on a half and judges on the other; None where that does not bear it out.
+def _proven(
+    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: np.ndarray | None, clock: Recurring
+) -> list[Proof]:
+    """Chooses on a half and judges on the other; none where that does not bear it out.
 
     What the floor took for noise, as what sways after each start, weighs next to nothing. So where
-    nothing is proven, what swings and takes much is looked for at larger weights.
+    nothing is proven, what swings and takes much is looked for at larger weights. Where time is
+    near the best, so is what comes and goes by the clock.
 
     Args:
         rows: are weighed anew.
         pool: to choose from.
         half: (S,) of the stretches.
         rival: (R, 1) raw column of what it must outdo.
+        clock: over the same rows.
     """
-    tries = (_proven_at(rows, pool, half, rival, weight=w) for w in (1.0, HEAVY))
-    return next((proof for proof in tries if proof), None)
+    rows.weighed(np.ones(len(rows.stretch)))
+    net = _promised(rows, pool, half)
+    best = np.argsort(-net)[:SHORTLIST]
+    found = None
+    if net[best[0]] > 0:
+        found = _judged(rows, pool, pool.some(best), half, rival=rival, tests=2)
+    found = found or _that_swings(rows, pool, half, rival)
+    is_of_time = found.chosen.forms[0].group == TIME if found else True
+    near = any(pool.forms[k].group == TIME for k in best[:NEAR])
+    by_clock = None
+    if near and is_of_time:
+        by_clock = _by_the_clock(rows, pool, half, rival=rival, clock=clock)
+    return [proof for proof in (found, by_clock) if proof]
 
 
-def _proven_at(
-    rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None, *, weight: float
+def _promised(rows: Evidence, pool: Pool, half: np.ndarray) -> np.ndarray:
+    """(T,) what each form gains on left-out stretches of a half, less what its numbers cost."""
+    gains = Sums.of(rows, pool, pool.raw[:, :0]).held_out(half)
+    return gains - SETTINGS.each * np.array([f.numbers for f in pool.forms])
+
+
+def _that_swings(
+    rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None
 ) -> Proof | None:
-    """The same with rows that weigh so many times what they do; above 1 of what swings alone."""
-    rows.weighed(np.full(len(rows.stretch), weight))
-    some = pool.some([k for k, f in enumerate(pool.forms) if f.damping]) if weight > 1 else pool
-    sums = Sums.of(rows, some, pool.raw[:, :0])
-    net = sums.held_out(half) - SETTINGS.each * np.array([f.numbers for f in some.forms])
+    """Of what swings alone, by rows that weigh more."""
+    rows.weighed(np.full(len(rows.stretch), HEAVY))
+    some = pool.some([k for k, f in enumerate(pool.forms) if f.damping])
+    net = _promised(rows, some, half)
     best = np.argsort(-net)[:SHORTLIST]
     left = rows.left[half[rows.stretch]]
-    if net[best[0]] <= (SETTINGS.formula_takes * left @ left if weight > 1 else 0):
+    if net[best[0]] <= SETTINGS.formula_takes * left @ left:
         return None
-    first = some.some(best[:1])
-    rows.weighed(weight * _scales(rows, first.raw, half))
-    chosen = _chosen(rows, pool, some.some(best), half)
+    return _judged(rows, pool, some.some(best), half, rival=rival, tests=4, weight=HEAVY)
+
+
+def _by_the_clock(
+    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: np.ndarray | None, clock: Recurring
+) -> Proof | None:
+    """Of what is there for a part of each period, chosen again by what noise then remains."""
+    plain = np.ones(len(rows.stretch))
+    rows.weighed(plain)
+    first = clock.best(half)
+    rows.weighed(_scales(rows, first.raw, half))
+    short = clock.best(half)
+    rows.weighed(plain)
+    return _judged(rows, pool, short, half, rival=rival, tests=6)
+
+
+def _judged(
+    rows: Evidence,
+    pool: Pool,
+    short: Pool,
+    half: np.ndarray,
+    *,
+    rival: np.ndarray | None,
+    tests: int,
+    weight: float = 1.0,
+) -> Proof | None:
+    """The proof on the other half of what is chosen on one; None if it is none.
+
+    Args:
+        rows: that weigh so many times what they do.
+        pool: of which terms after the first are.
+        short: of which the first is, the best in front.
+        half: (S,) of the stretches.
+        rival: (R, 1) raw column of what it must outdo.
+        tests: that are done in all.
+        weight: of the rows.
+    """
+    rows.weighed(weight * _scales(rows, short.some([0]).raw, half))
+    chosen = _chosen(rows, pool, short, half)
     if not chosen or (rival is not None and _outdone(rows, chosen, rival, half)):
         return None
-    proof = _proof(rows, chosen, half, tests=2 if weight == 1 else 4)
+    proof = _proof(rows, chosen, half, tests=tests)
     if proof.chance > SETTINGS.formula_chance or proof.takes < SETTINGS.formula_takes:
         return None
     return proof
@@ -261,19 +340,12 @@ def _complexity(form: Form) -> int:
 
 
 def _polished(rows: Evidence, one: Pool, half: np.ndarray, found: Chosen) -> Chosen:
-    """With the best constants near the form's, and sharpened where that is simpler or better."""
+    """With the best constants near the form's."""
     best = best_of(rows, one, half, found)
     for part, name in product((1.0, 0.25), best.forms[-1].searched):
         tried = best.forms[-1].near(name, part * TRIED)
         best = max(best, made(rows, tried, half, found), key=lambda c: c.gain)
-    form = best.forms[-1]
-    if form.group != TIME or not form.constant:
-        return best
-    numbers = fitted(rows, best, half)[-2:] * form.strengths
-    near = form.near("constant", TRIED[::2] / 4)
-    sharp = [s for w in near for s in on_and_off(w, numbers, LEVELS)]
-    other = made(rows, sharp, half, found)
-    return other if other.net > best.net - _alike(best.net) else best
+    return best
 
 
 # -- proof -----------------------------------------------------------------------------------------

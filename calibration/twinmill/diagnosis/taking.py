@@ -239,7 +239,7 @@ def _refitted(
 
 
 def _count(forms: Sequence[Form]) -> int:
-    return sum(form.numbers for form in forms)
+    return sum(len(form.shapes) + len(form.searched) for form in forms)
 
 
 def _as_fitted(

@@ -155,6 +155,23 @@ def test_the_score_without_the_formula_is_the_last_one_of_the_steps(explained):
     assert result.formula.before == result.diagnosis.steps[-1][1]
 
 
+def test_what_is_switched_is_told_with_its_period_its_moments_and_its_size(explained):
+    """An eighth less for 7 s of every 20."""
+
+    def there(t_s):
+        return np.sin(2 * np.pi * t_s / 20 + 2.0) > 0.4
+
+    def at_times(motion):
+        return motion * (1 - 0.12 * there(np.arange(len(motion)) * STEP_S))[:, None]
+
+    formula = explained(at_times, 101).diagnosis.rest.proven
+    (form,), (number,) = formula.forms, formula.numbers
+    t_s = np.arange(0, 80, 0.1)
+    told = eval(form.texts[0], {"sin": np.sin, "t": t_s})
+    assert np.mean(told == there(t_s)) > 0.97
+    assert number.value == pytest.approx(-0.12, rel=0.1)
+
+
 def test_a_formula_of_the_moments_of_one_run_is_told_and_not_taken(explained):
     result = explained(switched, 101)
     assert result.diagnosis.rest.proven.names_time

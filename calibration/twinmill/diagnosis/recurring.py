@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is there for a part of each period, by the clock: the one of all such forms that fits best.
+
+The way within one bin of time is a column; any form that is there in some bins is a sum of these.
+So thousands of periods, moments and parts cost little more than the bins do.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from twinmill.diagnosis.evidence import Evidence, Pool
+from twinmill.diagnosis.forms import SHORTEST_S, Form, on_and_off, sized
+from twinmill.diagnosis.term import TIME
+
+BINS = 96
+POINTS = 4  # of each bin, at which it is looked up whether a form is there
+LONGEST = 1 / 1.5  # share of the time of all logs: what is seen but once does not recur
+PHASES = 24
+PARTS = (0.2, 0.3, 0.4, 0.5)  # of a period; of a longer one the rest is that part
+STEPS = 4  # a finer grid has so many to each side of the best, of the last one's step
+FINER = (1.0, 0.2)
+
+
+@dataclass(frozen=True)
+class Recurring:
+    """What is tried over the logs of some evidence.
+
+    Attributes:
+        rows: of the logs.
+    """
+
+    rows: Evidence
+
+    @cached_property
+    def edges_s(self) -> np.ndarray:
+        """(BINS + 1,) of bins of the time of all logs."""
+        t_s = np.concatenate([m.names["t"] for m in self.rows.motions])
+        return np.linspace(t_s.min(), t_s.max() + 1e-6, BINS + 1)
+
+    @cached_property
+    def raw(self) -> np.ndarray:
+        """(R, BINS) raw columns of the way within each bin."""
+        inside = [f"(t >= {a:.6f})*(t < {b:.6f})" for a, b in pairwise(self.edges_s)]
+        return self.rows.raw([Form("motion", (text,), TIME, sizes=(1.0,)) for text in inside])
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """(K, 3) rates in rad/s, angles at time 0 and parts of a period that are tried first."""
+        span_s = np.ptp(self.edges_s)
+        low, high = 1 / (LONGEST * span_s), 1 / SHORTEST_S
+        per_s = np.linspace(low, high, max(2, round((high - low) * 10 * span_s)))
+        angles = np.linspace(0, 2 * np.pi, PHASES, endpoint=False)
+        grid = np.meshgrid(2 * np.pi * per_s, angles, PARTS, indexing="ij")
+        return np.stack([g.ravel() for g in grid], axis=1)
+
+    @property
+    def tried(self) -> int:
+        """Candidates."""
+        return len(self.first)
+
+    @cached_property
+    def _there(self) -> np.ndarray:
+        return self._in_bins(self.first)
+
+    def _in_bins(self, tried: np.ndarray) -> np.ndarray:
+        """(K, BINS) share of each bin in which candidates are there."""
+        inside = (np.arange(POINTS) + 0.5) / POINTS
+        t_s = (self.edges_s[:-1, None] + inside * np.diff(self.edges_s)[:, None]).ravel()
+        waves, which = np.unique(tried[:, :2], axis=0, return_inverse=True)
+        wave = np.sin(waves[:, [0]] * t_s + waves[:, [1]]).astype(np.float32)
+        level = np.cos(np.pi * tried[:, [2]]).astype(np.float32)
+        there = wave[which.ravel()] > level
+        return there.reshape(len(tried), BINS, POINTS).mean(axis=2, dtype=np.float32)
+
+    def best(self, half: np.ndarray) -> Pool:
+        """The one form that takes most on (S,) stretches of a half, as the rows are weighed."""
+        own = half[self.rows.stretch]
+        columns = self.rows.seen(self.raw)[own]
+        gram = (columns.T @ columns).astype(np.float32)
+        moment = (columns.T @ self.rows.left[own]).astype(np.float32)
+
+        def most(tried: np.ndarray, there: np.ndarray) -> np.ndarray:
+            taken = (there @ moment) ** 2
+            return tried[np.argmax(taken / (np.einsum("kb,kb->k", there @ gram, there) + 1e-3))]
+
+        best = most(self.first, self._there)
+        for part in FINER:
+            near = self._near(best, part)
+            best = most(near, self._in_bins(near))
+        forms = sized([on_and_off(*best)], self.rows.motions)
+        return Pool(forms, self.rows.raw(forms))
+
+    def _near(self, best: np.ndarray, part: float) -> np.ndarray:
+        """(K, 3) candidates around one."""
+        span_s, middle_s = np.ptp(self.edges_s), self.edges_s.mean()
+        steps = part * np.arange(-STEPS, STEPS + 1) / STEPS
+        rates = best[0] + 2 * np.pi * 0.1 / span_s * steps
+        turns = 2 * np.pi / PHASES * steps
+        parts = np.clip(best[2] + 0.1 * steps, 0.08, 0.5)
+        grid = np.meshgrid(rates, turns, parts, indexing="ij")
+        found = np.stack([g.ravel() for g in grid], axis=1)
+        found[:, 1] += best[1] - (found[:, 0] - best[0]) * middle_s  # turned about the middle
+        return found
