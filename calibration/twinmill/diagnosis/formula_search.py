@@ -6,14 +6,14 @@ forms, the one of fewest numbers among those that predict left-out stretches of 
 well; then terms beside it, as long as they help. What was chosen is judged on the other half, which
 neither chose nor fitted it: by an F test, and by the chance of so large a fall under random signs
 of blocks (both exact for what they assume; the larger chance counts). So one formula is tested a
-half, however many were tried, and both halves together count twice (Bonferroni), four times
-where a second one is tested that was chosen at larger weights, or six times where a third one is
-tested that comes and goes by the clock. Of those that are
-proven, the one that gains more on both halves is told.
+half, however many were tried, and both halves together count twice (Bonferroni). Where a half tests
+one more that was chosen at larger weights, or that comes and goes by the clock, that counts four
+times, and a third one six times. Of those that are proven, the one that gains most on both halves
+is told.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -59,6 +59,19 @@ DRAWN = 4095  # ... of more so many
 NEAR = 10  # best forms: where one of these is of time, all that comes by the clock is tried
 
 
+@dataclass(frozen=True)
+class Rival:
+    """What a formula must outdo.
+
+    Attributes:
+        changes: (R,) of each log's rows by it.
+        numbers: that were fitted to all rows.
+    """
+
+    changes: Sequence[np.ndarray]
+    numbers: int
+
+
 def formula_of(
     fit: ScoreFit,
     *,
@@ -66,7 +79,7 @@ def formula_of(
     velocities: Sequence[np.ndarray],
     terms: Sequence[Term],
     changes: Columns,
-    rival: Sequence[np.ndarray] = (),
+    rival: Rival | None = None,
 ) -> Formula | None:
     """The formula for what a fit leaves; None if none is proven.
 
@@ -76,7 +89,7 @@ def formula_of(
         velocities: (N, 3) of the body in each, as the final model moves.
         terms: of the library.
         changes: of all logs' rows by each.
-        rival: (R,) of each log's rows by what the formula must outdo; empty if nothing.
+        rival: what the formula must outdo.
     """
     pairs = zip(logs, velocities, strict=True)
     motions = [Motion.of(own, v, HORIZONS) for (_, own), v in pairs]
@@ -89,12 +102,11 @@ def formula_of(
     command_unit = "rad/s" if model.drive == "wheel_speed" else ""  # a duty is a plain figure
     forms = [*from_library(terms, command_unit), *sized(own, motions)]
     pool = Pool(forms, rows.raw(forms))
-    other = rows.of_all(rival) if len(rival) else None
     clock = Recurring(rows)
     half = np.arange(len(rows.parts)) % 2 == 0
     found: list[Proof] = []
     for chooses in (half, ~half):
-        found += _proven(rows, pool, chooses, rival=other, clock=clock)
+        found += _proven(rows, pool, chooses, rival=rival, clock=clock)
     return _borne_out(rows, pool, clock, found)
 
 
@@ -161,7 +173,7 @@ def _net(rows: Evidence, proof: Proof) -> float:
 
 
 def _proven(
-    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: np.ndarray | None, clock: Recurring
+    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: Rival | None, clock: Recurring
 ) -> list[Proof]:
     """Chooses on a half and judges on the other; none where that does not bear it out.
 
@@ -173,22 +185,29 @@ def _proven(
         rows: are weighed anew.
         pool: to choose from.
         half: (S,) of the stretches.
-        rival: (R, 1) raw column of what it must outdo.
+        rival: what it must outdo.
         clock: over the same rows.
     """
     rows.weighed(np.ones(len(rows.stretch)))
     net = _promised(rows, pool, half)
     best = np.argsort(-net)[:SHORTLIST]
-    found = None
+    tested = []
     if net[best[0]] > 0:
-        found = _judged(rows, pool, pool.some(best), half, rival=rival, tests=2)
-    found = found or _that_swings(rows, pool, half, rival)
-    is_of_time = found.chosen.forms[0].group == TIME if found else True
-    near = any(pool.forms[k].group == TIME for k in best[:NEAR])
-    by_clock = None
-    if near and is_of_time:
-        by_clock = _by_the_clock(rows, pool, half, rival=rival, clock=clock)
-    return [proof for proof in (found, by_clock) if proof]
+        tested += _judged(rows, pool, pool.some(best), half, rival=rival, tests=2)
+    if not any(_holds(proof) for proof in tested):
+        tested += _that_swings(rows, pool, half, rival=rival, before=len(tested))
+    found = [proof for proof in tested if _holds(proof)]
+    is_of_time = all(proof.chosen.forms[0].group == TIME for proof in found)
+    if is_of_time and any(pool.forms[k].group == TIME for k in best[:NEAR]):
+        first = _by_the_clock(rows, half, clock)
+        tests = 2 * (len(tested) + 1)
+        found += filter(_holds, _judged(rows, pool, first, half, rival=rival, tests=tests))
+    return found
+
+
+def _holds(proof: Proof) -> bool:
+    """Whether the half that judged it bears it out."""
+    return proof.chance <= SETTINGS.formula_chance and proof.takes >= SETTINGS.formula_takes
 
 
 def _promised(rows: Evidence, pool: Pool, half: np.ndarray) -> np.ndarray:
@@ -198,30 +217,28 @@ def _promised(rows: Evidence, pool: Pool, half: np.ndarray) -> np.ndarray:
 
 
 def _that_swings(
-    rows: Evidence, pool: Pool, half: np.ndarray, rival: np.ndarray | None
-) -> Proof | None:
-    """Of what swings alone, by rows that weigh more."""
+    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: Rival | None, before: int
+) -> list[Proof]:
+    """Of what swings alone, by rows that weigh more, after so many tests of a half."""
     rows.weighed(np.full(len(rows.stretch), HEAVY))
     some = pool.some([k for k, f in enumerate(pool.forms) if f.damping])
     net = _promised(rows, some, half)
     best = np.argsort(-net)[:SHORTLIST]
     left = rows.left[half[rows.stretch]]
     if net[best[0]] <= SETTINGS.formula_takes * left @ left:
-        return None
-    return _judged(rows, pool, some.some(best), half, rival=rival, tests=4, weight=HEAVY)
+        return []
+    tests = 2 * (before + 1)
+    return _judged(rows, pool, some.some(best), half, rival=rival, tests=tests, weight=HEAVY)
 
 
-def _by_the_clock(
-    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: np.ndarray | None, clock: Recurring
-) -> Proof | None:
-    """Of what is there for a part of each period, chosen again by what noise then remains."""
+def _by_the_clock(rows: Evidence, half: np.ndarray, clock: Recurring) -> Pool:
+    """What is there for a part of each period, chosen again by what noise then remains."""
     plain = np.ones(len(rows.stretch))
     rows.weighed(plain)
-    first = clock.best(half)
-    rows.weighed(_scales(rows, first.raw, half))
-    short = clock.best(half)
+    rows.weighed(_scales(rows, clock.best(half).raw, half))
+    best = clock.best(half)
     rows.weighed(plain)
-    return _judged(rows, pool, short, half, rival=rival, tests=6)
+    return best
 
 
 def _judged(
@@ -230,36 +247,36 @@ def _judged(
     short: Pool,
     half: np.ndarray,
     *,
-    rival: np.ndarray | None,
+    rival: Rival | None,
     tests: int,
     weight: float = 1.0,
-) -> Proof | None:
-    """The proof on the other half of what is chosen on one; None if it is none.
+) -> list[Proof]:
+    """The proof on the other half of what is chosen on one; none if nothing is, or it is outdone.
 
     Args:
         rows: that weigh so many times what they do.
         pool: of which terms after the first are.
         short: of which the first is, the best in front.
         half: (S,) of the stretches.
-        rival: (R, 1) raw column of what it must outdo.
-        tests: that are done in all.
+        rival: what it must outdo.
+        tests: that its chance counts for, of both halves.
         weight: of the rows.
     """
     rows.weighed(weight * _scales(rows, short.some([0]).raw, half))
     chosen = _chosen(rows, pool, short, half)
-    if not chosen or (rival is not None and _outdone(rows, chosen, rival, half)):
-        return None
-    proof = _proof(rows, chosen, half, tests=tests)
-    if proof.chance > SETTINGS.formula_chance or proof.takes < SETTINGS.formula_takes:
-        return None
-    return proof
+    if not chosen or (rival and _outdone(rows, chosen, rival, half)):
+        return []
+    return [_proof(rows, chosen, half, tests=tests)]
 
 
-def _outdone(rows: Evidence, chosen: Chosen, rival: np.ndarray, half: np.ndarray) -> bool:
-    """Whether a rival predicts left-out stretches as well."""
-    one = Pool([Form("motion", ("1",), "", sizes=(1.0,))], rival)
-    sums = Sums.of(rows, one, rival[:, :0])
-    return bool(sums.held_out(half)[0] >= chosen.gain - _alike(chosen.gain))
+def _outdone(rows: Evidence, chosen: Chosen, rival: Rival, half: np.ndarray) -> bool:
+    """Whether a rival predicts left-out stretches as well.
+
+    Its numbers were fitted to these as well: what each takes there by chance goes off.
+    """
+    one = Pool([Form("motion", ("1",), "", sizes=(1.0,))], rows.of_all(rival.changes))
+    gain = Sums.of(rows, one, one.raw[:, :0]).held_out(half)[0] - SETTINGS.each * rival.numbers
+    return bool(gain >= chosen.gain - _alike(chosen.gain))
 
 
 def _scales(rows: Evidence, raw: np.ndarray, half: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.formula import Formula
-from twinmill.diagnosis.formula_search import formula_of
+from twinmill.diagnosis.formula_search import Rival, formula_of
 from twinmill.diagnosis.library import LEFT_OVER, library
 from twinmill.diagnosis.moments import Events, Moment, events_of
 from twinmill.diagnosis.place import comes_again
@@ -220,7 +220,8 @@ class Doubted:
     def formula(self, whole: ScoreFit) -> Formula | None:
         """The formula that does better than they do in the fit that has them, if one is proven."""
         before, after = self.fit.state[0], whole.state[0]
-        rival = [before[i] - after[i] for i, _ in self.formulas.logs]
+        changes = [before[i] - after[i] for i, _ in self.formulas.logs]
+        rival = Rival(changes, max(len(whole.unknowns) - len(self.fit.unknowns), 0))
         found = formula_of(self.fit, **vars(self.formulas), rival=rival)
         return replace(found, instead_of=self.names) if found else None
 

@@ -7,12 +7,15 @@ The robots are no twin: each hides something of its own, written here in NumPy o
 import numpy as np
 import pytest
 
+from twinmill.challenge.cases import draw, draw_robots, make_log
+from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import Explanation, explain
 from twinmill.diagnosis.taking import taken
 from twinmill.fitting.compare import compare
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, effect_parameters
+from twinmill_cli.challenge import base_of
 
 STEP_S = 1 / 480  # of the robot
 
@@ -138,6 +141,22 @@ def test_a_push_that_grows_with_speed_stands_in_the_place_of_one_that_does_not(e
     east, north = (n.value for n in result.formula.numbers)
     assert np.hypot(east, north) == pytest.approx(0.1, rel=0.1)
     assert np.arctan2(north, east) == pytest.approx(0.7, abs=0.1)
+
+
+def test_tiles_are_told_in_the_place_of_a_patch_that_was_fitted_to_all_of_the_way(tmp_path):
+    """A case of the exam, whose plant shares no code: a patch takes most of what tiles do."""
+    robots = draw_robots(2041)
+    case = draw(59, 2041, robots, 90.0)
+    (tiles,) = case.hidden
+    base = base_of(tmp_path, case.robot, robots[case.robot], 2041, duration_s=90.0)
+    make_log(case, tmp_path / "run.lcmlog")
+    logs = load_measurements([tmp_path / "run.lcmlog"])
+    out = tmp_path / "explained.toml"
+    result = explain(logs, ModelFile.load(str(base)), out=out, command="")
+    assert tiles.name == "tiles" and result.formula.kept
+    assert "floor_patch" in result.formula.formula.instead_of
+    (form,) = result.formula.formula.forms
+    assert 2 * np.pi / form.constant == pytest.approx(tiles.values["length_m"], rel=0.02)
 
 
 def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
