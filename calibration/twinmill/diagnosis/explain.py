@@ -70,12 +70,11 @@ class Explanation:
         if not (self.formula and self.formula.kept):
             return ""
         own = self.formula
-        now = (
+        return (
             f"The model now has the formula {own.added.equals}, which takes "
             f"{100 * own.share:.0f} % of what was left (held-out score {own.before:.2f} without "
             f"it, {own.after:.2f} with it)."
         )
-        return f"{now} {own.note}".rstrip()
 
     @property
     def steps(self) -> list[tuple[str | None, float]]:

@@ -120,10 +120,7 @@ def _borne_out(
         again = stability(rows, _with(pool, proof) if first.recurs else pool, first)
         if again >= SETTINGS.formula_again:
             tried = len(pool.forms) + (clock.tried if first.recurs else 0)
-            whole = _completed(rows, pool, proof, clock)
-            formula = told(rows, whole, tried, again)
-            goes_on = first.recurs and clock.goes_on(whole.chosen.raw[:, :1])
-            return replace(formula, goes_on=goes_on)
+            return told(rows, _completed(rows, pool, proof, clock), tried, again)
     return None
 
 

@@ -75,7 +75,7 @@ class Taken:
     @property
     def why_not(self) -> str:
         """What keeps it out of the model; empty if nothing does."""
-        if self.formula.passing and self.runs < SEVERAL:
+        if self.formula.names_time and self.runs < SEVERAL:
             return "it names the time of one run, and nothing shows that another run shares it"
         if self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"
@@ -87,16 +87,6 @@ class Taken:
         return ""
 
     @property
-    def note(self) -> str:
-        """What a formula in the model says of other runs alone where they begin alike, or empty."""
-        if not (self.kept and self.formula.names_time and self.runs < SEVERAL):
-            return ""
-        return (
-            "Its time counts from the start of the log, and this one log does not tell whether "
-            "others begin at the same moment of its period: where they do not, leave it out."
-        )
-
-    @property
     def added(self) -> Formula:
         """As the model has it."""
         return replace(self.formula, numbers=self.numbers)
@@ -106,7 +96,6 @@ class Taken:
         return {
             "kept": self.kept,
             "why_not": self.why_not,
-            "note": self.note,
             "effect": EFFECT,
             "equation": self.formula.equation,
             "text": self.added.equals,
