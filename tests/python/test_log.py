@@ -166,6 +166,20 @@ def test_a_stamp_out_of_its_order_is_damage_and_moves_no_other(write_log, messag
         np.testing.assert_allclose(t_s, np.delete(stamps_s, count // 2), atol=2e-6)
 
 
+@pytest.mark.parametrize("held", [0, 27])
+def test_a_command_that_is_held_for_minutes_is_no_damage(write_log, message, held):
+    """Commands that are sent when they change: one circle of five minutes before or after the rest.
+
+    It had been left out, and with it all poses of that time.
+    """
+    steps_s = np.full(28, 1.2)
+    steps_s[held] = 300.0
+    t_s = np.concatenate([[0.0], np.cumsum(steps_s)])
+    drives = [message("drive", utime_us=int(1e15 + 1e6 * t), robot_id=7) for t in t_s]
+    log = read_log(write_log(*[("R07_DRIVE", drive) for drive in drives]))
+    assert len(log.robots[7].command_t_s) == 29 and not any("damaged" in w for w in log.warnings)
+
+
 def test_stamps_that_a_network_disorders_are_sorted(write_log, message):
     """Two halves of a log that were joined in the wrong order, too: they are no damage."""
     t_s = np.arange(0, 90, 0.1)

@@ -29,6 +29,7 @@ CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
 
 FAR_S = 60.0  # beside its span: no channel has single stamps so far away
+ALONE = 100  # times the span, of commands that are sent when they change: one is held for long
 LATE_S = 1.0  # a network hands messages over late by less
 FARTHEST_M = 1e9  # no room is as large: such a place is damage
 
@@ -253,7 +254,8 @@ def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.nd
 
     One stamp that is minutes early would be the beginning of the log, and of all times told of it.
     """
-    strange = _strays(messages["utime_us"].astype(float) / 1e6)
+    alone = ALONE if channel.endswith("_DRIVE") else 1
+    strange = _strays(messages["utime_us"].astype(float) / 1e6, alone)
     if "kind" in messages.dtype.names:
         kinds, counts = np.unique(messages["kind"], return_counts=True)
         strange |= messages["kind"] != kinds[counts.argmax()]
@@ -264,15 +266,16 @@ def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.nd
     return messages[~strange]
 
 
-def _strays(t_s: np.ndarray) -> np.ndarray:
+def _strays(t_s: np.ndarray, alone: int) -> np.ndarray:
     """(K,) bool of stamps in file order: far beside all others, or far from their place among them.
 
     Args:
         t_s: (K,) stamps.
+        alone: how many times as long as all others last is far.
     """
     spared = most_broken(len(t_s))
     first_s, last_s = np.sort(t_s)[[spared, -1 - spared]]
-    far_s = last_s - first_s + FAR_S
+    far_s = alone * (last_s - first_s) + FAR_S
     far = (t_s < first_s - far_s) | (t_s > last_s + far_s)
     if (np.diff(t_s) >= -LATE_S).all():
         return far

@@ -712,12 +712,15 @@ def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict])
 def of_no_right_model(found: Sequence[Finding], rest: Rest, score: float) -> list[Finding]:
     """Findings, doubtful where the model with all of them is none that is right.
 
+    What is left may be something else, where it depends on something.
+
     Args:
         found: of which many that are doubtful were judged.
         rest: what is left.
         score: held out, of that model.
     """
-    if score <= SETTINGS.no_right_model or rest.share <= SETTINGS.left_by_right:
+    told = rest.depends_on and not rest.likely
+    if told or score <= SETTINGS.no_right_model or rest.share <= SETTINGS.left_by_right:
         return list(found)
     why = f"the score that is left is {score:.2f}, and that of a right model is 1"
     return [doubted(f, why) if f.certainty == "sure" and f.effect != REFIT else f for f in found]

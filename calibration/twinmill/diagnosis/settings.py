@@ -84,7 +84,7 @@ class Settings(Numbers):
     lag_leaves: float = number(0.12, "share left, beyond which no lag is sure")
     wheel_leaves: float = number(0.05, "the same of a weak wheel, if it depends on speeds")
     no_right_model: float = number(1.15, "score beyond which no name is sure ...")
-    left_by_right: float = number(0.04, "... if so large a share is left")
+    left_by_right: float = number(0.04, "... if so large a share is left that depends on nothing")
     form_takes: float = number(0.15, "share of what is left, by which a finding has another form")
     nearly_all: float = number(0.85, "... beyond which share it is still the same physics")
     same: float = number(0.8, "cosine of what two take, from which they take the same errors ...")

@@ -971,13 +971,18 @@ def test_beside_a_rest_that_is_no_noise_a_name_is_doubtful(effect, left, firm, c
 
 
 @pytest.mark.parametrize(
-    ("score", "left", "certainty"),
-    [(1.05, 0.1, "sure"), (1.2, 0.01, "sure"), (1.2, 0.06, "doubtful")],
+    ("score", "left", "depends_on", "certainty"),
+    [
+        (1.05, 0.1, [], "sure"),
+        (1.2, 0.01, [], "sure"),
+        (1.2, 0.06, [], "doubtful"),
+        (1.2, 0.06, ["place"], "sure"),  # that may be something else
+    ],
 )
-def test_a_score_that_no_right_model_has_leaves_no_name_sure(score, left, certainty):
-    """Of eleven such names of strangers' and own cases five were wrong, of 384 others nine."""
+def test_a_score_that_no_right_model_has_leaves_no_name_sure(score, left, depends_on, certainty):
+    """Steel in the floor had been a heading that is off, surely."""
     found = [Finding("heading_bias", None, [], 0.9, "sure")]
-    (judged,) = of_no_right_model(found, Rest(left, False, []), score)
+    (judged,) = of_no_right_model(found, Rest(left, False, depends_on), score)
     assert judged.certainty == certainty
 
 
