@@ -39,6 +39,7 @@ class CheckSettings(Numbers):
     drift_span_s: float = number(30.0, "... in logs of this length at least")
     least_ppm: float = number(870.0, "drift of clocks: less is for fits, robots imitate it ...")
     drift_sure: float = number(7.0, "... and so many standard errors")
+    most_ppm: float = number(1500.0, "drift beyond which steps may be behind it as well")
     step_sure: float = number(2.0, "standard errors by which a step explains more than a drift")
     skips: float = number(0.5, "of a step missing in the beat of stamps: their clock was set")
     acting_later_s: float = number(0.5, "a longer step of what the commands do no diagnosis tells")
