@@ -70,13 +70,18 @@ def estimate_offset(track: Track) -> ClockOffset:
 def _minimum(losses: np.ndarray, offsets_s: np.ndarray) -> tuple[float, float, float]:
     """Offset, lag and loss at the minimum of (lags, offsets), between offsets by a parabola."""
     lag, k = np.unravel_index(losses.argmin(), losses.shape)
-    offset_s = float(offsets_s[k])
-    if 0 < k < len(offsets_s) - 1:
-        left, middle, right = losses[lag, k - 1 : k + 2]
+    return place_of_least(offsets_s, losses[lag]), LAGS_S[lag], float(losses[lag, k])
+
+
+def place_of_least(at: np.ndarray, losses: np.ndarray) -> float:
+    """Where (S,) losses at places of one step are least, between these by a parabola."""
+    k = int(losses.argmin())
+    if 0 < k < len(at) - 1:
+        left, middle, right = losses[k - 1 : k + 2]
         curvature = left - 2 * middle + right
         if curvature > 0:
-            offset_s += float(0.5 * (left - right) / curvature * (offsets_s[1] - offsets_s[0]))
-    return offset_s, LAGS_S[lag], float(losses[lag, k])
+            return float(at[k]) + float(0.5 * (left - right) / curvature * (at[1] - at[0]))
+    return float(at[k])
 
 
 class _Regression:

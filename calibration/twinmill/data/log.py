@@ -29,7 +29,7 @@ CommandKind = Literal["duty", "wheel_speed", "twist", "none"]
 KINDS: tuple[CommandKind, ...] = ("duty", "wheel_speed", "twist")  # by drive_t.kind
 
 FAR_S = 60.0  # beside its span: no channel has single stamps so far away
-ALONE = 100  # times the span, of commands that are sent when they change: one is held for long
+ALONE = 100  # times the span of all others, of what may be held for long: a command, a row in order
 LATE_S = 1.0  # a network hands messages over late by less
 FARTHEST_M = 1e9  # no room is as large: such a place is damage
 

@@ -120,14 +120,14 @@ def instead_over_time(done: Search, name: str) -> list[str]:
     something is left beside the one that was found, its form may be wrong. So it is beside another
     of the time that ended at its bound, and would do more with a larger size.
     """
-    if done.last.held_score < SETTINGS.level:
+    bends = bends_speed(name)
+    if done.last.held_score < SETTINGS.level or not (bends or _is_slow(name)):
         return []
     same = _same(done, name)
     slow, curves = [n for n in same if _is_slow(n)], [n for n in same if bends_speed(n)]
-    if not _is_slow(name):
-        return slow if bends_speed(name) else []
-    named = [(t, t.names[0]) for t in done.round_of(name).trials]
-    bounded = {n for t, n in named if any(e.at_bound for e in estimates_of(t, n))}
+    if bends:
+        return slow
+    bounded = {t.names[0] for t in done.round_of(name).trials if _is_bounded(t)}
     return [*curves, *(n for n in slow if n in bounded)]
 
 
@@ -355,8 +355,7 @@ def _same(
     taken = this.before.held_score**2 - this.accepted.held_score**2
 
     def takes_enough(trial: Trial) -> bool:
-        bounded = any(e.at_bound for e in estimates_of(trial, trial.names[0]))
-        share = at_bound if bounded else SETTINGS.same_fall
+        share = at_bound if _is_bounded(trial) else SETTINGS.same_fall
         return this.before.held_score**2 - trial.held_score**2 > share * taken
 
     return [
@@ -367,6 +366,11 @@ def _same(
         and takes_enough(t)
         and in_common(this.before, this.accepted, t) > least
     ]
+
+
+def _is_bounded(trial: Trial) -> bool:
+    """Whether a number of a trial of one effect ended at its bound."""
+    return any(e.at_bound for e in estimates_of(trial, trial.names[0]))
 
 
 def stand_in(done: Search, name: str) -> str | None:

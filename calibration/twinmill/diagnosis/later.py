@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.data.clock import place_of_least
 from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import CLOCK
 
@@ -63,8 +64,8 @@ def later_from(own: Opened, model: native.Model) -> tuple[Later, np.ndarray] | N
     if len(before) <= 2 * FEWEST:
         return None
     k = FEWEST + int((before + after)[inside].argmin())
-    first_s = _best(shifts_s, squares[:, k])
-    then_s = _best(shifts_s, squares[:, -1] - squares[:, k])
+    first_s = place_of_least(shifts_s, squares[:, k])
+    then_s = place_of_least(shifts_s, squares[:, -1] - squares[:, k])
     later_s = then_s - first_s
     most = LEAVES * float(squares[:, -1].min())
     if abs(later_s) < LEAST_S or (before + after)[k] > most:
@@ -76,13 +77,3 @@ def later_from(own: Opened, model: native.Model) -> tuple[Later, np.ndarray] | N
     track = data.measurement.track
     found = Later(data.measurement.log_name, track.robot_id, float(data.start_s[k + 1]), later_s)
     return found, np.where(np.arange(len(before))[:, None, None] <= k, *errors)
-
-
-def _best(shifts_s: np.ndarray, squares: np.ndarray) -> float:
-    """Where (S,) squared errors are least, between the shifts by a parabola."""
-    k = int(squares.argmin())
-    if not 0 < k < len(shifts_s) - 1:
-        return float(shifts_s[k])
-    left, middle, right = squares[k - 1 : k + 2]
-    bend = left - 2 * middle + right
-    return float(shifts_s[k] + (STEP_S * 0.5 * (left - right) / bend if bend > 0 else 0.0))

@@ -300,10 +300,9 @@ def is_far(errors: np.ndarray, floor: np.ndarray, times: float, moved: np.ndarra
         moved: (W, H, 3) predicted displacements.
     """
     floor = np.where(np.isfinite(floor) & (floor > 1e-9), floor, np.nan)
-    size = np.where(rms(moved) > 0, rms(moved), np.nan)
-    missed, ways = errors / floor, moved / size
-    ways = np.where(np.isfinite(missed), ways, np.nan)
-    missed, way = _mean_square(missed), _mean_square(ways)
+    size = rms(moved)
+    over, ways = errors / floor, moved / np.where(size > 0, size, np.nan)
+    missed, way = _mean_square(over), _mean_square(np.where(np.isfinite(over), ways, np.nan))
     return missed > times * _usual(missed, way)
 
 

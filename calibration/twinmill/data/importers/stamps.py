@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from twinmill.data.log import ALONE
 from twinmill.data.measurement_table import Table
 
 LEAST_S = 1.0  # nearer than that to the others a stamp is no damaged one
-ALONE = 100  # times as long as all the others last: so far away a row in its order is damaged ...
-BACK, BACK_SHARE = 2, 0.02  # ... and one out of order, of so few, by the longest other step
+BACK, BACK_SHARE = 2, 0.02  # rows out of order, of so few, are damaged by the longest other step
 FEWEST = 5  # rows that tell how the others lie
 REPEATED = 0.9  # share of the rows under a stamp that they share with another, of equal values
 MOST_NAMED = 3  # damaged rows in a sentence
