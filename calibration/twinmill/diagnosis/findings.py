@@ -28,6 +28,7 @@ from twinmill.model.parameters import (
     CLOCK,
     LAG,
     LAG_EFFECT,
+    NORMAL_95,
     ParameterEstimate,
     catalogue_of,
     effect_names,
@@ -425,24 +426,16 @@ def _ranked(trial: Trial, name: str, *, this: Round, first: float, group: int | 
 
 
 def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
-    """How late the final model is."""
+    """How late the final model is; what else takes the same errors may have another sum."""
     model, fit = done.last.state.model, done.last.fit
     names = [u.parameter.name for u in fit.unknowns]
-    parts = {"lag": [LAG], "delay": [], "clock": []}
-    for instance in effect_names(model):
-        if late := late_part(instance.split("#")[0]):
-            kind, key = late
-            parts[kind].append(f"{instance}.{key}")
-    value = {k: sum(model.get(n) for n in own) for k, own in parts.items()}
-    every = [n for own in parts.values() for n in own]
-    if not same_clock:
-        offsets = [m.get("clock.offset_s") for m in done.last.state.models]
-        value["clock"] += float(np.median(offsets))
-        every.append("clock.offset_s")
+    value = _late_values(done.last.state, same_clock)
+    every = [n for own in _late_parts(model).values() for n in own] + [CLOCK] * (not same_clock)
     # Of what each log or robot has of its own, the mean.
     mask = np.array([(n in every) / names.count(n) for n in names])
     free = bool(mask.any())
-    std = float(np.sqrt(mask @ fit.covariance @ mask)) if free else None
+    apart = max((_late_apart_s(done, f, same_clock) for f in found if f.group), default=0.0)
+    std = float(np.sqrt(mask @ fit.covariance @ mask + (apart / NORMAL_95) ** 2)) if free else None
     kinds = [{late[0] for n in f.group or () if (late := late_part(n))} for f in found]
     tied = any(len(k) > 1 for k in kinds)
     lag_tied = any(len(k) > 1 and "lag" in k for k in kinds)
@@ -455,3 +448,30 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
         float(value["clock"]) if parted else None,
         bool(parted),
     )
+
+
+def _late_parts(model: native.Model) -> dict[str, list[str]]:
+    """Names of what makes a model late: lag, delay, clock."""
+    parts = {"lag": [LAG], "delay": [], "clock": []}
+    for instance in effect_names(model):
+        if late := late_part(instance.split("#")[0]):
+            kind, key = late
+            parts[kind].append(f"{instance}.{key}")
+    return parts
+
+
+def _late_values(state: State, same_clock: bool) -> dict[str, float]:
+    """Seconds by lag, delay and clock; of logs whose clocks are two, the median."""
+    value = {k: sum(map(state.model.get, own)) for k, own in _late_parts(state.model).items()}
+    if not same_clock:
+        value["clock"] += float(np.median([m.get(CLOCK) for m in state.models]))
+    return value
+
+
+def _late_apart_s(done: Search, finding: Finding, same_clock: bool) -> float:
+    """How far the lateness by others of a finding's group is from the one by the finding itself."""
+    this = done.round_of(finding.effect)
+    assert this.accepted is not None
+    others = [t for t in _rivals(done, finding.effect) if set(t.names) <= set(finding.group or ())]
+    own, *rest = (sum(_late_values(t.state, same_clock).values()) for t in (this.accepted, *others))
+    return max((abs(other - own) for other in rest), default=0.0)

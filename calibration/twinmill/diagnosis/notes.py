@@ -10,7 +10,8 @@ from twinmill.diagnosis.moments import left_out
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, of_few_commands
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import drives_sideways
+from twinmill.model.parameters import HEADING, drives_sideways
+from twinmill.predict.datasets import ErrorDataset, Trajectory
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S
@@ -126,6 +127,28 @@ def lag_notes(spread_s: float) -> list[str]:
     ms = 1000 * spread_s
     return [
         f"The robots' motor lags differ by {ms:.1f} ms (one standard deviation); each has its own."
+    ]
+
+
+def heading_notes(datasets: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[str]:
+    """A sentence on headings that were not recorded: those that were found in their place.
+
+    Args:
+        datasets: of one or more robots; tables have no heading.
+        models: one for each, fitted.
+    """
+    found = [
+        np.degrees(model.get(HEADING))
+        for data, model in zip(datasets, models, strict=True)
+        if isinstance(data, Trajectory) and not data.measurement.track.has_heading
+    ]
+    if not found:
+        return []
+    least, middle, most = np.round(np.percentile(found, (0, 50, 100))).astype(int)
+    each = f"in {len(found)} tracks {least} to {most} degrees, {middle} in the middle"
+    return [
+        "No heading was recorded. What the robot held was found from how it moves against its "
+        f"commands: {each if len(found) > 1 else f'{middle} degrees'}."
     ]
 
 

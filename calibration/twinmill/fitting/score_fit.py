@@ -30,7 +30,7 @@ from twinmill.model.parameters import (
     lasts_for_a_while,
     stated_names,
 )
-from twinmill.predict.datasets import PARTS, ErrorDataset, Trajectory, errors_of
+from twinmill.predict.datasets import FEWEST_BLOCKS, PARTS, ErrorDataset, Trajectory, errors_of
 
 ROUNDS = 12
 CONVERGED = 1e-2  # change of the cost that decides nothing
@@ -42,6 +42,7 @@ LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # fa
 ANGLES_RAD = np.radians(np.arange(-180.0, 180.0, 30.0))  # of wheels, where a fit may begin
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
+CHANCE = 0.05  # at which data sets disagree more than their blocks tell
 PASSING_S = 3.0  # of blocks, where all of an effect may lie within a usual one
 
 
@@ -557,6 +558,7 @@ class ScoreFit:
         """(P, P) covariance due to what the data scatter.
 
         Of an effect that lasts for a while by shorter blocks: one whole block may hold all of it.
+        What data sets tell together is as wide as they disagree, where that is no chance.
         """
         spread, passing = self._jackknife(None), self._own_to(lasts_for_a_while)
         if passing.any():
@@ -564,7 +566,29 @@ class ScoreFit:
             short = self._jackknife(PASSING_S)[own]
             spread[passing] = spread[:, passing] = 0.0
             spread[own] = short
-        return spread
+        wider = self._disagreement(np.diag(spread))
+        return spread * np.outer(wider, wider)
+
+    def _disagreement(self, within: np.ndarray) -> np.ndarray:
+        """(P,) how many times wider than by blocks data sets scatter; 1 where that may be chance.
+
+        Blocks of one run share what differs from run to run: then runs are what counts as
+        independent (Cameron and Miller 2015, section II). By leaving out a data set at a time.
+
+        Args:
+            within: (P,) variances by leaving out blocks.
+        """
+        members = [len(u.members) for u in self.unknowns]
+        wider = np.ones(len(members))
+        if max(members, default=0) < FEWEST_BLOCKS:
+            return wider
+        whole = [np.zeros(len(d.block), int) for d in self.datasets]
+        square = sum(self._moved_without_each(i, one)[0] ** 2 for i, one in enumerate(whole))
+        for c, count in enumerate(members):
+            ratio = square[c] * (count - 1) / count / max(within[c], 1e-300)
+            if count >= FEWEST_BLOCKS and f_above(ratio, count - 1, self.blocks - 1) < CHANCE:
+                wider[c] = np.sqrt(ratio)
+        return wider
 
     def _jackknife(self, block_s: float | None) -> np.ndarray:
         """(P, P) covariance by leaving out blocks of this length; None: as the data sets have them.

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnosis of logs that another program made; the answers are in their README."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +11,10 @@ from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis import ties
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.findings import lateness
 from twinmill.diagnosis.first_sight import at_first_sight
-from twinmill.diagnosis.rounds import Round
+from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.screening import Screened
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.ties import canonical_correlation, ties_of
@@ -258,3 +261,29 @@ def test_who_calls_it_from_a_program_is_interrupted_as_by_any_other(calibrated, 
     """An exam's worker must not take half a search for a whole one."""
     with pytest.raises(KeyboardInterrupt):
         diagnose(case("e"), calibrated, progress=stopping_at("round 1: trying"))
+
+
+def late_trial(model_file, effect, **numbers):
+    """A fit of the base with one effect that makes it late."""
+    model = model_file().model.copy()
+    model.add_effect(effect)
+    for name, value in numbers.items():
+        model.set(f"{effect}.{name}", value)
+    known = SimpleNamespace(parameter=SimpleNamespace(name=f"{effect}.{next(iter(numbers))}"))
+    fit = SimpleNamespace(unknowns=[known], covariance=np.array([[0.01**2]]))
+    state = SimpleNamespace(model=model, models=[model])
+    return SimpleNamespace(names=(effect,), state=state, fit=fit, held_score=1.0)
+
+
+def test_a_lateness_is_as_unsure_as_what_stands_in_for_it_differs(model_file):
+    """0.2 s of delay known to 10 ms, or 0.3 s of lag: the interval holds both."""
+    delay = late_trial(model_file, "input_delay", delay_s=0.2)
+    lag = late_trial(model_file, "motor_lag", extra_s=0.3)
+    only = Round(delay, [], [delay, lag], accepted=delay, tied=[lag])
+    done = Search([only], delay, [], SETTINGS)
+    found = Finding("input_delay", ("input_delay", "motor_lag"), [], 1.0, "group")
+    late = lateness(done, [found], same_clock=True)
+    assert late.sum_s == pytest.approx(delay.state.model.get("base.motor_lag_s") + 0.2)
+    assert 1.96 * late.sum_std_s == pytest.approx(np.hypot(1.96 * 0.01, 0.1))
+    alone = lateness(done, [replace(found, group=None)], same_clock=True)
+    assert alone.sum_std_s == pytest.approx(0.01)

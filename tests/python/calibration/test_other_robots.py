@@ -228,6 +228,7 @@ def test_a_heading_that_a_robot_holds_and_nobody_recorded_is_found(tmp_path):
     found = diagnose(load_measurements(logs), model_file(tmp_path, OMNI))
     headings_rad = [o.model.get("frame.heading_rad") for o in found.opened]
     assert headings_rad == pytest.approx(held_rad, abs=0.01)
+    assert any("in 3 tracks -150 to 30 degrees, 5 in the middle" in note for note in found.notes)
     assert found.late.sum_s == pytest.approx(0.2, abs=0.01)
     model = found.search.last.state.model
     assert model.get("base.forward_gain") == pytest.approx(0.8, abs=0.01)
