@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import gzip
 import json
+import re
 import resource
 from pathlib import Path
 
@@ -228,6 +229,36 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(put, tmp_path, poses, 
         import_log(put("p.csv", poses), put("c.csv", commands), tmp_path / "o.lcmlog")
     assert "\n" not in str(caught.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["c.csv", "p.csv"]
+
+
+@pytest.mark.parametrize(
+    ("their_poses", "their_commands", "why"),
+    [
+        ([10.5, 11, 12], [10], "do not overlap"),  # one command, before its first pose
+        ([10, 11, 12], [20, 21], "do not overlap"),
+        ([0, 5000], [0], r"held for 5000 s"),
+        ([0, 10, 20, 30, 40], [0, 40], r"10 s apart"),
+    ],
+)
+def test_one_robot_of_no_run_is_left_out_with_the_reason(
+    put, tmp_path, their_poses, their_commands, why
+):
+    """What is judged of the others is what it would be without it, and so is what cameras saw."""
+    poses = POSES + "".join(f"{t},7,0,0,0\n" for t in their_poses)
+    told = "t_s,robot_id,vx_mps,vy_mps,omega_radps\n0,4,0,0,0\n0.1,4,0.1,0,0.5\n"
+    commands = told + "".join(f"{t},7,0.1,0,0\n" for t in their_commands)
+    seen = put("s.csv", "t_s,robot_id,seen\n0.2,4,1\n11,7,1\n")
+    logs = {}
+    for name, texts in (("alone", (POSES, told)), ("beside", (poses, commands))):
+        files = (put(f"{name}_{k}.csv", text) for k, text in enumerate(texts))
+        done = import_log(*files, tmp_path / name, detections=None if name == "alone" else seen)
+        logs[name] = read_log(tmp_path / name).robots
+    assert list(logs["alone"]) == list(logs["beside"]) == [4]
+    for series in ("pose_t_s", "pose", "command_t_s", "command"):
+        alone, beside = (getattr(logs[name][4], series) for name in logs)
+        np.testing.assert_array_equal(alone, beside)
+    (left_out,) = (w for w in done["warnings"] if w.startswith("Left out: robot 7: "))
+    assert re.search(why, left_out)
 
 
 def test_existing_and_unwritable_outputs_are_refused(put, tmp_path):

@@ -2,6 +2,7 @@
 """Makes a log from motion capture exports and command tables of others."""
 
 import hashlib
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -172,7 +173,11 @@ def import_log(
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = [_moved(series, options) for series in pose_series]
     shift = not bag or options.receive_stamps
-    _check_times(pose_series, command_series, shift)
+    left_out = _of_no_run(pose_series, command_series, shift)
+    pose_series, command_series = (
+        [own for own in series if own.robot_id not in left_out]
+        for series in (pose_series, command_series)
+    )
     if options.path_heading:
         pose_series = _headed(pose_series, command_series)
     by_robot = {series.robot_id: series for series in pose_series}
@@ -180,11 +185,12 @@ def import_log(
         in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
         for series in command_series
     ]
-    seen = _detections(detections, options, by_robot) if detections else []
+    seen = _detections(detections, options, by_robot, left_out) if detections else []
     with replacing(out, options.force, inputs=inputs) as temporary:
         provenance = _provenance(sources, options)
         write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
-        warnings = [w for series in (*pose_series, *command_series, *seen) for w in series.warnings]
+        warnings = [f"Left out: {why}" for why in left_out.values()]
+        warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
         return _summary(read_log(temporary), out, warnings)
 
 
@@ -239,12 +245,16 @@ def _read_tables(
 
 
 def _detections(
-    path: Path, options: ImportOptions, poses: dict[int, PoseSeries]
+    path: Path,
+    options: ImportOptions,
+    poses: dict[int, PoseSeries],
+    left_out: Collection[int],
 ) -> list[DetectionSeries]:
-    """Of robots whose poses are known, at the time of the poses."""
-    series = read_detections(
+    """Of robots whose poses are known, at the time of the poses; none of those left out."""
+    read = read_detections(
         path, Columns(options.rename, robot_id=options.robot_id, robots=options.robots)
     )
+    series = [own for own in read if own.robot_id not in left_out]
     for own in series:
         where = f"{path.name}: robot {own.robot_id}"
         if own.robot_id not in poses:
@@ -324,10 +334,16 @@ def _on_our_clock(utime_us: np.ndarray, options: ImportOptions) -> np.ndarray:
     return utime_us[0] + np.round(since_us).astype(np.int64) + round(options.pose_shift_s * 1e6)
 
 
-def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: bool) -> None:
-    """Raises LogError unless some robot has both, at the same time, without absurd holds.
+def _of_no_run(
+    poses: list[PoseSeries], commands: list[CommandSeries], shift: bool
+) -> dict[int, LogError]:
+    """Robots whose poses and commands are of no one run, and why, where others' are.
 
     The remedy is a shift of the poses, or the times at which a bag's messages were received.
+
+    Raises:
+        LogError: no robot has both, at the same time, without absurd holds; or two sources of
+            commands are for one robot.
     """
     ids = [series.robot_id for series in commands]
     if len(set(ids)) < len(ids):
@@ -342,28 +358,40 @@ def _check_times(poses: list[PoseSeries], commands: list[CommandSeries], shift: 
             f"robot has both; number them alike, for example with --robot {ids[0]}="
             f"{poses[0].robot_id}."
         )
+    wrong = {}
     for p, c in pairs:
-        first_s, last_s = p.utime_us[[0, -1]] / 1e6
-        start_s, end_s = c.utime_us[[0, -1]] / 1e6
-        _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
-        _check_rate(p)
-        if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
-            remedy = (
-                "shift the poses, for example so that both start together: --pose-shift-s "
-                f"{start_s - first_s:.3f}"
-                if shift
-                else "take the times of receipt of both: --receive-stamps"
-            )
-            raise LogError(
-                f"robot {p.robot_id}: poses from {first_s:.3f} to {last_s:.3f} s and commands from "
-                f"{start_s:.3f} to {end_s:.3f} s do not overlap; {remedy}."
-            )
-        hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
-        if hold_s > LONGEST_HOLD_S:
-            raise LogError(
-                f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
-                "times of commands and poses are not of one run, or mixed up."
-            )
+        try:
+            _check_times(p, c, shift)
+        except LogError as error:
+            wrong[p.robot_id] = error
+    if len(wrong) == len(pairs):
+        raise next(iter(wrong.values()))
+    return wrong
+
+
+def _check_times(p: PoseSeries, c: CommandSeries, shift: bool) -> None:
+    """Raises LogError unless poses and commands of a robot are of one time, without long holds."""
+    first_s, last_s = p.utime_us[[0, -1]] / 1e6
+    start_s, end_s = c.utime_us[[0, -1]] / 1e6
+    _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
+    _check_rate(p)
+    if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
+        remedy = (
+            "shift the poses, for example so that both start together: --pose-shift-s "
+            f"{start_s - first_s:.3f}"
+            if shift
+            else "take the times of receipt of both: --receive-stamps"
+        )
+        raise LogError(
+            f"robot {p.robot_id}: poses from {first_s:.3f} to {last_s:.3f} s and commands from "
+            f"{start_s:.3f} to {end_s:.3f} s do not overlap; {remedy}."
+        )
+    hold_s = np.diff(np.append(c.utime_us / 1e6, max(last_s, end_s))).max()
+    if hold_s > LONGEST_HOLD_S:
+        raise LogError(
+            f"robot {p.robot_id}: a command would be held for {hold_s:.0f} s; the "
+            "times of commands and poses are not of one run, or mixed up."
+        )
 
 
 def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float) -> None:
