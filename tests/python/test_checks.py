@@ -13,10 +13,11 @@ from twinmill.data.measurement import load_measurements
 from twinmill.data.track import make_track
 from twinmill_cli.diagnose import robots_recorded
 
-LEVER_M, TOP_MPS, LAG_S = 0.126, 0.36, 0.07
+LEVER_M, TOP_MPS, LAG_S, RADIUS_M = 0.126, 0.36, 0.07, 0.0325
 MECANUM = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # Muir and Neuman 1987
 MODEL = """
 [robot]
+wheel_radius_m = 0.0325
 half_wheelbase_m = 0.059
 half_track_m = 0.067
 [base]
@@ -90,6 +91,12 @@ def _one(robots, *words, fatal=True):
         assert word in f"{found[0].what}; {found[0].remedy}", found[0]
     assert found[0].fatal is fatal
     assert str(found[0]).count(";") == 1 and str(found[0]).endswith(".")
+
+
+def _by_encoders(robot):
+    """The same robot's log with the speeds that its wheels are to have, rad/s, for duties."""
+    rim_mps = TOP_MPS * np.sign(robot.command) * np.abs(robot.command) ** 0.7
+    return replace(robot, command_kind="wheel_speed", command=rim_mps / RADIUS_M)
 
 
 def _with_pose(robot, x=None, y=None, theta=None):
@@ -215,22 +222,41 @@ def test_a_clock_that_was_set_within_the_log_is_told_with_time_and_step(robot, b
     assert ("later" if by_s > 0 else "sooner") in f.evidence
 
 
-@pytest.mark.parametrize("by_s", [0.06, 0.12, -0.3, 0.4])
-def test_commands_that_act_later_from_a_moment_on_are_no_clock(robot, by_s):
+@pytest.mark.parametrize("drive", ["duty", "wheel_speed"])
+@pytest.mark.parametrize(
+    ("by_s", "from_s"), [(0.06, 30), (0.12, 30), (-0.3, 30), (0.4, 30), (0.08, 15), (-0.08, 45)]
+)
+def test_commands_that_act_later_from_a_moment_on_are_no_clock(robot, by_s, from_s, drive):
     """What the robot does at 30 s it does `by_s` later; each pose is stamped when it was taken.
 
     It is neither a drift, which would be mended by a rate, nor a clock that was set, which leaves
     the poses' beat broken.
     """
     t_s = robot.pose_t_s
-    done_s = np.where(t_s > 30, t_s - by_s, t_s)
-    late = [np.interp(done_s, t_s, column) for column in robot.pose.T]
-    (f,) = _findings([_with_pose(robot, *late)])
+    done_s = np.where(t_s > from_s, t_s - by_s, t_s)
+    late = _with_pose(robot, *(np.interp(done_s, t_s, column) for column in robot.pose.T))
+    (f,) = _findings([late if drive == "duty" else _by_encoders(late)], drive)
     assert not f.fatal and "--pose-clock-ppm" not in f.remedy
     than = "later" if by_s > 0 else "sooner"
     assert f.what.startswith(f"the robot follows its commands {than} from about ")
-    assert abs(float(f.what.split("about ")[1].split(" s")[0]) - 30) <= 3
+    assert not f.steady
+    assert abs(float(f.what.split("about ")[1].split(" s")[0]) - from_s) <= 3
     assert abs(float(f.evidence.split("come ")[1].split(" s")[0]) - abs(by_s)) <= 0.02
+
+
+@pytest.mark.parametrize("ppm", [0, 300])
+@pytest.mark.parametrize("more_s", [0.0, 0.15])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_robot_whose_lateness_follows_from_its_drive_has_no_step(seed, more_s, ppm):
+    """Its poses come later by up to `more_s`, the slower it drives; the clocks drift a little."""
+    robot = _robot(seed=seed)
+    t_s = robot.pose_t_s
+    told = np.abs(robot.command).max(axis=1)
+    slow = np.interp(t_s, robot.command_t_s, np.convolve(1 - told, np.ones(40) / 40, "same"))
+    late = _with_pose(robot, *(np.interp(t_s - more_s * slow, t_s, c) for c in robot.pose.T))
+    late = replace(late, pose_t_s=t_s * (1 + 1e-6 * ppm))
+    for kind, log in (("duty", late), ("wheel_speed", _by_encoders(late))):
+        assert _findings([log], kind) == []
 
 
 def test_a_step_too_long_to_be_told_by_a_diagnosis_parts_the_log(robot):

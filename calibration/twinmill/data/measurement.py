@@ -38,6 +38,7 @@ class Measurement:
         recorded_utime_us: earliest stamp in the log, us since the Unix epoch.
         time_base: of the log, where it was not what the stamps say; `track` has it put right.
         frames: of the robot's camera; None if the log tells of none.
+        findings: mistakes of the input with which it can be judged.
     """
 
     log_name: str
@@ -47,6 +48,7 @@ class Measurement:
     recorded_utime_us: int
     time_base: TimeBase | None = None
     frames: Frames | None = None
+    findings: tuple[InputFinding, ...] = ()
 
     @classmethod
     def live(cls, track: Track) -> "Measurement":
@@ -65,6 +67,11 @@ class Measurement:
     def same_clock(self) -> bool:
         """The log says that one clock stamped commands and poses."""
         return self.track.same_clock
+
+    @property
+    def steady(self) -> bool:
+        """One offset of the clocks may hold for the whole log, and so for another one."""
+        return self.time_base is None and all(f.steady for f in self.findings)
 
     @cached_property
     def played(self) -> native.Track:
@@ -109,6 +116,15 @@ class Measurement:
         return replace(self, track=track, warnings=[*self.warnings, why])
 
 
+def unsteady(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
+    """Sentences on robots that follow later, or sooner, from some time on, by their input."""
+    runs = [m for m in measurements if isinstance(m, Measurement)]
+    told = [(m.label, f.what) for m in runs for f in m.findings if not f.steady]
+    if len(runs) == 1:
+        return [f"{what[0].upper()}{what[1:]}." for _, what in told]
+    return [f"{label}: {what}." for label, what in told]
+
+
 class Measurements(list[Measurement | SteadyTable]):
     """What can be judged, and what is to be said of the input.
 
@@ -140,7 +156,7 @@ class Measurements(list[Measurement | SteadyTable]):
         found = [*self.findings, *findings]
         bad = {(f.log_name, f.robot_id) for f in found if f.fatal}
         left = [
-            _without_foreign(m, findings)
+            _with_findings(m, findings)
             for m in self
             if isinstance(m, SteadyTable) or (m.log_name, m.track.robot_id) not in bad
         ]
@@ -151,17 +167,18 @@ class Measurements(list[Measurement | SteadyTable]):
         return Measurements(left, [*self.excluded, *reasons], kept)
 
 
-def _without_foreign(
+def _with_findings(
     measurement: Measurement | SteadyTable, findings: Sequence[InputFinding]
 ) -> Measurement | SteadyTable:
-    """Without the whiles whose commands do not belong to its motion."""
+    """With its own findings, and without the whiles whose commands do not belong to its motion."""
     if isinstance(measurement, SteadyTable):
         return measurement
-    own = (measurement.log_name, measurement.track.robot_id)
-    for f in findings:
-        if f.cut_s and (f.log_name, f.robot_id) == own:
+    name = (measurement.log_name, measurement.track.robot_id)
+    own = tuple(f for f in findings if (f.log_name, f.robot_id) == name)
+    for f in own:
+        if f.cut_s:
             measurement = measurement.without(list(f.cut_s), f"Cut: {f.what}.")
-    return measurement
+    return replace(measurement, findings=(*measurement.findings, *own))
 
 
 class BadInputError(LogError):

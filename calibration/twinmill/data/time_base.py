@@ -19,6 +19,8 @@ SMOOTH_S = 0.15
 GRID_S, COARSE_S = 0.02, 0.1
 RATES = np.arange(0.8, 1.25, 0.01)  # seconds of capture in one of the log
 OFFSETS_S = 0.25  # step of the coarse search
+OWN_OFFSETS_S = np.arange(-0.3, 0.31, 0.02)  # of a log whose stamps are times
+PARTS = 60  # of a log, between which its offset may change
 LEVER_M = 0.1  # weighs turning (rad/s) against moving (m/s), as in clock.py
 CREEP_MPS = 0.005
 CRYSTAL = 0.002  # no clock that counts time is off by so much
@@ -51,7 +53,11 @@ class TimeBase:
 
 
 def find_time_base(robot: RobotLog) -> TimeBase | None:
-    """The time base of measured wheel speeds; None if the log's own will do, or nothing tells."""
+    """The time base of measured wheel speeds; None if the log's own will do, or nothing tells.
+
+    A robot that follows later from some time on has a time base that suits it, too: one of
+    `checks/clocks.py` then tells the step, if that explains more.
+    """
     if robot.same_clock:
         return None
     if robot.command_kind != "wheel_speed" or len(robot.command_t_s) < 100:
@@ -61,7 +67,7 @@ def find_time_base(robot: RobotLog) -> TimeBase | None:
     problem, coarse = _Regression(robot, GRID_S), _Regression(robot, COARSE_S)
     if not problem.moves:
         return None
-    own = min(problem.loss((offset_s, 1.0, 1.0)) for offset_s in np.arange(-0.3, 0.31, 0.02))
+    own = min(problem.loss((offset_s, 1.0, 1.0)) for offset_s in OWN_OFFSETS_S)
     reach_s = coarse.reach_s()
     _, offset_s, rate = min(
         (coarse.loss((offset_s, rate, rate)), offset_s, rate)
@@ -80,6 +86,8 @@ def find_time_base(robot: RobotLog) -> TimeBase | None:
     offset_s, straight, turning = (float(v) for v in found.x)
     usual = max(abs(straight - 1), abs(turning - 1)) < CRYSTAL
     if found.fun > WORTH * own or usual or 1 - found.fun < LEAST_EXPLAINED:
+        return None
+    if problem.stepped_loss(OWN_OFFSETS_S) < found.fun:
         return None
     return TimeBase(offset_s, straight, turning, 1 - float(found.fun))
 
@@ -136,6 +144,22 @@ class _Regression:
             gram, moment = weighted.T @ self.command, weighted.T @ measured
             explained = np.sum(moment * (np.linalg.pinv(gram, rcond=SINGULAR) @ moment))
         share = explained * self.step_s / GRID_S / max(np.sum(self.velocity**2), 1e-12)
+        return float(1 - share)
+
+    def stepped_loss(self, offsets_s: np.ndarray) -> float:
+        """The same of the log's own seconds with one offset up to a time, and another from it."""
+        edges = np.arange(PARTS) * len(self.grid_s) // PARTS
+        moments = np.array(
+            [
+                np.add.reduceat(self.command[:, :, None] * measured[:, None], edges)
+                for measured in (self._measured((offset_s, 1.0, 1.0)) for offset_s in offsets_s)
+            ]
+        )  # (offsets, PARTS, columns, 3)
+        before = np.cumsum(moments, axis=1)
+        after = before[:, -1:] - before
+        beside = before[:, None, :-1] + after[None, :, :-1]
+        explained = np.einsum("abpij,ik,abpkj->abp", beside, self._inverse, beside, optimize=True)
+        share = explained.max() * self.step_s / GRID_S / max(np.sum(self.velocity**2), 1e-12)
         return float(1 - share)
 
     @cached_property

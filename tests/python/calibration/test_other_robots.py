@@ -70,8 +70,11 @@ def drive_legs(count, random, straight_mps, turn_radps):
     return np.array(rows[:count], float)
 
 
-def encoder_log(straight, turning, offset_s, seed=1):
-    """Wheel speeds in rows of 10 ms that lasted longer, and poses at 100 Hz of capture's clock."""
+def encoder_log(straight, turning, offset_s, seed=1, later_s=0.0):
+    """Wheel speeds in rows of 10 ms that lasted longer, and poses at 100 Hz of capture's clock.
+
+    From 20 s on the robot does all of it `later_s` later.
+    """
     random = np.random.default_rng(seed)
     legs = drive_legs(4000, random, (-0.1, 0.07, 0.1), (-0.5, 0.5))
     radius_m, lever_m = 0.03, 0.2
@@ -82,7 +85,8 @@ def encoder_log(straight, turning, offset_s, seed=1):
     x, y = (np.cumsum(legs[:, 0] * f(heading) * lasted_s) for f in (np.cos, np.sin))
     capture_s = offset_s + np.cumsum(lasted_s)
     seen_s = np.arange(0, capture_s[-1] + 1, 0.01)
-    pose = np.column_stack([np.interp(seen_s, capture_s, v) for v in (x, y, heading)])
+    done_s = seen_s - later_s * (seen_s > 20)
+    pose = np.column_stack([np.interp(done_s, capture_s, v) for v in (x, y, heading)])
     pose += random.normal(size=pose.shape) * (1e-4, 1e-4, 1e-3)
     nothing, count = np.empty(0), len(legs)
     return RobotLog(
@@ -103,6 +107,12 @@ def test_rows_that_last_longer_are_found_on_straights_and_in_turns():
 
 def test_a_log_whose_stamps_are_right_keeps_them():
     assert find_time_base(encoder_log(1.0, 1.0, 0.1)) is None
+
+
+@pytest.mark.parametrize("later_s", [0.12, 0.2, -0.2])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_robot_that_follows_later_from_some_time_on_has_no_other_seconds(later_s, seed):
+    assert find_time_base(encoder_log(1.0, 1.0, 0.1, seed, later_s)) is None
 
 
 @pytest.fixture(scope="module")

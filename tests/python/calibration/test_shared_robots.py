@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from twinmill.data.checks import check_driven
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
@@ -99,6 +100,13 @@ def test_a_missing_lever_scores_above_two_on_every_run(run, imported, model_of):
     logs = imported("omni3_joystick", f"run-{run}")
     assert 1.8 < compare(logs, model_of(OMNI3)).score < 2.7
     assert compare(logs, model_of(WITH_MARKER)).score < 1.35
+
+
+@pytest.mark.parametrize("run", OMNI3_RUNS)
+def test_a_real_robot_on_one_clock_neither_drifts_nor_comes_later(run, imported, model_of):
+    """README: one clock stamped both. Its lever, which the model lacks, looks like either."""
+    tracks = imported("omni3_joystick", f"run-{run}").tracks
+    assert check_driven(tracks, model_of(OMNI3).model) == []
 
 
 def test_two_model_files_share_the_floor_of_a_real_log(imported, model_of):

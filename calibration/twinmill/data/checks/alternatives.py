@@ -21,6 +21,7 @@ from twinmill.data.checks.motion import (
     Motion,
 )
 from twinmill.data.checks.settings import CHECKS
+from twinmill.data.clock import place_of_least
 
 NEGLIGIBLE = 1e-4  # share of the largest channel's squared speed: no unit is told from it
 LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the wheels' lever
@@ -281,6 +282,17 @@ class Search:
         by_block = np.concatenate(lefts)
         explained = replace(own, left=float(by_block.sum()), by_block=by_block)
         return Jump(float(self.motion.t_s[self.starts[split]]), *shifts_s, explained)
+
+    def jump_std_s(self, jump: Jump) -> float:
+        """Standard error of a jump's size, of its two shifts by leaving out a stretch at a time."""
+        power, along, total = self._by_shift(jump.explained.lag_s)
+        split, variance = int(np.searchsorted(self.motion.t_s[self.starts], jump.t_s)), 0.0
+        for part in (slice(split), slice(split, None)):
+            left, _ = self._judged(power[:, part], along[:, part], total[part], part)
+            left *= total[part].sum()
+            without = [place_of_least(self.lates_s, left.sum(axis=1) - b) for b in left.T]
+            variance += (len(without) - 1) * float(np.var(without))  # Efron and Stein 1981
+        return float(np.sqrt(variance))
 
     def best(self, alternatives: list[Alternative]) -> list[Explained]:
         """Each at the lag and the shift where it explains most, of those that are likely."""

@@ -26,12 +26,7 @@ LOOK = "look at what sent the commands, its buffers and its link"
 def stepped(
     checked: CheckedTrack, search: Search, own: Explained, best: Explained
 ) -> InputFinding | None:
-    """A step of the poses against the commands, where it explains more than any other mistake.
-
-    Rows of encoder logs are often counted, not timed: of them `time_base.py` judges.
-    """
-    if checked.track.command_kind == "wheel_speed":
-        return None
+    """A step of the poses against the commands, where it explains more than any other mistake."""
     far = Search(search.motion, search.wheels, search.felt, FAR_S)
     jump = far.jump(own, CHECKS.fewest_blocks // 2)
     better = far_better(jump.explained, own) and jump.explained.left < best.left
@@ -46,9 +41,13 @@ def stepped(
 
 def _refined(search: Search, own: Explained, jump: Jump) -> Jump:
     """The same step on a finer grid of shifts."""
-    near_s = np.unique(np.round([jump.before_s + FINE_S, jump.after_s + FINE_S], 3))
-    fine = Search(search.motion, search.wheels, search.felt, near_s)
+    fine = Search(search.motion, search.wheels, search.felt, _about(jump))
     return fine.jump(own, CHECKS.fewest_blocks // 2)
+
+
+def _about(jump: Jump) -> np.ndarray:
+    """Shifts about both of a step, s."""
+    return np.unique(np.round([jump.before_s + FINE_S, jump.after_s + FINE_S], 3))
 
 
 def _of_step(checked: CheckedTrack, own: Explained, jump: Jump) -> InputFinding:
@@ -68,6 +67,7 @@ def _of_step(checked: CheckedTrack, own: Explained, jump: Jump) -> InputFinding:
         "was not set",
         f"{LOOK}, or whether the clock that stamps them was set" + (f"; {apart}" if far else ""),
         fatal=far,
+        steady=False,
     )
 
 
@@ -93,21 +93,22 @@ def _skips(t_s: np.ndarray, at_s: float, by_s: float) -> bool:
 
 
 def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
-    """Clocks that run apart, by the rate at which the commands explain the motion best.
+    """Clocks that run apart, by the rate at which the commands explain the motion best; or a step.
 
-    A step is told as one where it explains more, and neither is where both explain as much.
+    A step is told as one where it explains more, and neither is where both explain as much. Of
+    encoder logs, whose rows are often counted, `time_base.py` judges the rate.
     """
-    if checked.track.command_kind == "wheel_speed":
-        return []
     span_s = float(np.ptp(search.motion.t_s))
     if own.left > CHECKS.drift_left or span_s < CHECKS.drift_span_s:
         return []
     rate, std = _rate(search, own)
-    if not abs(rate) > max(1e-6 * CHECKS.least_ppm, CHECKS.drift_sure * std):
-        return []
     jump = _refined(search, own, search.jump(own, CHECKS.fewest_blocks // 2))
+    drifts = abs(rate) > max(1e-6 * CHECKS.least_ppm, CHECKS.drift_sure * std)
+    drifts &= checked.track.command_kind != "wheel_speed"
+    if not drifts and not _is_step(search, own, jump):
+        return []
     steps = _gained(_drifted(search, own, rate), jump.explained)
-    if steps > CHECKS.step_sure:
+    if steps > CHECKS.step_sure or not np.isfinite(rate):
         return [_of_step(checked, own, jump)]
     drift = _in_words(search, rate, std)
     if steps < -CHECKS.step_sure:
@@ -119,8 +120,24 @@ def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[I
             f"{drift}, or {1e3 * abs(jump.by_s):.0f} ms in one step: both explain the motion alike",
             f"{OWN_CLOCKS} and log again, which rules the first out; or {LOOK}",
             fatal=False,
+            steady=False,
         )
     ]
+
+
+def _is_step(search: Search, own: Explained, jump: Jump) -> bool:
+    """Whether a step of surely that size leaves far less than one shift of the whole log does.
+
+    Where a lag depends on the command a robot is late by how it is driven; a step by the mean of
+    that leaves more than half.
+    """
+    if abs(jump.by_s) < CHECKS.least_step_s:
+        return False
+    steady = min(own.left, _drifted(search, own, 0.0).left)
+    if jump.explained.left > CHECKS.step_leaves * steady:
+        return False
+    fine = Search(search.motion, search.wheels, search.felt, _about(jump))
+    return abs(jump.by_s) > CHECKS.step_seen * fine.jump_std_s(jump)
 
 
 def _of_drift(checked: CheckedTrack, drift: str, rate: float) -> InputFinding:
@@ -135,6 +152,7 @@ def _of_drift(checked: CheckedTrack, drift: str, rate: float) -> InputFinding:
         f"{OWN_CLOCKS} and log again, which rules the first out; or {LOOK}; or, if the clock that "
         f"stamps the poses counts so, {anew}",
         fatal=False,
+        steady=False,
     )
 
 

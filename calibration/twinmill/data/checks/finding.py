@@ -19,6 +19,8 @@ class InputFinding:
         fatal: the log cannot be judged as it is; false where only something about it is lost.
         log_name, robot_id: whose; -1 where it is about all robots.
         cut_s: stretches of capture's clock that are not to be judged.
+        steady: one offset of the clocks may hold for the whole log; false where what the commands
+            do comes later, or sooner, from some time on.
     """
 
     what: str
@@ -28,6 +30,7 @@ class InputFinding:
     log_name: str = ""
     robot_id: int = -1
     cut_s: tuple[tuple[float, float], ...] = ()
+    steady: bool = True
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -47,6 +50,9 @@ class CheckedTrack:
     track: Track
     body: np.ndarray
 
-    def finding(self, what: str, evidence: str, remedy: str, fatal: bool = True) -> InputFinding:
+    def finding(
+        self, what: str, evidence: str, remedy: str, *, fatal: bool = True, steady: bool = True
+    ) -> InputFinding:
         """An `InputFinding` with the name of this log and the number of this robot."""
-        return InputFinding(what, evidence, remedy, fatal, self.label, self.track.robot_id)
+        own = self.label, self.track.robot_id
+        return InputFinding(what, evidence, remedy, fatal, *own, steady=steady)

@@ -41,6 +41,9 @@ class CheckSettings(Numbers):
     drift_sure: float = number(7.0, "... and so many standard errors")
     most_ppm: float = number(1500.0, "drift beyond which steps may be behind it as well")
     step_sure: float = number(2.0, "standard errors by which a step explains more than a drift")
+    least_step_s: float = number(0.04, "step of lateness: less may be how the robot is driven ...")
+    step_leaves: float = number(0.5, "... times what is left without it, at most, ...")
+    step_seen: float = number(8.0, "... and as sure as this: its standard errors")
     skips: float = number(0.5, "of a step missing in the beat of stamps: their clock was set")
     acting_later_s: float = number(0.5, "a longer step of what the commands do no diagnosis tells")
 
