@@ -178,7 +178,7 @@ def _with_findings(
     for f in own:
         if f.cut_s:
             measurement = measurement.without(list(f.cut_s), f"Cut: {f.what}.")
-    return replace(measurement, findings=(*measurement.findings, *own))
+    return replace(measurement, findings=(*measurement.findings, *own)) if own else measurement
 
 
 class BadInputError(LogError):

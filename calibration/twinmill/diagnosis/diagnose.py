@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.data.measurement import Measurement
+from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.cameras import with_detections
@@ -382,6 +382,7 @@ def _concluded(
         usual,
         disturbed,
         random,
+        () if rest.events.later else unsteady([o.measurement for o in known]),
     )
     if weighed.verdict == "outside_catalogue":
         rest = rest.with_first(acted_on(findings, rest.least))

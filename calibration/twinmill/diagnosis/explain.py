@@ -17,7 +17,7 @@ from twinmill.diagnosis.stopped import stopped
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
 from twinmill.diagnosis.trials import REFIT, fitted, without_effect
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.fit import common_clock
+from twinmill.fitting.fit import common_clock, unsteady_clocks, without_clock
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelFile, child_of
 from twinmill.model.parameters import (
@@ -125,6 +125,8 @@ def explain(
         ModelError: the new file cannot be written.
     """
     diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
+    no_clock = without_clock(_unsteady(diagnosis, diagnosis.search.last.fit))
+    diagnosis = replace(diagnosis, notes=[*diagnosis.notes, *no_clock])
     if not diagnosis.search.stopped:
         try:
             diagnosis = _with_stale_lag(diagnosis)
@@ -178,7 +180,8 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
     """Whether a fit predicts left-out data better than the model as given.
 
     Numbers that were fitted though nothing was found must predict most blocks better: a few that
-    follow no command pull them wherever they like.
+    follow no command pull them wherever they like. Where lateness changes within a log, a lag goes
+    half of the way, and suits no other log.
     """
     if diagnosis.camera or len(diagnosis.robots) > 1:
         return True  # common numbers are not all that is new
@@ -190,7 +193,8 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
                 for old, new in zip(start.block_squares, fit.block_squares, strict=True)
             ]
         )
-        if diagnosis.verdict == "outside_catalogue" or np.median(falls) < 0:
+        pulled = diagnosis.verdict == "outside_catalogue" or _unsteady(diagnosis, fit)
+        if pulled or np.median(falls) < 0:
             return False
     return total_score(fit.held_scores) <= total_score(start.held_scores)
 
@@ -213,7 +217,7 @@ def _as_given(
         logs=logs,
         score_before=before.score,
         score_after=before.score,
-        clock=common_clock(diagnosis.search.rounds[0].before.fit),
+        clock=_clock(diagnosis, diagnosis.search.rounds[0].before.fit),
         base_told=bool(model_file.known_from_other_logs(logs.values())),
         left_over=_left_over(diagnosis, beyond),
     )
@@ -248,7 +252,7 @@ def _written(
         score_before=diagnosis.before.score,
         score_after=total_score(fit.held_scores),
         noise=noise,
-        clock=common_clock(fit),
+        clock=_clock(diagnosis, fit),
         base_told=bool(model_file.known_from_other_logs(logs.values())),
         left_over=_left_over(diagnosis, beyond),
         robots=_own_values(diagnosis, fit),
@@ -258,6 +262,17 @@ def _written(
     after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
     child.write(force)
     return Explanation(diagnosis, after, estimates, child.path, beyond)
+
+
+def _clock(diagnosis: Diagnosis, fit: ScoreFit) -> dict[str, ParameterEstimate]:
+    """Offset and rate that the logs share; empty where one of them changes within its log."""
+    return {} if _unsteady(diagnosis, fit) else common_clock(fit)
+
+
+def _unsteady(diagnosis: Diagnosis, fit: ScoreFit) -> list[str]:
+    """Labels of logs whose offset changes within them, by their input or by what was found."""
+    later = [f"{c.log} R{c.robot_id:02d}" for c in diagnosis.rest.events.later]
+    return list(dict.fromkeys([*unsteady_clocks(fit), *later]))
 
 
 def _beyond(diagnosis: Diagnosis, fit: ScoreFit, proven: Formula, runs: int) -> Taken:

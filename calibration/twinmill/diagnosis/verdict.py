@@ -26,6 +26,7 @@ class VerdictInputs:
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
         random: the motion is so much less regular than the model says that something is there.
+        unsteady: what the input tells of commands that act later from some time on, in sentences.
     """
 
     score: float
@@ -40,6 +41,7 @@ class VerdictInputs:
     known: float
     disturbed: Sequence[str] = ()
     random: bool = False
+    unsteady: Sequence[str] = ()
 
     @property
     def effects(self) -> list[Finding]:
@@ -167,13 +169,22 @@ class VerdictInputs:
 
     @property
     def sentence(self) -> str:
+        """The verdict for people, after what the input tells of when commands act."""
+        return " ".join([*self.unsteady, self._own])
+
+    @property
+    def _nothing(self) -> str:
+        return "Nothing else" if self.unsteady else "Nothing"
+
+    @property
+    def _own(self) -> str:
         """The verdict for people."""
         verdict = self.verdict
         if verdict == "model_adequate":
             maybe = " or ".join(f.effect for f in self._all_doubtful)
             there = f" {maybe} may be there, and is too small to be sure." if maybe else ""
             apart = " Stretches unlike all the rest are left out." if self.disturbed else ""
-            shown = f"Nothing is missing that these logs would show.{apart}"
+            shown = f"{self._nothing} is missing that these logs would show.{apart}"
             return f"{shown}{there}{self._as_before}"
         if verdict == "cannot_tell" and self._within_told:
             return (
@@ -187,10 +198,14 @@ class VerdictInputs:
                 f"{names} may be there, or something of another form."
             )
         if verdict == "cannot_tell" and self._unexplained:
+            misses = f"the model misses by more than the noise (score {self.last:.2f})"
+            if self.unsteady:
+                return (
+                    f"That may be why {misses}: no effect and no formula that was tried takes it."
+                )
             return (
-                f"The model misses by more than the noise (score {self.last:.2f}), and these logs "
-                "do not tell why: no effect and no formula that was tried takes it."
-                f"{self._most_likely}"
+                f"{misses[0].upper()}{misses[1:]}, and these logs do not tell why: no effect and "
+                f"no formula that was tried takes it.{self._most_likely}"
             )
         if verdict == "cannot_tell" and self.noises:
             return (
@@ -198,12 +213,12 @@ class VerdictInputs:
                 "regular than the model file says, and these logs do not tell why."
             )
         if verdict == "cannot_tell" and self.last > MISSING:
-            return f"Nothing new is missing that these logs would show.{self._as_before}"
+            return f"{self._nothing} new is missing that these logs would show.{self._as_before}"
         if verdict == "cannot_tell":
             seen = (
                 "The base model's numbers were stale, and a refit takes the error away"
                 if self._stale
-                else "Nothing is missing that these logs would show"
+                else f"{self._nothing} is missing that these logs would show"
             )
             if self._instead:
                 return (
@@ -217,8 +232,9 @@ class VerdictInputs:
                 )
             return f"{seen}, but these logs cannot show {', '.join(self.silent)}."
         if verdict == "refit_enough":
+            effect = "No other effect" if self.unsteady else "No effect"
             return (
-                "No effect is missing; the base model's numbers were stale, and a refit is enough."
+                f"{effect} is missing; the base model's numbers were stale, and a refit is enough."
                 f"{self._as_before}"
             )
         if verdict in ("effect_missing", "ambiguous"):

@@ -21,7 +21,9 @@ from twinmill.fitting.fit import (
     common_clock,
     fitted,
     noise_of,
+    unsteady_clocks,
     with_estimates,
+    without_clock,
     without_held,
 )
 from twinmill.fitting.formula_start import sized, with_time_constants
@@ -63,6 +65,7 @@ class AddResult:
         heldout_after: refitted with it.
         path: of the new model.
         robot_id: of the robot that alone has it; None if all have.
+        unsteady: labels of logs within which the offset of the clocks changes.
     """
 
     effect: str
@@ -75,6 +78,7 @@ class AddResult:
     heldout_after: HeldOut
     path: Path
     robot_id: int | None = None
+    unsteady: Sequence[str] = ()
 
     @property
     def of_camera(self) -> bool:
@@ -88,14 +92,16 @@ class AddResult:
 
     @property
     def notes(self) -> list[str]:
-        """A sentence where left-out data are worse predicted with it; none otherwise."""
+        """Sentences where left-out data are worse predicted with it, or no clock is written."""
+        told = without_clock(self.unsteady)
         without, after = self.heldout_refit.score, self.heldout_after.score
         if not after > WORSE * without:
-            return []
+            return told
         return [
+            *told,
             f"Held-out predictions are worse with it ({without:.3g} to {after:.3g}): leave it out; "
             "or, if its fit began too far off, put better values into the new model with "
-            "`twinmill set` and fit that again with `twinmill fit`."
+            "`twinmill set` and fit that again with `twinmill fit`.",
         ]
 
     @property
@@ -205,7 +211,10 @@ def add(
         force=force,
     )
     estimates += own
-    return AddResult(name, before.model_name, before, after, estimates, *held, Path(out), robot_id)
+    return AddResult(
+        *(name, before.model_name, before, after, estimates, *held, Path(out), robot_id),
+        unsteady=unsteady_clocks(found),
+    )
 
 
 def _add_to_camera(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.data.measurement import Measurement
+from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.equations import idle
 from twinmill.fitting.floor import NoiseFloor
@@ -182,6 +182,15 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
+        """What the score means, after what the input tells of when commands act."""
+        told = unsteady([r.measurement for r in self.robots])
+        own = self._own_verdict
+        if told:
+            own = own.replace("nothing is missing", "nothing else is missing")
+        return " ".join([*told, own])
+
+    @property
+    def _own_verdict(self) -> str:
         """What the score means; where some robots are missed and others not, of both."""
         missed = self.missed
         if not missed:

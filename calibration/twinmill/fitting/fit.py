@@ -164,7 +164,7 @@ def fit(
     clock = common_clock(found)
     heldout = HeldOut.of(found)
     few = of_few_commands(judged(opened))
-    notes = (few,) if few else ()
+    notes = (*([few] if few else []), *without_clock(unsteady_clocks(found)))
     write_child(  # last, so that Ctrl-C leaves no file of which nothing is told
         model_file,
         Fitted(
@@ -199,9 +199,9 @@ def with_estimates(model: native.Model, estimates: Sequence[ParameterEstimate]) 
 
 
 def common_clock(fit: ScoreFit) -> dict[str, ParameterEstimate]:
-    """Offset and rate that the logs share; empty if they differ, or were known before."""
+    """Offset and rate that the logs share; empty if they differ, change, or were known before."""
     own = [fit.own_estimates(i) for i in range(len(fit.datasets))]
-    if not own or not all(CLOCK in e for e in own):
+    if not own or not all(CLOCK in e for e in own) or unsteady_clocks(fit):
         return {}
     common = {}
     for name, least in ((CLOCK, 0.001), (CLOCK_RATE, 5.0)):
@@ -214,3 +214,19 @@ def common_clock(fit: ScoreFit) -> dict[str, ParameterEstimate]:
         std = float(1 / np.sqrt(weights.sum()))
         common[name] = ParameterEstimate(name, mean, std, own[0][name].unit, False, True)
     return common
+
+
+def unsteady_clocks(fit: ScoreFit) -> list[str]:
+    """Labels of logs whose clocks are found, and whose offset changes within them."""
+    own = [d.measurement for d in fit.datasets if CLOCK in {p.name for p in d.own}]
+    return [m.label for m in own if not m.steady]
+
+
+def without_clock(labels: Collection[str]) -> list[str]:
+    """A sentence where the offset of the clocks changes within logs, so that none is written."""
+    if not labels:
+        return []
+    return [
+        f"No clock offset is written into the model: within {', '.join(labels)} it changes, and "
+        "holds for no other log."
+    ]

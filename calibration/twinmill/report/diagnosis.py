@@ -32,8 +32,8 @@ TOO_FEW = (
 )
 
 NOTHING_GAINED = (
-    "Nothing could be gained: no numbers predict left-out data better than those of the model as "
-    "given, and the new file has these."
+    "Nothing could be gained: no numbers predict other data surely better than those of the model "
+    "as given, and the new file has these."
 )
 
 Commands = Sequence[tuple[str, str]]  # what for, and the line to type

@@ -11,7 +11,7 @@ from twinmill.diagnosis.diagnose import _after_a_look
 from twinmill.diagnosis.doubts import undetermined
 from twinmill.diagnosis.explain import _gained
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.later import later_from
+from twinmill.diagnosis.later import Later, later_from
 from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence, to_look_at
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
@@ -97,22 +97,25 @@ def test_an_effect_of_which_no_number_is_determined_is_not_sure(seen, certainty)
 
 
 @pytest.mark.parametrize(
-    ("squares", "verdict", "gained"),
+    ("squares", "verdict", "later", "gained"),
     [
-        ((0.9,) * 8, "model_adequate", True),
-        ((0.9,) * 8, "outside_catalogue", False),  # single moments alone
-        ((1.1,) * 7 + (0.0,), "model_adequate", False),  # one block pulled the numbers
-        ((1.1,) * 8, "model_adequate", False),
+        ((0.9,) * 8, "model_adequate", (), True),
+        ((0.9,) * 8, "outside_catalogue", (), False),  # single moments alone
+        ((0.9,) * 8, "cannot_tell", (Later("run", 1, 30.0, 0.2),), False),  # of two latenesses
+        ((1.1,) * 7 + (0.0,), "model_adequate", (), False),  # one block pulled the numbers
+        ((1.1,) * 8, "model_adequate", (), False),
     ],
 )
-def test_numbers_that_gain_nothing_are_not_written(squares, verdict, gained):
+def test_numbers_that_gain_nothing_are_not_written(squares, verdict, later, gained):
     def fit(own):
-        return SimpleNamespace(block_squares=[np.array(own)], held_scores=[np.sqrt(np.sum(own))])
+        held = [np.sqrt(np.sum(own))]
+        return SimpleNamespace(block_squares=[np.array(own)], held_scores=held, datasets=[])
 
+    rest = SimpleNamespace(events=SimpleNamespace(later=later))
     start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))
     search = SimpleNamespace(rounds=[start])
     diagnosis = SimpleNamespace(
-        search=search, verdict=verdict, findings=[], camera=(), robots=(None,)
+        search=search, verdict=verdict, findings=[], camera=(), robots=(None,), rest=rest
     )
     assert _gained(diagnosis, fit(squares), None) == gained
 

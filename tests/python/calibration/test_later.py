@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that act later from some time on: one robot's log, not the clock of others."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from twinmill.data.checks import InputFinding
+from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.rest import Rest
+from twinmill.diagnosis.verdict import VerdictInputs
+from twinmill.fitting.compare import compare
+from twinmill.fitting.fit import fit
+from twinmill.model.model_file import ModelFile
+
+LATER_S, DURATION_S = 0.1, 60.0
+NO_CLOCK = "No clock offset is written into the model: within run.lcmlog R03 it changes"
+
+
+@pytest.fixture(scope="module")
+def late(tanh_robot):
+    """Half-way through the log its link comes to hold each command back."""
+
+    class Late(tanh_robot):
+        def wheels_mps(self, duty):
+            half, held_back = len(duty) // 2, round(LATER_S * 480)
+            told = np.vstack([duty[:half], duty[half - held_back : -held_back]])
+            return super().wheels_mps(told)
+
+    return Late()
+
+
+@pytest.mark.parametrize("stale", [False, True])
+def test_a_log_whose_lateness_changes_gives_the_model_no_clock(
+    stale, late, tanh_robot, run_log, measure, true_model, tmp_path
+):
+    """The same robot without that link is predicted no worse by the new model than by the given."""
+    base, path = true_model, tmp_path / "explained.toml"
+    if stale:
+        stale_text = true_model.path.read_text().replace("yaw_gain = 0.8", "yaw_gain = 0.9")
+        (tmp_path / "stale.toml").write_text(stale_text)
+        base = ModelFile.load(str(tmp_path / "stale.toml"))
+    runs = load_measurements([run_log(late, 6, DURATION_S)], base.model)
+    found = explain(runs, base, out=path, command="test")
+    assert found.gained == stale
+    assert "[clock]" not in path.read_text()
+    assert any(note.startswith(NO_CLOCK) for note in found.diagnosis.notes)
+    assert "later" in found.sentence and "Nothing is missing" not in found.sentence
+    other = [measure(tanh_robot(), 7, 40.0)]
+    assert compare(other, ModelFile.load(str(path))).score <= compare(other, base).score
+
+
+def test_a_fit_to_such_a_log_says_that_it_writes_no_clock(
+    late, run_log, model_file, tmp_path, true_model
+):
+    runs = load_measurements([run_log(late, 6, DURATION_S)], true_model.model)
+    done = fit(runs, model_file(), tmp_path / "m.toml", "")
+    assert done.clock is None and "[clock]" not in (tmp_path / "m.toml").read_text()
+    assert any(note.startswith(NO_CLOCK) for note in done.notes)
+
+
+@pytest.mark.parametrize(
+    ("last", "verdict", "words"),
+    [
+        (1.0, "model_adequate", "Nothing else is missing"),
+        (1.29, "cannot_tell", "That may be why the model misses"),
+    ],
+)
+def test_a_verdict_does_not_deny_what_the_input_tells(last, verdict, words):
+    told = "The robot follows its commands later from about 33 s on."
+    rest = Rest(1.0, True, [])
+    weighed = VerdictInputs(last, last, last, last, [], rest, [], [], [], 1.0, unsteady=[told])
+    assert weighed.verdict == verdict
+    assert weighed.sentence.startswith(f"{told} {words}")
+
+
+def test_a_comparison_does_not_deny_what_the_input_tells(measure, tanh_robot, true_model):
+    run = measure(tanh_robot(), 7, 40.0)
+    what = "the robot follows its commands later from about 33 s on"
+    (silent, told) = (
+        compare([replace(run, findings=found)], true_model).verdict
+        for found in ((), (InputFinding(what, "", "", False, steady=False),))
+    )
+    assert "nothing is missing" in silent
+    assert "follows its commands later" in told and "nothing is missing" not in told
