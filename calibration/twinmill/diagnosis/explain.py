@@ -31,6 +31,7 @@ from twinmill.model.parameters import (
     is_local,
     late_part,
     newest_instance,
+    phases,
     with_role,
 )
 from twinmill.predict.datasets import total_score
@@ -70,11 +71,12 @@ class Explanation:
         if not (self.formula and self.formula.kept):
             return ""
         own = self.formula
-        return (
+        now = (
             f"The model now has the formula {own.added.equals}, which takes "
             f"{100 * own.share:.0f} % of what was left (held-out score {own.before:.2f} without "
             f"it, {own.after:.2f} with it)."
         )
+        return f"{now} {own.note}".rstrip()
 
     @property
     def steps(self) -> list[tuple[str | None, float]]:
@@ -240,7 +242,7 @@ def _written(
     model = _with_found(diagnosis, model_file, beyond)
     kept = beyond if beyond and beyond.kept else None
     shared = kept.estimates if kept else fit.shared_estimates()
-    estimates = [*shared, *diagnosis.detection_estimates]
+    estimates = [*shared, *fit.first_phases, *diagnosis.detection_estimates]
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
@@ -259,7 +261,9 @@ def _written(
         covariance=kept.covariance if kept else fit.shared_covariance(),
     )
     child = child_of(model_file, told, Path(out), command)
-    after = comparison(child, [o.with_model(child.model) for o in diagnosis.opened])
+    own = phases(child.model)
+    opened = [(o.aligned if own else o.with_model)(child.model) for o in diagnosis.opened]
+    after = comparison(child, opened)
     child.write(force)
     return Explanation(diagnosis, after, estimates, child.path, beyond)
 

@@ -13,7 +13,7 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import cycle
-from types import CodeType
+from types import CodeType, MappingProxyType
 
 import numpy as np
 
@@ -61,6 +61,8 @@ NAMED = ("vx", "vy", "omega", "x", "y", "theta", "course", "t")  # as formulas a
 ANGLES = ("theta", "course")
 MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
 C, D, L = "{c}", "{d}", "{l}"  # the constant, the damping and the lever in texts
+A = "{a}"  # the angle of a period at time 0
+PLACES = {"constant": C, "damping": D, "phase": A}
 SWINGS_HZ = (0.55, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.3)
 DAMPINGS = (0.07, 0.3)
 DAMPED = 2.2  # times which a better damping may differ
@@ -123,6 +125,7 @@ class Form:
         command_unit: of the command u, where a shape names it.
         damping: written {d} in a state that swings, 1 where it no longer would.
         figures: fitted constants that the shapes have as figures.
+        phase: rad, written {a} in a shape that comes back by the clock; None of all others.
     """
 
     adds_to: str
@@ -137,11 +140,12 @@ class Form:
     command_unit: str = ""
     damping: float = 0.0
     figures: int = 0
+    phase: float | None = None
 
     @property
     def texts(self) -> tuple[str, ...]:
         """The shapes with their constant."""
-        return tuple(self._with_constant(s) for s in self.shapes)
+        return tuple(self.filled(s) for s in self.shapes)
 
     @property
     def of_body(self) -> bool:
@@ -161,13 +165,13 @@ class Form:
     @property
     def recurs(self) -> bool:
         """It is there for a part of each period, by the clock."""
-        return self.group == TIME and bool(self.figures)
+        return self.phase is not None
 
     @property
     def rates(self) -> tuple[str, ...]:
         """Of its states with its constants; none if it has no state."""
         texts = (self.state.text, self.state.second_text) if self.state else ()
-        return tuple(self._with_constant(t) for t in texts if t)
+        return tuple(self.filled(t) for t in texts if t)
 
     @property
     def is_late(self) -> bool:
@@ -189,7 +193,12 @@ class Form:
     @property
     def numbers(self) -> int:
         """Fitted ones, constants among them."""
-        return len(self.shapes) + len(self.searched) + self.figures
+        return self.places + len(self.searched) + self.figures
+
+    @property
+    def places(self) -> int:
+        """Numbers of the effect `equation` that it takes: of its shapes, and its phase."""
+        return len(self.shapes) + self.recurs
 
     @property
     def strengths(self) -> np.ndarray:
@@ -207,8 +216,14 @@ class Form:
         tried = np.clip(self.damping * DAMPED ** np.array(parts), LEAST_DAMPED, MOST_DAMPED)
         return [replace(self, damping=float(f"{d:.3g}"), sizes=()) for d in np.unique(tried)]
 
-    def _with_constant(self, text: str) -> str:
-        return _filled(text, f"{self.constant:.4g}", f"{self.damping:.3g}")
+    def filled(self, text: str, names: Mapping[str, str] = MappingProxyType({})) -> str:
+        """A text of it with its constants; those that have a name there have that."""
+        figures = {"constant": f"{self.constant:.4g}", "damping": f"{self.damping:.3g}"}
+        if self.phase is not None:
+            figures["phase"] = f"{self.phase:.3f}"
+        for key, value in (figures | {**names}).items():
+            text = text.replace(PLACES[key], value)
+        return text.replace(L, f"{LEVER_M:g}")
 
 
 GAINS = tuple(Form(to, (axis,), "") for to, axis in zip(CHANNELS, SPEEDS, strict=True))
@@ -298,7 +313,7 @@ class Motion:
         """(N,) the state's mean over each step."""
         step_s = self.own.floor.response.step_s
         goal, rate = (
-            np.broadcast_to(_value(form._with_constant(t or "0"), names), step_s.shape)
+            np.broadcast_to(_value(form.filled(t or "0"), names), step_s.shape)
             for t in (form.state.goal, form.state.rate)
         )
         if not form.state.goal:
@@ -585,28 +600,34 @@ def _swings(to: str, shapes: tuple[str, ...], state: State) -> list[Form]:
 def on_and_off(rate_radps: float, angle_rad: float, part: float) -> Form:
     """There while a wave of the time is high, for a part of each period."""
     angle_rad = (angle_rad + np.pi) % (2 * np.pi) - np.pi
-    inside = f"sin({rate_radps:.4g}*t + {angle_rad:.3f})"
-    return Form("motion", (f"({inside} > {np.cos(np.pi * part):.3g})",), TIME, figures=3)
+    inside = f"sin({rate_radps:.4g}*t + {A})"
+    shape = f"({inside} > {np.cos(np.pi * part):.3g})"
+    return Form("motion", (shape,), TIME, figures=2, phase=angle_rad)
 
 
 def joined(forms: Sequence[Form]) -> dict[str, str]:
-    """Texts of the effect `equation` that has these terms, all of one place, one with states."""
-    texts = [text for form in forms for text in form.texts]
-    rates = next((f.rates for f in forms if f.state), ())
-    return _equation(forms[0].adds_to, texts, rates)
+    """Texts of the effect `equation` that has these terms, all of one place, one with states.
+
+    A phase is a number of it, behind all shapes': each log has its own.
+    """
+    return _with_names(forms, [()] * len(forms))
 
 
 def tunable(forms: Sequence[Form]) -> dict[str, str]:
-    """The same with all constants as numbers, too: of each form in turn, behind all shapes'."""
+    """The same with all constants as numbers, too: of each form in turn."""
+    return _with_names(forms, [form.searched for form in forms])
+
+
+def _with_names(forms: Sequence[Form], constants: Sequence[tuple[str, ...]]) -> dict[str, str]:
     number = sum(len(form.shapes) for form in forms)
     texts, rates = [], []
-    for form in forms:
-        own = {name: f"p{number + k}" for k, name in enumerate(form.searched)}
+    for form, searched in zip(forms, constants, strict=True):
+        names = (*searched, *("phase",) * form.recurs)
+        own = {name: f"p{number + k}" for k, name in enumerate(names)}
         number += len(own)
-        constants = own.get("constant", ""), own.get("damping", "")
-        texts += [_filled(text, *constants) for text in form.shapes]
+        texts += [form.filled(text, own) for text in form.shapes]
         state = (form.state.text, form.state.second_text) if form.state else ()
-        rates += [_filled(text, *constants) for text in state if text]
+        rates += [form.filled(text, own) for text in state if text]
     return _equation(forms[0].adds_to, texts, rates)
 
 
@@ -614,13 +635,6 @@ def _equation(adds_to: str, texts: Sequence[str], rates: Sequence[str]) -> dict[
     numbers = [f"p{k}" for k in range(len(texts))]
     found = {"adds_to": adds_to, "formula": _sum(adds_to, texts, numbers)}
     return found | dict(zip(("state_rate", "second_rate"), rates, strict=False))
-
-
-def _filled(text: str, constant: str, damping: str) -> str:
-    """A text of a form with its constants."""
-    for name, number in ((C, constant), (D, damping), (L, f"{LEVER_M:g}")):
-        text = text.replace(name, number)
-    return text
 
 
 def summed(forms: Sequence[Form], numbers: Sequence[str]) -> str:

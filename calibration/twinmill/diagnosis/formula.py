@@ -64,6 +64,8 @@ class Formula:
         holds: names of the motion in it, with the least and largest value seen.
         curve: what the report draws; None of single wheels and of a push in the room.
         instead_of: findings in doubt, without which it was found.
+        goes_on: its first term comes again by the clock: the first part of the run, taken by
+            itself, predicts the rest.
     """
 
     forms: tuple[Form, ...]
@@ -75,6 +77,7 @@ class Formula:
     holds: dict[str, tuple[float, float]]
     curve: Curve | None
     instead_of: tuple[str, ...] = ()
+    goes_on: bool = False
 
     @property
     def equation(self) -> dict[str, str]:
@@ -92,9 +95,17 @@ class Formula:
         return any(f.names_time for f in self.forms)
 
     @property
+    def passing(self) -> bool:
+        """It has moments of the run that do not come again by the clock."""
+        return any(self._passes(f) for f in self.forms)
+
+    def _passes(self, form: Form) -> bool:
+        return form.names_time and not (self.goes_on and form.recurs)
+
+    @property
     def lasting(self) -> "Formula":
-        """Without the terms that have moments of the run, if there are others."""
-        kept = [form for form in self.forms if not form.names_time]
+        """Without the terms that have moments of the run alone, if there are others."""
+        kept = [form for form in self.forms if not self._passes(form)]
         if len(kept) in (0, len(self.forms)):
             return self
         shapes = [n for n in self.numbers if n.name]
@@ -108,7 +119,8 @@ class Formula:
                 others += constants[:last]
             shapes, constants = shapes[first:], constants[last:]
         own = [replace(n, name=f"p{k}") for k, n in enumerate(own)]
-        holds = {name: span for name, span in self.holds.items() if name != "t"}
+        timed = any(form.names_time for form in kept)
+        holds = {name: span for name, span in self.holds.items() if timed or name != "t"}
         return replace(self, forms=tuple(kept), numbers=(*own, *others), holds=holds)
 
     @property
@@ -146,6 +158,7 @@ class Formula:
             "chance": self.chance,
             "tried": self.tried,
             "again": self.again,
+            "goes_on": self.goes_on,
             "like": self.like,
             "instead_of": list(self.instead_of),
             "holds": {name: list(span) for name, span in self.holds.items()},

@@ -120,7 +120,10 @@ def _borne_out(
         again = stability(rows, _with(pool, proof) if first.recurs else pool, first)
         if again >= SETTINGS.formula_again:
             tried = len(pool.forms) + (clock.tried if first.recurs else 0)
-            return told(rows, _completed(rows, pool, proof, clock), tried, again)
+            whole = _completed(rows, pool, proof, clock)
+            formula = told(rows, whole, tried, again)
+            goes_on = first.recurs and clock.goes_on(whole.chosen.raw[:, :1])
+            return replace(formula, goes_on=goes_on)
     return None
 
 
@@ -323,9 +326,9 @@ def _worth(more: Chosen, less: Chosen, tried: int) -> bool:
 
 def _fits_beside(form: Form, found: Chosen) -> bool:
     states = bool(form.state) + sum(bool(f.state) for f in found.forms)
-    shapes = len(form.shapes) + sum(len(f.shapes) for f in found.forms)
+    places = form.places + sum(f.places for f in found.forms)
     same = form.adds_to == found.forms[0].adds_to
-    return same and states < 2 and shapes <= MOST_NUMBERS and form not in found.forms
+    return same and states < 2 and places <= MOST_NUMBERS and form not in found.forms
 
 
 def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen | None:

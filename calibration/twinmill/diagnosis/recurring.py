@@ -13,6 +13,7 @@ import numpy as np
 
 from twinmill.diagnosis.evidence import Evidence, Pool
 from twinmill.diagnosis.forms import SHORTEST_S, Form, on_and_off, sized
+from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME
 
 BINS = 96
@@ -22,6 +23,7 @@ PHASES = 24
 PARTS = (0.2, 0.3, 0.4, 0.5)  # of a period; of a longer one the rest is that part
 STEPS = 4  # a finer grid has so many to each side of the best, of the last one's step
 FINER = (1.0, 0.2)
+FIRST = 0.6  # share of a log that must predict the rest
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,28 @@ class Recurring:
             best = most(near, self._in_bins(near))
         forms = sized([on_and_off(*best)], self.rows.motions)
         return Pool(forms, self.rows.raw(forms))
+
+    def goes_on(self, raw: np.ndarray) -> bool:
+        """Whether what the first part of a log tells by itself predicts the rest.
+
+        Moments of chance do not come again by a clock, and waves that were fitted to them do not
+        go on. Of several logs it is not asked: they tell it by themselves.
+
+        Args:
+            raw: (R, 1) raw column of the form that all of it told.
+        """
+        if len(self.rows.logs) > 1:
+            return False
+        count = len(self.rows.parts)
+        early = np.arange(count) < FIRST * count
+        columns = self.rows.seen(np.hstack([self.best(early).raw, raw]))
+        before = early[self.rows.stretch]
+        left, later = self.rows.left[~before], columns[~before]
+        known = columns[before, 0]
+        size = known @ self.rows.left[before] / max(known @ known, 1e-9)
+        gain = size * (2 * later[:, 0] @ left - size * later[:, 0] @ later[:, 0])
+        most = (later[:, 1] @ left) ** 2 / max(later[:, 1] @ later[:, 1], 1e-9)
+        return bool(gain > max(SETTINGS.likely, SETTINGS.formula_goes_on * most))
 
     def _near(self, best: np.ndarray, part: float) -> np.ndarray:
         """(K, 3) candidates around one."""

@@ -116,6 +116,9 @@ class Settings(Numbers):
     formula_again: float = number(0.5, "share of resamplings in which its dependence must win")
     formula_alike: float = number(0.05, "share of the gain that a simpler formula may lack")
     formula_beside: float = number(0.1, "share of the gain that one more term must add")
+    formula_goes_on: float = number(
+        0.5, "share of its gain on the last 40 % of a log that the first 60 % must predict"
+    )
     no_noise: float = number(
         1.5, "errors of so many times the noise are none, however few there are"
     )

@@ -26,6 +26,7 @@ from twinmill.model.parameters import (
     effect_parameters,
     is_local,
     newest_instance,
+    phases,
 )
 from twinmill.predict.datasets import ErrorDataset, Trajectory, total_score
 
@@ -75,7 +76,7 @@ class Taken:
     @property
     def why_not(self) -> str:
         """What keeps it out of the model; empty if nothing does."""
-        if self.formula.names_time and self.runs < SEVERAL:
+        if self.formula.passing and self.runs < SEVERAL:
             return "it names the time of one run, and nothing shows that another run shares it"
         if self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"
@@ -87,6 +88,16 @@ class Taken:
         return ""
 
     @property
+    def note(self) -> str:
+        """What of a formula in the model no other log shares, or empty."""
+        if not (self.kept and any(form.recurs for form in self.formula.forms)):
+            return ""
+        return (
+            "It comes back by the clock: the model keeps its period, and at which moment of it a "
+            "log begins is found anew in each log."
+        )
+
+    @property
     def added(self) -> Formula:
         """As the model has it."""
         return replace(self.formula, numbers=self.numbers)
@@ -96,6 +107,7 @@ class Taken:
         return {
             "kept": self.kept,
             "why_not": self.why_not,
+            "note": self.note,
             "effect": EFFECT,
             "equation": self.formula.equation,
             "text": self.added.equals,
@@ -120,7 +132,7 @@ def taken(
 ) -> Taken:
     """The fit with a formula added, and without the findings that it stands for.
 
-    Of terms with moments of the run the model of other runs has none, where others are left.
+    Of terms with moments of one run alone the model of other runs has none, where others are left.
 
     Args:
         fit: of all that was found; stays as it is.
@@ -223,23 +235,41 @@ def _refitted(
     drive them far off.
     """
     if any(f.searched for f in formula.forms) and _count(formula.forms) <= MOST_NUMBERS:
-        models, free = _with_equation(fit, formula.instead_of, tunable(formula.forms))
+        models, free = _with_equation(fit, formula, tunable(formula.forms))
+        datasets = _with_own_start(datasets, models)
         fresh = _begun(models[0], formula)
         constants = _constants(models[0], formula.forms)
         found = ScoreFit(datasets, models, [*free, *fresh, *constants], fit.by_channel).fit()
         estimates = {e.name: e for e in found.shared_estimates()}
         own = [estimates[p.name] for p in constants]
         if all(p.min < e.value < p.max for p, e in zip(constants, own, strict=True)):
-            return found, _as_fitted(formula, [estimates[p.name] for p in fresh], own)
-    models, free = _with_equation(fit, formula.instead_of, formula.equation)
+            told = _as_fitted(formula, [estimates[p.name] for p in fresh], own)
+            return found, _with_phases(told, found.models[0])
+    models, free = _with_equation(fit, formula, formula.equation)
+    datasets = _with_own_start(datasets, models)
     fresh = _begun(models[0], formula)
     found = ScoreFit(datasets, models, [*free, *fresh], fit.by_channel).fit()
     estimates = {e.name: e for e in found.shared_estimates()}
-    return found, _as_fitted(formula, [estimates[p.name] for p in fresh], None)
+    told = _as_fitted(formula, [estimates[p.name] for p in fresh], None)
+    return found, _with_phases(told, found.models[0])
+
+
+def _with_phases(formula: Formula, model: native.Model) -> Formula:
+    """With the phases of a model that has it, as those of its forms."""
+    values = iter([model.get(name) for name in _phases_of(model)])
+    forms = [replace(f, phase=next(values)) if f.recurs else f for f in formula.forms]
+    return replace(formula, forms=tuple(forms))
 
 
 def _count(forms: Sequence[Form]) -> int:
-    return sum(len(form.shapes) + len(form.searched) for form in forms)
+    return sum(form.places + len(form.searched) for form in forms)
+
+
+def _with_own_start(
+    datasets: Sequence[ErrorDataset], models: Sequence[native.Model]
+) -> list[ErrorDataset]:
+    pairs = zip(datasets, models, strict=True)
+    return [d.with_own_start(m) if isinstance(d, Trajectory) else d for d, m in pairs]
 
 
 def _as_fitted(
@@ -291,14 +321,26 @@ def _around(number: Number, value: float, std: float) -> Number:
 
 
 def _with_equation(
-    fit: ScoreFit, gone: Sequence[str], texts: dict[str, str]
+    fit: ScoreFit, formula: Formula, texts: dict[str, str]
 ) -> tuple[list[native.Model], list[Parameter]]:
-    """Models of a fit without some effects and with an equation, and what else was free."""
-    models = [_without(m, gone) for m in fit.models]
+    """Models of a fit with a formula, without what it stands for, and what else was free."""
+    models = [_without(m, formula.instead_of) for m in fit.models]
     free = _still_free(fit, models[0])
     for model in models:
         model.add_effect(EFFECT, texts)
+        for name, value in zip(_phases_of(model), _phases_in(formula), strict=True):
+            model.set(name, value)
     return models, free
+
+
+def _phases_of(model: native.Model) -> list[str]:
+    """Names of those of the newest formula."""
+    instance = newest_instance(model, EFFECT)
+    return [p.name for p in phases(model) if p.name.split(".")[0] == instance]
+
+
+def _phases_in(formula: Formula) -> list[float]:
+    return [form.phase for form in formula.forms if form.phase is not None]
 
 
 def _still_free(fit: ScoreFit, less: native.Model) -> list[Parameter]:

@@ -157,7 +157,7 @@ def with_effects(
                 model.set(p.name, p.value)
         free += fresh
     pairs = zip(state.datasets, models, strict=True)
-    datasets = [d.with_starting_angles(m) if isinstance(d, Trajectory) else d for d, m in pairs]
+    datasets = [d.with_own_start(m) if isinstance(d, Trajectory) else d for d, m in pairs]
     return replace(state, datasets=datasets, models=models, free=tuple(free))
 
 

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-from twinmill.diagnosis.forms import C, D, Form, L
+from twinmill.diagnosis.forms import A, C, D, Form, L
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def units_of(form: Form) -> list[str]:
 
 
 def _unit(text: str, names: dict[str, Unit]) -> Unit:
-    plain = text.replace(C, "c").replace(D, "1.0").replace(L, "l")
+    plain = text.replace(C, "c").replace(D, "1.0").replace(A, "1.0").replace(L, "l")
     if "?" in plain:  # of one wheel, and 0 of the others
         plain = plain.partition("?")[2].rpartition(":")[0].strip()
     return eval(plain, {"__builtins__": {}, **FUNCTIONS}, names) * PLAIN

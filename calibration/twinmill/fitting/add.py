@@ -190,7 +190,7 @@ def add(
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
     after = replace(after, about=robot_id)
-    estimates = found.shared_estimates()
+    estimates = [*found.shared_estimates(), *found.first_phases]
     own = _own_estimates(found, fresh) if robot_id is not None else []
     write_child(
         model_file,

@@ -10,11 +10,17 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
-from twinmill.fitting.equations import idle
+from twinmill.fitting.equations import idle, unseen
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK, HEADING, starting_angles, unevenness
+from twinmill.model.parameters import (
+    CLOCK,
+    HEADING,
+    ParameterEstimate,
+    starting_angles,
+    unevenness,
+)
 from twinmill.predict.datasets import total_score
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections
@@ -43,6 +49,7 @@ class RobotComparison:
         floor: of the log, and where it comes from.
         score: RMS over horizons and channels of error over floor; NaN without a floor.
         where: regimes.
+        phases: moments of the periods of the model's formulas at which the log begins.
     """
 
     modelled: ModelledLog
@@ -51,6 +58,7 @@ class RobotComparison:
     floor: NoiseFloor
     score: float
     where: list[Regime]
+    phases: tuple[ParameterEstimate, ...] = ()
 
     @property
     def measurement(self) -> Measurement:
@@ -123,6 +131,7 @@ class RobotComparison:
             "time_offset_s": self.time_offset_s,
             "held_heading_rad": self.held_heading_rad,
             "wheel_angles_rad": self.wheel_angles_rad,
+            "phases": [p.to_json() for p in self.phases],
             "time_base": base.to_json() if (base := self.measurement.time_base) else None,
         }
 
@@ -248,7 +257,9 @@ def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     windows = Windows.of(own.measurement.track)
     errors = np.where(own.floor.keep[:, None, None], windows.errors(modelled), np.nan)
     regimes = where_it_fails(modelled, windows, errors, own.floor.rms) if own.data else []
-    return RobotComparison(modelled, windows, errors, own.floor, own.score, regimes)
+    return RobotComparison(
+        modelled, windows, errors, own.floor, own.score, regimes, phases=own.phases
+    )
 
 
 def comparison(
@@ -259,6 +270,7 @@ def comparison(
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
     known = [o for o in opened if o.data is not None]
     warnings += idle([o.data for o in known], [o.model for o in known])
+    warnings += [said for o in known for said in unseen(o.data, o.model)]
     name = fitted_name or model_file.path.name
     return Comparison(name, [compare_robot(o) for o in opened], warnings)
 

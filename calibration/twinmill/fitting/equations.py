@@ -7,13 +7,15 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelError
-from twinmill.model.parameters import effect_names, words
+from twinmill.model.parameters import effect_names, phases, words
 from twinmill.predict.datasets import ErrorDataset, Trajectory, errors_of
 
 EQUATION = "equation"
 GROWN = 1e9  # errors, in what is usual of them: nothing that drives is so far off
 FAR = 1e4  # m or rad, within the longest prediction: nothing drives or turns so fast
 NOTHING = 1e-9  # of errors: what is rounded off
+# Of n ln S^2: of 24 moments of a period, of which the best is taken, by chance one in 100 has more.
+SHOWN = 2 * np.log(24) + 6.6
 
 
 def check_states(data: ErrorDataset, model: native.Model) -> None:
@@ -64,9 +66,31 @@ def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[s
     return found
 
 
-def _acts(data: ErrorDataset, model: native.Model, name: str) -> bool:
+def unseen(data: ErrorDataset, model: native.Model) -> list[str]:
+    """A sentence for each formula that recurs, and that a log does not show.
+
+    At the best moment of its period it must bring more than the best of so many would by chance.
+    """
+    found = []
+    own = [p.name.split(".")[0] for p in phases(model)] if isinstance(data, Trajectory) else []
+    for name in dict.fromkeys(own):
+        without, with_it = (np.sum(errors_of(data, m) ** 2) for m in (_without(model, name), model))
+        if data.n_eff * np.log(without / with_it) < SHOWN:
+            found.append(
+                f"{data.label}: does not show {name}, which recurs in time: at no moment of its "
+                "period does it predict this log better than without; the robot may lack it now."
+            )
+    return found
+
+
+def _without(model: native.Model, name: str) -> native.Model:
     less = model.copy()
     less.remove_effect(effect_names(model).index(name))
+    return less
+
+
+def _acts(data: ErrorDataset, model: native.Model, name: str) -> bool:
+    less = _without(model, name)
     return not np.allclose(errors_of(data, model), errors_of(data, less), rtol=0, atol=NOTHING)
 
 

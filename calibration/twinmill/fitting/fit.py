@@ -160,7 +160,7 @@ def fit(
     moved, found = fitted(opened, free)
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
-    estimates = found.shared_estimates()
+    estimates = [*found.shared_estimates(), *found.first_phases]
     clock = common_clock(found)
     heldout = HeldOut.of(found)
     few = of_few_commands(judged(opened))

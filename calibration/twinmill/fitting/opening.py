@@ -15,16 +15,16 @@ from twinmill.fitting.floor import NoiseFloor, coarse_offset_s, no_floor, noise_
 from twinmill.fitting.score_fit import ROUNDS, ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
-    ALIGNMENT,
     CLOCK,
     CLOCK_RATE,
     GAINS,
     HEADING,
     LAG,
     Parameter,
-    acting_by_wheel_angle,
+    ParameterEstimate,
     base_parameters,
-    starting_angles,
+    of_each_log,
+    take_alignment,
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.modelled_log import ModelledLog
@@ -49,6 +49,7 @@ class Opened:
         model: of its robot, on its clock.
         floor: of a log; None of a table.
         same_clock: commands and poses are stamped by one clock.
+        phases: of the model's formulas, as they were found for this log.
     """
 
     measurement: Measurement | SteadyTable
@@ -56,6 +57,7 @@ class Opened:
     model: native.Model
     floor: NoiseFloor | None
     same_clock: bool
+    phases: tuple[ParameterEstimate, ...] = ()
 
     @property
     def score(self) -> float:
@@ -81,18 +83,19 @@ class Opened:
     def aligned(
         self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS
     ) -> "Opened":
-        """The same with another model, on the clock, heading and angles of the wheels that suit it.
+        """The same with another model, on the clock, heading, angles and phases that suit it.
 
         They are those with which it predicts best. One clock for commands and poses is kept, a
         heading that was recorded, and all of a measurement without a floor. The wheels' angles at
-        the begin are found if the model acts by them: no other log tells them.
+        the begin are found if the model acts by them, and the phases of its formulas: no other log
+        tells them.
 
         Args:
             model: of all robots.
             offset_s: where the search begins; by default where the floor was found.
             rounds: of the search.
         """
-        free = not self.same_clock or self.heading_held or acting_by_wheel_angle(model)
+        free = not self.same_clock or self.heading_held or of_each_log(model)
         if self.data is None or self.floor is None or not free:
             return self.with_model(model)
         own = self.with_model(model).model
@@ -103,11 +106,12 @@ class Opened:
         if self.heading_held:
             own.set(HEADING, self.floor.heading_rad)
             unknown += base_parameters(own, [HEADING])
-        unknown += starting_angles(own)
+        unknown += of_each_log(own)
         data = replace(self.data, own=tuple(unknown))
         fit = ScoreFit([data], [own], [])
-        fit.begin_at_angles()
-        return replace(self, data=data, model=fit.fit(rounds).models[0])
+        fit.begin_at_best_start()
+        fit.fit(rounds)
+        return replace(self, data=data, model=fit.models[0], phases=tuple(fit.first_phases))
 
     def realigned(self) -> "Opened":
         """The same on the clock and heading that would be found for its model anew."""
@@ -122,9 +126,8 @@ class Opened:
         if self.floor is None:
             return replace(self, model=model.for_robot(self.measurement.robot_id))
         own = model.for_robot(self.measurement.track.robot_id)
-        for name in ALIGNMENT:
-            own.set(name, self.model.get(name))
-        data = self.data and self.data.with_starting_angles(own)
+        take_alignment(own, self.model)
+        data = self.data and self.data.with_own_start(own)
         return replace(self, model=own, data=data)
 
 

@@ -22,12 +22,14 @@ from twinmill.model.parameters import (
     ALIGNMENT,
     NO_SIZE,
     NORMAL_95,
+    PHASE,
     WHEEL_ANGLES,
     Parameter,
     ParameterEstimate,
     acting_by_wheel_angle,
     is_local,
     lasts_for_a_while,
+    phases,
     stated_names,
 )
 from twinmill.predict.datasets import FEWEST_BLOCKS, PARTS, ErrorDataset, Trajectory, errors_of
@@ -40,6 +42,8 @@ LEAST_SQUARE = 0.25  # of a squared score: errors far below the floor tell nothi
 STARTS = (1.0, 0.3, 0.1, -0.1, -0.3, -1.0, 3.0)
 LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # far, then near
 ANGLES_RAD = np.radians(np.arange(-180.0, 180.0, 30.0))  # of wheels, where a fit may begin
+PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 15.0))  # of what recurs, likewise ...
+NEAR_RAD = np.radians(np.arange(-12.0, 13.0, 3.0))  # ... and around the best of these
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
 CHANCE = 0.05  # at which data sets disagree more than their blocks tell
@@ -121,9 +125,11 @@ class ScoreFit:
         by_robot: dict[tuple[int, str], list[int]] = {}
         held = self._held_angles()
         for i, d in enumerate(self.datasets):
+            there = {p.name for p in phases(self.models[i])}
             for p in d.own:
-                if p.name in WHEEL_ANGLES:
-                    if i not in held:
+                if p.name in WHEEL_ANGLES or p.role == PHASE:
+                    acts = p.name in there if p.role == PHASE else i not in held
+                    if acts:
                         now = p.at(self.models[i].get(p.name))
                         unknowns.append(Unknown(now, frozenset([i])))
                 elif p.name not in ALIGNMENT:  # of the robot, in all its logs
@@ -290,7 +296,11 @@ class ScoreFit:
                 self._begin_at([np.where(new, f * self.x, self.x) for f in factors])
             return
         away = self.x - self.usual
-        self._begin_at([np.where(new, self.usual + s * away, self.x) for s in STARTS])
+        points = [np.where(new, self.usual + s * away, self.x) for s in STARTS]
+        instances = {p.name.split(".")[0] for p in fresh}
+        if any(self.unknowns[c].parameter.name.split(".")[0] in instances for c in self._phases):
+            points = [self._with_best_phases(point) for point in points]
+        self._begin_at(points)
 
     @property
     def _angles(self) -> list[int]:
@@ -313,16 +323,37 @@ class ScoreFit:
         for c, u in enumerate(self.unknowns):
             if one in u.members:
                 self.x[c] = told[u.parameter.name]
-        self.begin_at_angles()
+        self.begin_at_best_start()
 
-    def begin_at_angles(self) -> None:
-        """Begins with wheels' angles at the best of a whole turn, one after the other, twice."""
+    def begin_at_best_start(self) -> None:
+        """Begins with what is of each log's start at the best of a whole turn or period.
+
+        Wheels' angles one after the other, twice; then formulas' phases.
+        """
         for c in 2 * self._angles:
-            (i,) = self.unknowns[c].members
-            points = np.repeat(self.x[None], 1 + len(ANGLES_RAD), axis=0)
-            points[1:, c] = ANGLES_RAD
-            missed = [self._misfit(i, rows) for rows in self.batch(i, points)]
-            self.x = points[int(np.argmin(missed))]
+            self.x = self._with_best(c, self.x, ANGLES_RAD)
+        self.x = self._with_best_phases(self.x)
+        self.usual[self._phases] = self.x[self._phases]
+
+    @property
+    def _phases(self) -> list[int]:
+        """Columns of formulas' phases."""
+        return [c for c, u in enumerate(self.unknowns) if u.parameter.role == PHASE]
+
+    def _with_best_phases(self, x: np.ndarray) -> np.ndarray:
+        """(P,) values with the phases of each log at their best."""
+        for c in self._phases:
+            x = self._with_best(c, x, PHASES_RAD)
+            x = self._with_best(c, x, x[c] + NEAR_RAD)
+        return x
+
+    def _with_best(self, c: int, x: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """(P,) values with one of a single data set's own as it is, or at the best of others."""
+        (i,) = self.unknowns[c].members
+        points = np.repeat(x[None], 1 + len(values), axis=0)
+        points[1:, c] = values
+        missed = [self._misfit(i, rows) for rows in self.batch(i, points)]
+        return points[int(np.argmin(missed))]
 
     def _begin_at(self, points: Sequence[np.ndarray]) -> None:
         """Begins at the one of some points (P,) that misses least."""
@@ -331,6 +362,7 @@ class ScoreFit:
         cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(within))]
         best = int(np.argmin(cost))
         self.x, self._begun = within[best], [r[best] for r in rows]
+        self.usual[self._phases] = self.x[self._phases]
 
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
         """Minimises the cost and leaves the values in the models."""
@@ -432,6 +464,7 @@ class ScoreFit:
                 g[np.ix_(own, own)] -= weighted.T @ j[out]
                 p[own] -= weighted.T @ r[out]
             points.append(self._stepped(g, p, self.x, self._own_to(is_local)))
+        self._find_phases_elsewhere(points)
         if sum(len(r) for r in rows) < FEW_ROWS:
             points = [self._without_part(k, x) for k, x in enumerate(points)]
         held = []
@@ -439,6 +472,22 @@ class ScoreFit:
             each = self.batch(i, np.array(points))
             held.append(each[self.datasets[i].part, np.arange(each.shape[1])])
         return held
+
+    def _find_phases_elsewhere(self, points: Sequence[np.ndarray]) -> None:
+        """Sets phases of (P,) values for each part to those that the other parts tell.
+
+        Of a whole period: else the part would have had a say in which moment was chosen.
+        """
+        for c in self._phases:
+            (i,) = self.unknowns[c].members
+            tried = np.repeat(self.x[None], 1 + len(PHASES_RAD), axis=0)
+            tried[1:, c] = PHASES_RAD
+            rows = self.batch(i, tried)
+            for k, point in enumerate(points):
+                others = rows * (self.datasets[i].part != k)
+                best = int(np.argmin([self._misfit(i, r) for r in others]))
+                if best:
+                    point[c] = tried[best, c]
 
     @cached_property
     def block_squares(self) -> list[np.ndarray]:
@@ -622,7 +671,8 @@ class ScoreFit:
             moved = push @ np.linalg.pinv(self._curvature)
         # Without the block around a moment, only the prior says where in it the moment was.
         parameters = [u.parameter for u in self.unknowns]
-        reach = np.array([p.std if p.role == "moment" else np.inf for p in parameters])
+        when = ("moment", PHASE)
+        reach = np.array([p.std if p.role in when else np.inf for p in parameters])
         return np.clip(moved, -reach, reach)
 
     @property
@@ -711,6 +761,14 @@ class ScoreFit:
         told = [c for c, e in enumerate(self.shared_estimates()) if e.seen or e.together]
         values = self._intervals[np.ix_(told, told)]
         return Covariance(tuple(self.estimates[c].name for c in told), values)
+
+    @property
+    def first_phases(self) -> list[ParameterEstimate]:
+        """Of formulas in the first log that has such: a model's file has one log's alone."""
+        own = (self.own_estimates(i) for i in range(len(self.datasets)))
+        names = {self.unknowns[c].parameter.name for c in self._phases}
+        found = ([e for name, e in every.items() if name in names] for every in own)
+        return next((own for own in found if own), []) if names else []
 
     def own_estimates(self, i: int) -> dict[str, ParameterEstimate]:
         """Of data set i alone: its clock and what its robot has of its own."""

@@ -3,7 +3,7 @@
 
 import math
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
@@ -24,6 +24,8 @@ LAG_EFFECT = "motor_lag"  # adds to LAG: beside it only their sum can be told
 
 # Standard deviations of the base's priors: as robots differ from their data sheets.
 ANY_ANGLE_RAD = 10.0  # so wide that it draws an angle nowhere
+PHASE_STD_RAD = 0.5  # around the best of a whole period, which is looked for before
+PHASE_STEP_RAD = 0.05
 USUAL_STD = {
     LAG: 0.3,
     CLOCK: 0.3,
@@ -43,9 +45,12 @@ GAIN_STEP = 0.004
 # Which part of a robot's lateness an effect changes, by its stage; "lag" at the others.
 LATE_PARTS = {"duty": "delay", "observe": "clock"}
 WHERE_OR_WHEN = ("place", "moment")  # roles of what says where an effect is, or from when on
-NO_SIZE = (*WHERE_OR_WHEN, "radius")  # roles of what says nothing of how strong an effect is
+PHASE = "phase"  # role of where a formula's period is when a log begins
+NO_SIZE = (*WHERE_OR_WHEN, "radius", PHASE)  # roles that say nothing of how strong an effect is
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
 UNKNOWN = 20.0  # so many times what is known of the size of a formula's number it may be
+# `sin(0.2*t + p1)`, `cos(t/5 - p3)`: a number that ends the angle of a wave of the time.
+IN_A_WAVE = re.compile(r"\b(?:sin|cos)\(([^()]*\bt\b[^()]*)[+-]\s*(p[0-3])\s*\)")
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,8 @@ class Parameter:
         std: standard deviation of the prior.
         step: of finite differences.
         central: differences are taken to both sides, where times make one-sided ones crude.
-        role: "size", "place" (where in the room), "moment" or "lateness", as on the effect's card.
+        role: "size", "place" (where in the room), "moment" or "lateness", as on the effect's card;
+            or PHASE.
         strength: an effect's default less its neutral value.
         words: what it is, where its name does not say so: `speed at 50 % duty`.
     """
@@ -169,6 +175,61 @@ def starting_angles(model: native.Model) -> list[Parameter]:
     if not acting_by_wheel_angle(model):
         return []
     return base_parameters(model, WHEEL_ANGLES[: len(model.wheels())])
+
+
+def phases(model: native.Model) -> list[Parameter]:
+    """Where the periods of a model's formulas are when a log begins, from where the model has them.
+
+    They are the numbers that do nothing but to end the angle of a wave of the time: no other log
+    begins at the same moment of the period.
+    """
+    found = []
+    for instance, texts in zip(effect_names(model), model.texts, strict=True):
+        found += [f"{instance}.{key}" for key in _phase_keys(texts)]
+    values = {v["name"]: v for v in model.values()} if found else {}
+    return [_phase(values[name]) for name in found]
+
+
+def _phase_keys(texts: Mapping[str, str]) -> list[str]:
+    """Of p0 to p3 those that are phases in an effect's texts."""
+    whole = " ".join(texts.values())
+    at = [key for _, key in IN_A_WAVE.findall(whole)]
+    return [k for k in dict.fromkeys(at) if len(re.findall(rf"\b{k}\b", whole)) == at.count(k)]
+
+
+def _phase(v: dict) -> Parameter:
+    at = v["value"]
+    return Parameter(
+        name=v["name"],
+        unit="rad",
+        value=at,
+        min=v["min"],
+        max=v["max"],
+        usual=at,
+        std=PHASE_STD_RAD,
+        step=PHASE_STEP_RAD,
+        central=True,
+        role=PHASE,
+        words="moment of its period at which the log begins",
+    )
+
+
+def of_each_log(model: native.Model) -> list[Parameter]:
+    """What no other log tells: wheels' angles at the start, if any acts, and formulas' phases."""
+    return [*starting_angles(model), *phases(model)]
+
+
+def take_alignment(model: native.Model, of: native.Model) -> None:
+    """Sets a model to the clock, heading, angles and phases of another one of the same log.
+
+    Phases of a formula that the other one lacks stay.
+    """
+    texts = dict(zip(effect_names(of), of.texts, strict=True))
+    own = dict(zip(effect_names(model), model.texts, strict=True))
+    alike = {name for name, text in own.items() if texts.get(name) == text}
+    known = [p.name for p in phases(model) if p.name.split(".")[0] in alike]
+    for name in (*ALIGNMENT, *known):
+        model.set(name, of.get(name))
 
 
 def unevenness(model: native.Model, wheel: str) -> float:
@@ -283,14 +344,18 @@ def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter
 def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -> list[Parameter]:
     """Free quantities of one effect of a model; a fresh one begins at its defaults.
 
-    Of a formula only those parameters that it names are free, and nothing is known of their size
-    but that they are no larger by far than 1, or than they are in the model.
+    Of a formula only those parameters that it names are free, but for its phases, which are of one
+    log; nothing is known of their size but that they are no larger by far than 1, or than they are
+    in the model.
     """
     place = effect_names(model).index(instance)
     texts, name = model.texts[place], instance.split("#")[0]
+    own = _phase_keys(texts)
     found = []
     for p in catalogue_of(model)[name]["parameters"]:
         if texts and not any(p["name"] in words(text) for text in texts.values()):
+            continue
+        if p["name"] in own:
             continue
         full = f"{instance}.{p['name']}"
         strength = p["default"] - p["neutral"]

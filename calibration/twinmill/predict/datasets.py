@@ -16,7 +16,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.model.parameters import CLOCK, MOTION_STAGES, Parameter, starting_angles
+from twinmill.model.parameters import CLOCK, MOTION_STAGES, Parameter, of_each_log
 from twinmill.predict.windows import EVERY_S, HORIZONS_S, Windows, difference
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
@@ -133,11 +133,11 @@ class Trajectory:
         known = np.where(floor > 1e-9, floor, np.inf)
         return replace(self, floor=known, keep=self.keep if keep is None else keep)
 
-    def with_starting_angles(self, model: native.Model) -> "Trajectory":
-        """The same with the angles at which the wheels begin, if the model acts by them."""
+    def with_own_start(self, model: native.Model) -> "Trajectory":
+        """The same with what it begins at: angles of wheels and phases of formulas that act."""
         known = {p.name for p in self.own}
-        angles = tuple(p for p in starting_angles(model) if p.name not in known)
-        return replace(self, own=(*self.own, *angles)) if angles else self
+        fresh = tuple(p for p in of_each_log(model) if p.name not in known)
+        return replace(self, own=(*self.own, *fresh)) if fresh else self
 
     def thinned(self, every: int) -> "Trajectory":
         """The same with every Nth start alone: predictions that overlap tell much the same."""

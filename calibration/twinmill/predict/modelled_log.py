@@ -8,7 +8,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import command_at
-from twinmill.model.parameters import ALIGNMENT, CLOCK, stated_names
+from twinmill.model.parameters import CLOCK, stated_names, take_alignment
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import Noise, fit_noise
 from twinmill.predict.residual import StepGrid
@@ -52,8 +52,7 @@ class ModelledLog:
     def with_model(self, model: native.Model) -> "ModelledLog":
         """The same measurement, clock and noise with another model."""
         model = model.for_robot(self.measurement.track.robot_id)
-        for name in ALIGNMENT:
-            model.set(name, self.model.get(name))
+        take_alignment(model, self.model)
         return replace(self, model=model)
 
     def fitted(self, model: native.Model) -> "ModelledLog":

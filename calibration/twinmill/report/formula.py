@@ -62,7 +62,8 @@ def taken(beyond: Taken | None) -> list[str]:
         f"The model has a formula{place}, fitted together with the rest: {beyond.added.equals}. It "
         f"takes {100 * beyond.share:.0f} % of the squared error above the floor that was left "
         f"(held-out score {scores}). {_numbers(beyond.added)}"
-        " --no-formula leaves it out."
+        " --no-formula leaves it out.",
+        *([beyond.note] if beyond.note else []),
     ]
 
 

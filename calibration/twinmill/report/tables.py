@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
-from twinmill.model.parameters import ParameterEstimate
+from twinmill.model.parameters import NORMAL_95, ParameterEstimate
 from twinmill.predict.noise import Noise
 from twinmill.predict.regimes import HORIZON, Regime
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
@@ -97,6 +97,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         ),
         *_held_heading(robot),
         *_wheel_angles(robot),
+        *_phases(robot),
     ]
 
 
@@ -116,6 +117,18 @@ def _wheel_angles(robot: RobotComparison) -> list[tuple[str, str]]:
     angles = ", ".join(f"{w} {round(np.degrees(a))}°" for w, a in robot.wheel_angles_rad.items())
     said = f"not recorded; the log begins at {angles}, where the model fits best"
     return [("wheel angles", said)]
+
+
+def _phases(robot: RobotComparison) -> list[tuple[str, str]]:
+    """At which moment of their periods the log begins, of formulas that recur in time."""
+    if not robot.phases:
+        return []
+    told = [
+        f"{p.name} {round(np.degrees(np.angle(np.exp(1j * p.value))))}° "
+        + (f"± {max(1, round(np.degrees(NORMAL_95 * p.std)))}°" if p.seen else "(hardly told)")
+        for p in robot.phases
+    ]
+    return [("phases", f"the log begins at {', '.join(told)}, where the model fits best")]
 
 
 def _noise(noise: Noise, has_heading: bool) -> str:

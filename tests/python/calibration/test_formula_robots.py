@@ -7,7 +7,7 @@ The robots are no twin: each hides something of its own, written here in NumPy o
 import numpy as np
 import pytest
 
-from twinmill.challenge.cases import draw, draw_robots, make_log
+from twinmill.challenge.cases import Case, draw, draw_robots, make_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import Explanation, explain
 from twinmill.diagnosis.taking import taken
@@ -51,6 +51,13 @@ def switched(motion: np.ndarray) -> np.ndarray:
     """A tenth less while something else takes power, every 16 s of the run."""
     t_s = np.arange(len(motion)) * STEP_S
     return motion * (1 - 0.1 * (np.sin(2 * np.pi * t_s / 16 - 1.0) > 0.3))[:, None]
+
+
+def switched_for_a_while(motion: np.ndarray) -> np.ndarray:
+    """An eighth less every 16 s, until 46 s; then no more."""
+    t_s = np.arange(len(motion)) * STEP_S
+    away = (np.sin(2 * np.pi * t_s / 16 - 1.0) > 0.3) & (t_s < 46)
+    return motion * (1 - 0.12 * away)[:, None]
 
 
 def oiled(motion: np.ndarray) -> np.ndarray:
@@ -136,18 +143,22 @@ def test_a_push_that_grows_with_speed_stands_in_the_place_of_one_that_does_not(e
     assert np.arctan2(north, east) == pytest.approx(0.7, abs=0.1)
 
 
+def explained_case(seed: int, number: int, folder) -> tuple[Case, Explanation]:
+    """A case of the exam, whose plant shares no code, and what `explain` makes of it."""
+    robots = draw_robots(seed)
+    case = draw(number, seed, robots, 90.0)
+    base = base_of(folder, case.robot, robots[case.robot], seed, duration_s=90.0)
+    make_log(case, folder / "run.lcmlog")
+    logs = load_measurements([folder / "run.lcmlog"])
+    out = folder / "explained.toml"
+    return case, explain(logs, ModelFile.load(str(base)), out=out, command="")
+
+
 def test_tiles_are_told_and_no_patch_that_takes_most_of_what_they_do(tmp_path):
-    """A case of the exam, whose plant shares no code."""
-    robots = draw_robots(2041)
-    case = draw(59, 2041, robots, 90.0)
+    case, result = explained_case(2041, 59, tmp_path)
     (tiles,) = case.hidden
-    base = base_of(tmp_path, case.robot, robots[case.robot], 2041, duration_s=90.0)
-    make_log(case, tmp_path / "run.lcmlog")
-    logs = load_measurements([tmp_path / "run.lcmlog"])
-    out = tmp_path / "explained.toml"
-    result = explain(logs, ModelFile.load(str(base)), out=out, command="")
     assert tiles.name == "tiles" and result.formula.kept
-    assert "floor_patch" not in effect_names(ModelFile.load(str(out)).model)
+    assert "floor_patch" not in effect_names(ModelFile.load(str(result.path)).model)
     (form,) = result.formula.formula.forms
     assert 2 * np.pi / form.constant == pytest.approx(tiles.values["length_m"], rel=0.02)
 
@@ -191,9 +202,11 @@ def test_what_is_switched_is_told_with_its_period_its_moments_and_its_size(expla
     assert number.value == pytest.approx(-0.12, rel=0.1)
 
 
-def test_a_formula_of_the_moments_of_one_run_is_told_and_not_taken(explained):
-    result = explained(switched, 101)
-    assert result.diagnosis.rest.proven.names_time
+def test_what_does_not_go_on_by_its_clock_is_told_and_not_taken(explained):
+    """What a part of the run does not share with the rest, another run does not share."""
+    result = explained(switched_for_a_while, 101)
+    proven = result.diagnosis.rest.proven
+    assert proven.names_time and not proven.goes_on
     assert "one run" in result.formula.why_not and not result.formula.kept
     assert result.formula.to_json()["share"] is None
     assert result.sentence == result.diagnosis.sentence
