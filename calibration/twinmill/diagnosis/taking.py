@@ -22,6 +22,7 @@ from twinmill.model.parameters import (
     UNKNOWN,
     Parameter,
     ParameterEstimate,
+    catalogue,
     effect_names,
     effect_parameters,
     is_local,
@@ -55,6 +56,7 @@ class Taken:
         share: of the squared held-out error above the floor that it takes away.
         evidence: fall of the held-out cost, and the same without the block with the most.
         runs: logs that bear it out.
+        replaced: effects in its place that the fit had against which it was judged.
     """
 
     formula: Formula
@@ -67,6 +69,7 @@ class Taken:
     share: float
     evidence: tuple[float, float]
     runs: int
+    replaced: int
 
     @property
     def kept(self) -> bool:
@@ -80,8 +83,10 @@ class Taken:
             return "it names the time of one run, and nothing shows that another run shares it"
         if self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"
-        # The best of so many forms falls by 2 ln of their number more than one of them would.
-        chosen = 2 * log(self.formula.tried)
+        # The best of so many forms falls by 2 ln of their number more than one of them would; so
+        # does each effect that it replaced, of all effects.
+        effects = self.replaced * log(len(catalogue()))
+        chosen = 2 * max(log(self.formula.tried) - effects, 0.0)
         least = SETTINGS.evidence + chosen, SETTINGS.without_best
         if any(own < enough for own, enough in zip(self.evidence, least, strict=True)):
             return "refitted with the rest, it has less evidence than an effect needs"
@@ -198,6 +203,7 @@ def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
         share=share,
         evidence=(fall, without_best),
         runs=runs,
+        replaced=len(formula.instead_of),
     )
 
 

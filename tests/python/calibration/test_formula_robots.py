@@ -163,6 +163,16 @@ def test_tiles_are_told_and_no_patch_that_takes_most_of_what_they_do(tmp_path):
     assert 2 * np.pi / form.constant == pytest.approx(tiles.values["length_m"], rel=0.02)
 
 
+def test_a_formula_needs_no_more_evidence_than_the_effects_that_it_stands_for_did(tmp_path):
+    """Two effects of a compass together do along one heading what turning by heading does."""
+    case, result = explained_case(2402, 39, tmp_path)
+    (turning,) = case.hidden
+    assert turning.name == "turn by heading" and result.formula.kept
+    assert {*result.formula.formula.instead_of} == {"heading_bias", "compass_deviation"}
+    east, north = (n.value for n in result.formula.numbers)
+    assert np.hypot(east, north) == pytest.approx(turning.values["share"], rel=0.05)
+
+
 def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
     """The floor that the robot drives on is level."""
     result = explained(resonant, 101)
