@@ -16,7 +16,7 @@ from twinmill.model.parameters import phases
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
 
 NAMED = ("effect_missing", "ambiguous")
-PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 5.0))
+PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 2.0))
 
 
 def answers(problem: Problem) -> dict[str, Answer]:
