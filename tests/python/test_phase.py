@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 import twinmill_native as native
 
@@ -102,6 +103,7 @@ def test_experiments_belong_to_the_cell_around_them_or_to_none():
         ("v_mps,omega_degps,class\n0.1,fast,milling\n", "line 2"),
         ("v_mps,omega_degps,class\nnan,30,milling\n", "v_mps is .nan.: it must be a number"),
         ("v_mps,omega_degps,class\n", "no experiment"),
+        ("# by hand\nv_mps,omega_degps,class\n# day 2\n0.1,30,miling\n", "line 4"),
     ],
 )
 def test_a_wrong_sheet_is_told_in_one_sentence(text: str, says: str):
@@ -117,6 +119,12 @@ def test_a_sheet_in_another_encoding_is_told_by_name(tmp_path: Path):
 
 def test_a_damaged_sweep_is_told_by_name(tmp_path: Path):
     (tmp_path / "sweep.parquet").write_bytes(b"PAR1 and no more")
+    with pytest.raises(ValueError, match=r"sweep\.parquet: is damaged; remove it"):
+        read_sweep(tmp_path)
+
+
+def test_a_table_that_no_sweep_wrote_is_told_by_name(tmp_path: Path):
+    pq.write_table(pa.table({"class": ["milling"]}), tmp_path / "sweep.parquet")
     with pytest.raises(ValueError, match=r"sweep\.parquet: is damaged; remove it"):
         read_sweep(tmp_path)
 

@@ -219,10 +219,11 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monk
         assert len({place.read_bytes() for place in places}) == 1
 
 
-def test_nobody_at_the_cluster_is_one_sentence(tmp_path: Path, monkeypatch):
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "host-without-port"])
+def test_nobody_at_the_cluster_is_one_sentence(tmp_path: Path, monkeypatch, address: str):
     monkeypatch.setattr("twinmill.swarm.workers.CONNECT_S", 0.5)
-    with pytest.raises(ValueError, match="no scheduler answers"):
-        sweep(request(), tmp_path / "s", dask="tcp://127.0.0.1:9")
+    with pytest.raises(ValueError, match=f"--dask {address}: no scheduler answers"):
+        sweep(request(), tmp_path / "s", dask=address)
 
 
 @pytest.mark.parametrize(
@@ -233,6 +234,7 @@ def test_nobody_at_the_cluster_is_one_sentence(tmp_path: Path, monkeypatch):
         ("v_mps=0.1:0.3", "from:to:count"),
         ("n=4:7:3", "whole numbers"),
         ("n=6,6", "differ"),
+        ("v_mps=0.1:0.3:1", "count of 2 to 9999"),
     ],
 )
 def test_a_wrong_axis_is_told_in_one_sentence(text: str, says: str):
@@ -245,6 +247,17 @@ def test_an_axis_that_cannot_act_is_refused():
     with pytest.raises(ValueError, match=r"robot\.mass_kg: changes nothing here: the planar"):
         make_request("milling", "turbopi.toml", mass)
     assert make_request("milling", "turbopi.toml", mass, plant="mujoco").axes
+
+
+def test_a_number_that_a_formula_does_not_name_is_no_axis(tmp_path: Path):
+    texts = '[[effect]]\nname = "equation"\nformula = "p0*vx"\np0 = 0.1\n'
+    path = tmp_path / "m.toml"
+    path.write_text(Path(native.find_model_file("paper.toml")).read_text() + texts)
+    with pytest.raises(
+        ValueError, match=r"equation\.p1: changes nothing here: its formula does not"
+    ):
+        make_request("milling", str(path), ["equation.p1=0,1"])
+    assert make_request("milling", str(path), ["equation.p0=0,1"]).axes
 
 
 def test_speeds_need_a_drive_where_they_can_be_chosen():
@@ -276,6 +289,47 @@ def test_a_lone_robot_circles_at_the_speed_asked_for(v_mps: float, omega_degps: 
 def test_a_value_that_no_swarm_can_have_is_told(axis: str, sentence: str):
     with pytest.raises(ValueError, match=sentence):
         request([axis])
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ({"tables": ["odd=nan,0,1,1"]}, "speed -100 to 100"),
+        ({"tables": ["odd=inf,0,1,1"]}, "speed -100 to 100"),
+        ({"tables": ["odd=0,1e300,1,1"]}, "turn -2 to 2"),
+        ({"tables": ["odd=0,1,1,1", "odd=0,1,2,1"]}, "odd: is given twice"),
+        ({"seeds": 10**11}, "6 cells of 100000000000 seeds are 600000000000 worlds"),
+        ({"first_seed": 2**63 - 1}, "take a smaller one"),
+        ({"first_seed": 10**23}, "take a smaller one"),
+        ({"axes": ["v_mps=0.1:0.3:9999", "omega_degps=1:90:9999"]}, "fewer values"),
+    ],
+)
+def test_what_is_too_much_or_no_table_is_told_at_once(given: dict, sentence: str):
+    with pytest.raises(ValueError, match=sentence):
+        request(**given)
+
+
+def test_one_value_is_an_axis_too():
+    paper = native.Model.load("paper.toml")
+    assert parse_axis("v_mps=0.2:0.2:1", paper) == parse_axis("v_mps=0.2", paper)
+
+
+def test_a_sweep_that_fails_at_once_leaves_no_folder(tmp_path: Path, monkeypatch):
+    def fail(*_):
+        raise OverflowError
+
+    monkeypatch.setattr("twinmill.swarm.workers.run_part", fail)
+    with pytest.raises(OverflowError):
+        sweep(request(), tmp_path / "s")
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_cell_has_a_model_of_its_own():
+    """All are copies of one that was read once."""
+    asked = request()
+    first, last = asked.cell_model(asked.points[0]), asked.cell_model(asked.points[-1])
+    assert first.get("base.speed_per_input_mps") != last.get("base.speed_per_input_mps")
+    assert asked.model.get("base.speed_per_input_mps") == 0.0025
 
 
 def test_the_first_species_takes_up_the_rest():

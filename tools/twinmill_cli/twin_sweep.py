@@ -12,7 +12,7 @@ from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli.ending import leave
 from twinmill_cli.options import SpreadM, Start
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import AsJson, busy, deliver
 
 AXIS_HELP = "name=from:to:count or name=value,value,..."
 app = typer.Typer(
@@ -90,22 +90,23 @@ def _command(
 
     Example: twin_sweep --x v_mps=0.1:0.35:6 --y omega_degps=20:90:8 --out sweep
     """
-    request = make_request(
-        behavior,
-        model,
-        [axis for axis in (x, y, *(z or [])) if axis],
-        table,
-        n=n,
-        seeds=seeds,
-        first_seed=first_seed,
-        duration_s=duration_s,
-        start=start,
-        spread_m=spread_m,
-        target_radius_m=target_radius_m,
-        full=full,
-        same_seeds=same_seeds,
-        plant=plant,
-    )
+    with busy("checking the cells"):
+        request = make_request(
+            behavior,
+            model,
+            [axis for axis in (x, y, *(z or [])) if axis],
+            table,
+            n=n,
+            seeds=seeds,
+            first_seed=first_seed,
+            duration_s=duration_s,
+            start=start,
+            spread_m=spread_m,
+            target_radius_m=target_radius_m,
+            full=full,
+            same_seeds=same_seeds,
+            plant=plant,
+        )
     data = sweep(request, out, workers, dask)
     deliver(data, _text(data), as_json)
 

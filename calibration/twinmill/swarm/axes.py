@@ -108,12 +108,14 @@ def _values(text: str, rest: str) -> tuple[float, ...]:
             if not re.fullmatch(r"[1-9]\d{0,3}", count):
                 raise ValueError
             values = np.linspace(float(first), float(last), int(count))
+            if len(values) == 1 and float(first) != float(last):
+                raise ValueError
         else:
             values = np.array([float(word) for word in rest.split(",")])
     except ValueError:
         raise ValueError(
-            f"'{text}': after = must come from:to:count with a count of 1 to 9999, as in "
-            "v_mps=0.1:0.3:5, or values with commas between."
+            f"'{text}': after = must come from:to:count with a count of 2 to 9999, as in "
+            "v_mps=0.1:0.3:5, or one value, or several with commas between."
         ) from None
     rounded = tuple(float(f"{value:.12g}") for value in values)
     if not all(map(math.isfinite, rounded)) or len(set(rounded)) < len(rounded):

@@ -40,10 +40,11 @@ def read_experiments(path: Path, phase: Phase) -> list[Experiment]:
     """
     with open(path, newline="", encoding="utf-8-sig") as file:
         try:
-            lines = [line for line in file if not line.startswith("#")]
+            lines = {k: line for k, line in enumerate(file, 1) if not line.startswith("#")}
         except UnicodeDecodeError as error:
             raise ValueError(f"{path}: is no CSV file in UTF-8 ({error}).") from error
-        reader = csv.DictReader(lines)
+        numbers = list(lines)
+        reader = csv.DictReader(lines.values())
         names = {ALIASES.get(name, name): name for name in reader.fieldnames or []}
         for axis in [*(axis.name for axis in phase.axes), "class"]:
             if axis not in names:
@@ -57,7 +58,8 @@ def read_experiments(path: Path, phase: Phase) -> list[Experiment]:
                 point = tuple(_number(row[names[axis.name]], axis.name) for axis in phase.axes)
                 observed = check_goal((row[names["class"]] or "").strip())
             except ValueError as error:
-                raise ValueError(f"{path}, line {reader.line_num}: {error}") from None
+                line = numbers[reader.line_num - 1]
+                raise ValueError(f"{path}, line {line}: {error}") from None
             found.append(_judge(point, observed, row.get(names.get("note", ""), "") or "", phase))
     if not found:
         raise ValueError(f"{path}: holds no experiment.")

@@ -94,8 +94,9 @@ def read_sweep(folder: Path) -> tuple[Request, pa.Table]:
         raise ValueError(f"{folder}: holds {state}; run twin_sweep --out {folder} to its end.")
     try:
         table = pq.read_table(store.result)
-    except pa.ArrowInvalid as error:
+        asked = table.schema.metadata[b"twinmill_request"]
+    except (pa.ArrowInvalid, KeyError, TypeError) as error:
         raise ValueError(
             f"{store.result}: is damaged; remove it and run the same twin_sweep again."
         ) from error
-    return Request.from_json(table.schema.metadata[b"twinmill_request"].decode()), table
+    return Request.from_json(asked.decode()), table

@@ -7,13 +7,19 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
+import twinmill_native as native
+
 from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import effect_names, words
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
 from twinmill.terminal import progress_bar
+
+MOST_WORLDS = 10_000_000  # a row of each is in memory at the end
+MOST_SEEDS = 2**63 - 1  # of 64 bits with a sign
 
 
 def make_request(
@@ -29,23 +35,53 @@ def make_request(
     names = [axis.name for axis in parsed]
     if len(set(names)) < len(names):
         raise ValueError(f"the axes {', '.join(names)}: each must be another quantity.")
+    own = [parse_table(text) for text in tables or []]
+    if twice := next((n for n, c in Counter(name for name, _ in own).items() if c > 1), None):
+        raise ValueError(f"--table {twice}: is given twice; give each behaviour one table.")
     request = Request(
         behavior=behavior,
         model_name=model_file.path.name,
         model_text=model_file.text,
         version=version("twinmill"),
         axes=parsed,
-        tables=[parse_table(text) for text in tables or []],
+        tables=own,
         **rest,
     )
     if request.plant not in PLANTS:
         raise ValueError(f"--plant {request.plant}: must be {' or '.join(PLANTS)}.")
+    _check_size(request)
+    unnamed = _unnamed(request.model)
     for point in request.points:
         request.cell(point)
-        inert = dict(request.cell_model(point).inert(request.plant))
+        inert = unnamed | dict(request.cell_model(point).inert(request.plant))
         for name in set(names) & set(inert):
             raise ValueError(f"the axis {name}: changes nothing here: {inert[name]}.")
     return request
+
+
+def _unnamed(model: native.Model) -> dict[str, str]:
+    """Numbers of equations that their texts do not name, and why they are inert."""
+    return {
+        row["name"]: "its formula does not name it"
+        for name, texts in zip(effect_names(model), model.texts, strict=True)
+        for row in model.values()
+        if texts
+        and row["name"].rpartition(".")[0] == name
+        and row["name"].rpartition(".")[2] not in words(" ".join(texts.values()))
+    }
+
+
+def _check_size(request: Request) -> None:
+    if request.world_count > MOST_WORLDS:
+        raise ValueError(
+            f"{request.world_count // request.seeds} cells of {request.seeds} seeds are "
+            f"{request.world_count} worlds, and a sweep holds at most {MOST_WORLDS}; take fewer "
+            "values or --seeds."
+        )
+    if request.first_seed + request.world_count > MOST_SEEDS:
+        raise ValueError(
+            f"--first-seed {request.first_seed}: seeds end at {MOST_SEEDS}; take a smaller one."
+        )
 
 
 def parse_table(text: str) -> tuple[str, list[int]]:
@@ -57,6 +93,10 @@ def parse_table(text: str) -> tuple[str, list[int]]:
     name, _, rest = text.partition("=")
     try:
         unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
+        within = [abs(v) <= 100 for v in (unseen_speed, seen_speed)]
+        within += [abs(v) <= 2 for v in (unseen_turn, seen_turn)]
+        if not name or not all(within):
+            raise ValueError
     except ValueError:
         raise ValueError(
             f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
@@ -117,7 +157,7 @@ def run_missing(
             for number, columns in run:
                 store.keep(number, columns)
                 tell(len(parts[number]))
-        except ValueError:  # its worlds cannot be run
+        except Exception:  # its worlds cannot be run, or nothing can be written
             store.leave_empty()
             raise
         if not store.result.exists():

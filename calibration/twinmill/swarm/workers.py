@@ -61,7 +61,7 @@ def run_on_dask(request: Request, parts: dict[int, range], address: str) -> Iter
 
     try:
         client = Client(address, timeout=CONNECT_S)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise ValueError(f"--dask {address}: no scheduler answers there ({error}).") from error
     with client:
         text = client.scatter(request.to_json(), broadcast=True, hash=False)
