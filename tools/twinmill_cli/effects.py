@@ -40,8 +40,11 @@ def _effects(
         typer.Option("--from", metavar="MODEL", help="Of new: the model that has its equation."),
     ] = None,
     equation: Annotated[
-        str, typer.Option("--equation", help="Of new: which of the model's equations.")
-    ] = "equation",
+        str | None,
+        typer.Option(
+            "--equation", help="Of new: which of the model's equations, if it has several."
+        ),
+    ] = None,
     into: Annotated[
         Path, typer.Option("--into", help="Of new: folder of the project's source.")
     ] = Path(),
@@ -68,7 +71,7 @@ def _effects(
 
 
 def _write(
-    name: str | None, model: Path | None, equation: str, into: Path, *, as_json: bool
+    name: str | None, model: Path | None, equation: str | None, into: Path, *, as_json: bool
 ) -> None:
     """Of `effects new`."""
     if name is None or model is None:

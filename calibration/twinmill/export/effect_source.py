@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Source, card and test of an effect for the catalogue, from the equation of a model."""
 
+import json
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import wrap
 
+import twinmill_native as native
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from twinmill.diagnosis.trials import REFIT
+from twinmill.export.formula_cpp import in_cpp
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.model_file import ModelError, ModelFile, write_whole
 from twinmill.model.parameters import catalogue, effect_names, words
@@ -17,7 +21,6 @@ from twinmill.model.parameters import catalogue, effect_names, words
 CATALOGUE, TESTS = Path("twin/effects/catalogue"), Path("tests/effects")
 LISTED = "add_executable(test_effects\n"  # in the tests' CMakeLists.txt; the new one follows
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
-TOKEN = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[A-Za-z_]\w*|\s+|.")
 PARAMETERS = ("p0", "p1", "p2", "p3")
 FAR = 1e6  # of any number: its size is the formula's
 LONGEST = 78  # of a text in the card
@@ -49,16 +52,8 @@ BODY = {
     "t": "in.t_s",
 }
 POSE = {"x": "in.x_m", "y": "in.y_m", "theta": "in.theta_rad"}
+CHANGING = {"x", "y", "theta", "course", "t", "rim", "angle"}  # within a step, which holds them
 RATES = {"state_rate": "s", "second_rate": "r"}
-FUNCTIONS = {
-    **{n: f"std::{n}" for n in ("abs", "sqrt", "exp", "sin", "cos", "tan", "min", "max")},
-    **{n: f"std::{n}" for n in ("asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")},
-    **{n: f"std::{n}" for n in ("asinh", "acosh", "atanh", "log2", "log10", "rint")},
-    "ln": "std::log",
-    "sign": "Sign",
-}
-OF_ANY_COUNT = ("min", "max")  # of arguments
-FIGURES = {"_pi": "M_PI", "_e": "M_E"}
 
 
 @dataclass(frozen=True)
@@ -122,13 +117,13 @@ class Function:
     parameters: Sequence[str]
 
 
-def write_effect(name: str, model_file: ModelFile, instance: str, root: Path) -> list[Path]:
+def write_effect(name: str, model_file: ModelFile, instance: str | None, root: Path) -> list[Path]:
     """Writes the source and the test of an effect, and lists the test for the build.
 
     Args:
         name: of the new effect.
         model_file: that has the equation.
-        instance: of the equation in it: `equation`, `equation#2`.
+        instance: of the equation in it: `equation`, `equation#2`; None: the only one.
         root: of the project's source.
 
     Returns:
@@ -140,33 +135,59 @@ def write_effect(name: str, model_file: ModelFile, instance: str, root: Path) ->
     """
     source, test = root / CATALOGUE / f"{name}.cpp", root / TESTS / f"test_{name}.cpp"
     lists = root / TESTS / "CMakeLists.txt"
-    _check(name, root, (source, test))
+    model = model_file.model
+    _check(name, model, root, (source, test))
     listed = lists.read_text()
     if LISTED not in listed:
         raise ModelError(f"{lists}: has no line '{LISTED.strip()}'; list the test there by hand.")
-    model = model_file.model
-    if instance not in effect_names(model) or not instance.startswith("equation"):
-        has = [n for n in effect_names(model) if n.split("#")[0] == "equation"]
+    instance = _chosen(model_file, instance)
+    texts = _texts(model, instance)
+    values = {p: model.get(f"{instance}.{p}") for p in PARAMETERS}
+    made = _source(name, texts, values, model_file.path.name)
+    tested = _test(name, texts, values)
+    with ExitStack() as undo:  # of all or none
+        for path, text in ((source, made), (test, tested)):
+            undo.callback(path.unlink, missing_ok=True)
+            write_whole(path, text)
+        write_whole(lists, listed.replace(LISTED, f"{LISTED}    test_{name}.cpp\n", 1))
+        undo.pop_all()
+    return [source, test, lists]
+
+
+def _chosen(model_file: ModelFile, instance: str | None) -> str:
+    """Of a model's equations the one that is asked for, or the only one."""
+    has = [n for n in effect_names(model_file.model) if n.split("#")[0] == "equation"]
+    if not has:
+        raise ModelError(f"{model_file.path.name}: has no equation; `add equation` takes one in.")
+    if instance is None and len(has) > 1:
         raise ModelError(
-            f"{model_file.path.name}: has no '{instance}'; "
-            + (f"its equations are {', '.join(has)}." if has else "it has no equation at all.")
+            f"{model_file.path.name}: has several equations; say which by --equation: "
+            f"{', '.join(has)}."
         )
+    if instance is not None and instance not in has:
+        raise ModelError(
+            f"{model_file.path.name}: has no '{instance}'; its equations are {', '.join(has)}."
+        )
+    return instance or has[0]
+
+
+def _texts(model: native.Model, instance: str) -> dict[str, str]:
+    """Of an equation that can be an effect."""
     texts = model.texts[effect_names(model).index(instance)]
     if texts["adds_to"] not in PLACES:
         raise ValueError(
             f"{instance}: adds to {texts['adds_to']}, which has two values, and only formulas of "
             "one value are written as an effect; keep the equation in the model."
         )
-    values = {p: model.get(f"{instance}.{p}") for p in PARAMETERS}
-    made = _source(name, texts, values, model_file.path.name)
-    tested = _test(name, texts, values)
-    write_whole(source, made)
-    write_whole(test, tested)
-    write_whole(lists, listed.replace(LISTED, f"{LISTED}    test_{name}.cpp\n", 1))
-    return [source, test, lists]
+    if not _numbers(texts):
+        raise ValueError(
+            f"{instance}: '{texts['formula']}' has none of p0 to p3, so that nothing would switch "
+            "the effect off; write a number of it as p0."
+        )
+    return texts
 
 
-def _check(name: str, root: Path, files: Sequence[Path]) -> None:
+def _check(name: str, model: native.Model, root: Path, files: Sequence[Path]) -> None:
     if not NAME.fullmatch(name):
         raise ValueError(
             f"effect '{name}': is no name; use small letters, figures and single underscores."
@@ -175,6 +196,10 @@ def _check(name: str, root: Path, files: Sequence[Path]) -> None:
         raise ValueError(f"effect '{name}': commands mean something else by it; take another name.")
     if name in catalogue():
         raise ValueError(f"effect '{name}': the catalogue has it already; take another name.")
+    if name in {part for row in model.values() for part in row["name"].split(".")}:
+        raise ValueError(
+            f"effect '{name}': model files mean something else by it; take another name."
+        )
     needed = (CATALOGUE, TESTS / "CMakeLists.txt")
     if missing := next((place for place in needed if not (root / place).exists()), None):
         raise ModelError(
@@ -200,18 +225,19 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
         .render(
             name=name,
             summary="Taken from an equation that was found for what a model lacked.",
-            equation="\n".join(f'        "{line}"' for line in _wrapped(equation)),
+            equation="\n".join(f"        {_quoted(line)}" for line in _wrapped(equation)),
             measure="drives that vary the quantities in the equation; what it resembles is its own",
-            reference=f"found in data by twinmill diagnose; {model}",
+            reference=_quoted(f"found in data by twinmill diagnose; {model}"),
             phrase="a formula that was found in data",
             **_kind(used, bool(rates), place.stage),
             parameters=[
                 {"name": p, "value": _plain(values[p] or 0.01), "far": f"{FAR:g}"}
                 for p in _numbers(texts)
             ],
+            places={p: k for k, p in enumerate(_numbers(texts))},
             neutral=" && ".join(f"v[{k}] == 0" for k in range(len(_numbers(texts)))),
             signs="sign" in used,
-            ordered=bool(used & {*OF_ANY_COUNT}),
+            ordered=bool(used & {"min", "max"}),
             formula=formula,
             rates=[_function(rate, place.names, state) for rate in rates.values()],
             wheels=place.wheels,
@@ -226,10 +252,9 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
 
 
 def _numbers(texts: dict[str, str]) -> list[str]:
-    """p0 and so on, as far as the texts name them."""
+    """Those of p0 to p3 that the texts name."""
     used = words(" ".join(texts.values()))
-    last = max((k for k, p in enumerate(PARAMETERS) if p in used), default=0)
-    return list(PARAMETERS[: last + 1])
+    return [p for p in PARAMETERS if p in used]
 
 
 def _kind(used: set[str], remembers: bool, stage: str) -> dict[str, str]:
@@ -254,84 +279,31 @@ def _function(text: str, names: dict[str, str], state: dict[str, str]) -> Functi
     own = [n for n in (*names, *state) if n in used]
     numbers = [p for p in PARAMETERS if p in used]
     return Function(
-        _in_cpp(text, {*names, *state, *PARAMETERS}),
+        in_cpp(text, {*names, *state, *PARAMETERS}),
         ", ".join(["const Numbers &v"] * bool(numbers) + [f"double {n}" for n in own]),
         ", ".join(["v"] * bool(numbers) + own),
         numbers,
     )
 
 
-def _in_cpp(text: str, names: Collection[str]) -> str:
-    """A formula of some names as C++ reads it: figures with a point, functions of its library.
-
-    Raises:
-        ValueError: C++ has no such function or sign.
-    """
-    spaced = re.sub(
-        r"(?<=[\w)}]) *([*/]) *", r" \1 ", _terms(iter(TOKEN.findall(text)), text, names)
-    )
-    return re.sub(r"\s+", " ", spaced)
-
-
-def _terms(tokens: Iterator[str], text: str, names: Collection[str]) -> str:
-    """Of a formula's tokens up to the end of the bracket that they stand in."""
-    parts = []
-    for token in tokens:
-        if token == ")":
-            break
-        if token == "(":
-            parts.append(f"({_terms(tokens, text, names)})")
-        elif token in FUNCTIONS:
-            while next(tokens) != "(":
-                pass
-            parts.append(_called(token, _terms(tokens, text, names)))
-        else:
-            parts.append(_plain_token(token, text, names))
-    return "".join(parts)
-
-
-def _called(function: str, arguments: str) -> str:
-    """A call; what compares is a number to the formula, and a truth to C++."""
-    own = [
-        f"static_cast<double>({a.strip()})" if re.search(r"[<>=&|]", a) and "?" not in a else a
-        for a in _arguments(arguments)
-    ]
-    inside = ",".join(own)
-    return f"{FUNCTIONS[function]}({f'{{{inside}}}' if function in OF_ANY_COUNT else inside})"
-
-
-def _arguments(text: str) -> list[str]:
-    """Parts between the commas that stand in no bracket."""
-    found, depth = [""], 0
-    for letter in text:
-        depth += (letter in "({") - (letter in ")}")
-        if letter == "," and not depth:
-            found.append("")
-        else:
-            found[-1] += letter
-    return found
-
-
-def _plain_token(token: str, text: str, names: Collection[str]) -> str:
-    """A figure, a name or a sign."""
-    if token == "^":
-        raise ValueError(f"'{text}': C++ has no power by ^; write x*x or exp(2*ln(x)).")
-    if re.match(r"[\d.]", token):
-        return token if re.search(r"[.eE]", token) else f"{token}.0"
-    if re.match(r"[A-Za-z_]", token) and token not in names and token not in FIGURES:
-        raise ValueError(
-            f"'{text}': {token} is not written in C++; say it by other functions, such as a + b "
-            "for sum(a, b), or keep the equation in the model."
-        )
-    return FIGURES.get(token, token)
-
-
 def _test(name: str, texts: dict[str, str], values: dict[str, float]) -> str:
-    own = [_plain(values[p] or 0.01) for p in _numbers(texts)]
-    pairs = ", ".join(f'{{"{key}", "{text}"}}' for key, text in texts.items() if text)
+    numbers = _numbers(texts)
+    pairs = ", ".join(f'{{"{key}", {_quoted(text)}}}' for key, text in texts.items() if text)
     title = "".join(part.capitalize() for part in name.split("_"))
     template = _environment().get_template("test_effect.cpp.j2")
-    return template.render(name=name, title=title, values=", ".join(own), texts=f"{{{pairs}}}")
+    return template.render(
+        name=name,
+        title=title,
+        values=", ".join(_plain(values[p] or 0.01) for p in numbers),
+        places=", ".join(str(PARAMETERS.index(p)) for p in numbers),
+        texts=f"{{{pairs}}}",
+        held=bool(words(" ".join(texts.values())) & CHANGING),
+    )
+
+
+def _quoted(text: str) -> str:
+    """A text of C++: JSON has the same marks and escapes."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _plain(value: float) -> str:
