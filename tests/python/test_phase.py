@@ -26,6 +26,7 @@ from twinmill.swarm.request import Request
 from twinmill.swarm.store import read_sweep
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli import main as cli
+from twinmill_cli.phase import _place
 
 SEEDS = 4
 
@@ -171,6 +172,11 @@ def test_the_command_draws_a_page_that_needs_no_other(tmp_path: Path, capsys):
     page = Path(data["report"]).read_text()
     assert 'type: "range"' in page and page.count("<svg") >= 3
     assert "http" not in page.replace("http://www.w3.org/", "")
+
+
+def test_a_place_on_an_axis_of_the_pictures_is_refused():
+    with pytest.raises(ValueError, match="no axis beyond the two of the pictures"):
+        _place(["v_mps=0.1"], made_phase({}))
 
 
 def test_sentences_say_which_values_serve():

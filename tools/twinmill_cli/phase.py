@@ -116,14 +116,19 @@ def _place(texts: list[str], phase: Phase) -> dict[str, float]:
     for text in texts:
         name, _, value = text.partition("=")
         name = ALIASES.get(name, name)
-        known = [axis.name for axis in phase.axes]
+        known = [axis.name for axis in phase.axes[2:]]
+        if not known:
+            raise ValueError(
+                f"--at '{text}': this sweep has no axis beyond the two of the pictures."
+            )
         try:
             if name not in known:
                 raise ValueError
             place[name] = float(value)
         except ValueError:
             raise ValueError(
-                f"--at '{text}': write name=value with one of the axes {', '.join(known)}."
+                f"--at '{text}': write name=value with an axis beyond the first two: "
+                f"{', '.join(known)}."
             ) from None
     return place
 
