@@ -370,7 +370,6 @@ class ScoreFit:
         self.__dict__.pop("state", None)
         if len(x):
             rows, slopes = self._slopes(x, self._begun)
-            self._begun = []
             cost = self.cost(rows, x)
             for done in range(1, rounds + 1):
                 gram, pull = self._normal(rows, slopes, x)
@@ -385,17 +384,15 @@ class ScoreFit:
                         break
                     damping *= 10
                 if moved is None:
+                    self.__dict__["state"] = (rows, slopes)
                     break
                 fell = cost - trial_cost
-                x, cost, damping = moved, trial_cost, max(damping / 10, 1e-9)
-                if done == rounds:  # slopes are found where they are asked for
-                    slopes = None
+                x, cost, rows, damping = moved, trial_cost, then, max(damping / 10, 1e-9)
+                converged = fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2)
+                if converged or done == rounds:  # slopes are found where they are asked for
                     break
-                rows, slopes = self._slopes(x, then)
-                if fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2):
-                    break
-            if slopes is not None:
-                self.__dict__["state"] = (rows, slopes)
+                rows, slopes = self._slopes(x, rows)
+            self._begun = rows
         self.x = x
         self.store()
         return self
@@ -429,7 +426,7 @@ class ScoreFit:
     @cached_property
     def state(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Rows and slopes at the values found."""
-        return self._slopes(self.x)
+        return self._slopes(self.x, self._begun)
 
     @property
     def scores(self) -> np.ndarray:
