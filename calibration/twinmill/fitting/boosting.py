@@ -140,19 +140,22 @@ class Learners:
     def __init__(
         self, batches: Iterable[tuple[np.ndarray, Sequence[np.ndarray]]], parts: Parts
     ) -> None:
-        self.parts, self.columns = parts, []
+        self.parts, self._rows = parts, []
+        self._places: list[tuple[int, np.ndarray]] = []  # of each group: its batch, columns there
         found: dict[int, list[tuple]] = {}
-        rows, first = [np.zeros((len(parts.inside), 0), np.float32)], 0
+        first = 0
         for x, groups in batches:
             grams = parts.summed(squares(x, parts.cells))
             for own in groups:
                 products = [gram[:, own[:, None], own] for gram in grams]
-                found.setdefault(len(own), []).append((len(self.columns), first + own, *products))
-                self.columns.append(first + own)
-            rows.append(x.astype(np.float32))
+                found.setdefault(len(own), []).append((len(self), first + own, *products))
+                self._places.append((len(self._rows), own))
+            self._rows.append(x.astype(np.float32))
             first += x.shape[1]
-        self.x = np.hstack(rows)
         self._alike = [_Alike(*map(np.array, zip(*own, strict=True))) for own in found.values()]
+
+    def __len__(self) -> int:
+        return len(self._places)
 
     def best(self, wanted: np.ndarray) -> tuple[float, int, float, np.ndarray]:
         """Of the group that lowers the squared error on left-out parts most.
@@ -167,15 +170,21 @@ class Learners:
         each = own.fitted(k, pull, LADDER[ridge])
         return float(falls[k, ridge]), int(own.numbers[k]), float(LADDER[ridge]), each
 
+    def rows_of(self, number: int) -> np.ndarray:
+        """(R, F) rows of a group."""
+        batch, columns = self._places[number]
+        return self._rows[batch][:, columns]
+
     def left(self, wanted: np.ndarray, number: int, each: np.ndarray) -> np.ndarray:
         """(R,) what a group's fits without each part leave of its rows."""
-        x = self.x[:, self.columns[number]]
+        x = self.rows_of(number)
         made = [x[own] @ one for own, one in zip(self.parts.slices, each, strict=True)]
         return wanted - np.concatenate(made)
 
     def _moments(self, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(K, all features) of the rows of each part, and of those that do not touch it."""
-        cells = np.array([wanted[k] @ self.x[k] for k in self.parts.cells], float)
+        batches = [[wanted[k] @ x[k] for k in self.parts.cells] for x in self._rows]
+        cells = np.concatenate(batches, axis=1, dtype=float)
         inside, touching = self.parts.summed(cells)
         return inside, inside.sum(axis=0) - touching
 
@@ -191,9 +200,9 @@ def boosted(
         independent: how many of the values are. The best of so many groups takes about
             2 ln(groups) / independent of an error that is noise: below twice that nothing is taken.
     """
-    if not learners.columns:
+    if not len(learners):
         return
-    by_chance = np.log(len(learners.columns)) / independent
+    by_chance = np.log(len(learners)) / independent
     least = max(FLOOR_SETTINGS.group_worth, FLOOR_SETTINGS.group_chance * by_chance)
     wanted = wanted.astype(np.float32)
     for _ in range(FLOOR_SETTINGS.most_groups):

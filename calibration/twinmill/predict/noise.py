@@ -7,6 +7,7 @@ phi = exp(-dt / tau). Whitened, they have unit variance and no memory.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -141,11 +142,11 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
         chunk //= 2
     if not len(pieces):
         return Noise(*(ChannelNoise(*least, LEAST_MEMORY_S) for least in LEAST))
-    bins = _bins(chunk)
+    bins, taken = _bins(chunk)
     power = np.mean([_median_power(np.nan_to_num(e), pieces, bins) for e in errors], axis=0)
     return Noise(
-        _fit_channel(power[:, :2].mean(1), bins, grid.period_s, LEAST[0]),
-        _fit_channel(power[:, 2], bins, grid.period_s, LEAST[1]),
+        _fit_channel(power[:, :2].mean(1), taken, grid.period_s, LEAST[0]),
+        _fit_channel(power[:, 2], taken, grid.period_s, LEAST[1]),
     )
 
 
@@ -165,12 +166,20 @@ def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None
     return np.array(starts or everywhere, dtype=int)
 
 
-def _bins(chunk: int) -> np.ndarray:
-    """(F, chunk) weights whose sums over a stretch are its spectrum: taper, wave, mean left out."""
+@cache
+def _bins(chunk: int) -> tuple[np.ndarray, np.ndarray]:
+    """What a spectrum is made of, and what it blurs.
+
+    Returns:
+        (F, chunk) weights whose sums over a stretch are its spectrum: taper, wave, mean left out;
+        (F, N) what each bin takes in of N frequencies, FINER than the bins.
+    """
     taper = np.hanning(chunk + 1)[:-1]
     wave = np.exp(-2j * np.pi * np.outer(np.arange(1, chunk // 2), np.arange(chunk)) / chunk)
     weights = taper * wave / np.sqrt(np.sum(taper**2))
-    return weights - weights.mean(axis=1, keepdims=True)
+    weights -= weights.mean(axis=1, keepdims=True)
+    count = FINER * chunk
+    return weights, np.abs(np.fft.fft(weights, count, axis=1)) ** 2 / count
 
 
 def _median_power(errors: np.ndarray, pieces: np.ndarray, bins: np.ndarray) -> np.ndarray:
@@ -187,16 +196,14 @@ def _median_of_exponentials(count: int) -> float:
 
 
 def _fit_channel(
-    power: np.ndarray, bins: np.ndarray, period_s: float, least: tuple[float, float]
+    power: np.ndarray, taken: np.ndarray, period_s: float, least: tuple[float, float]
 ) -> ChannelNoise:
     """Whittle's likelihood over sensor, drive and memory, with what each bin takes in from others.
 
     Debiased as by Sykulski et al. 2019, Biometrika 106(2): a short stretch blurs the spectrum, and
     leaving out its mean takes part of the slow drive noise away.
     """
-    count = FINER * bins.shape[1]
-    taken = np.abs(np.fft.fft(bins, count, axis=1)) ** 2 / count
-    frequency_Hz = np.fft.fftfreq(count, period_s)
+    frequency_Hz = np.fft.fftfreq(taken.shape[1], period_s)
     quiet = ChannelNoise(*least, LEAST_MEMORY_S)
     power = np.maximum(power, taken @ quiet.spectrum(frequency_Hz, period_s))
     sensor = np.sqrt(power[-len(power) // 4 :].mean() / 4)

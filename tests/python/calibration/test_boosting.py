@@ -12,8 +12,11 @@ ROWS, PARTS, NOISE = 800, 8, 0.5
 def learners(random):
     inside = np.repeat(np.arange(PARTS), ROWS // PARTS)
     parts = Parts(inside, inside, inside, PARTS)
-    groups = np.split(np.arange(47), np.cumsum((3, 10, 30)))
-    return Learners([(random.normal(size=(ROWS, 47)), groups)], parts)
+    batches = [
+        (random.normal(size=(ROWS, width)), np.split(np.arange(width), [first]))
+        for width, first in ((13, 3), (34, 30))
+    ]
+    return Learners(batches, parts)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -22,7 +25,7 @@ def test_takes_the_groups_that_made_the_values_the_larger_first(seed):
     groups = learners(random)
     wide, narrow = random.normal(size=10), random.normal(size=4)
     wide, narrow = 2 * wide / np.linalg.norm(wide), narrow / np.linalg.norm(narrow)
-    made = groups.x[:, groups.columns[1]] @ wide + groups.x[:, groups.columns[3]] @ narrow
+    made = groups.rows_of(1) @ wide + groups.rows_of(3) @ narrow
     wanted = made + NOISE * random.normal(size=ROWS)
     assert [number for number, _ in boosted(groups, wanted, ROWS)][:2] == [1, 3]
 
@@ -36,7 +39,7 @@ def test_takes_nothing_from_noise(seed):
 def test_what_is_left_of_a_part_is_predicted_without_it():
     random = np.random.default_rng(7)
     groups = learners(random)
-    x = groups.x[:, groups.columns[0]].astype(float)
+    x = groups.rows_of(0).astype(float)
     wanted = x @ np.array([1.0, -2.0, 0.5]) + NOISE * random.normal(size=ROWS)
     _, number, ridge, each = groups.best(wanted)
     first = slice(0, ROWS // PARTS)
