@@ -20,6 +20,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 gc.disable()  # nothing of what is imported is garbage, and to look for it takes long
 import twinmill_cli.lazy  # noqa: E402, F401 what all need, Typer above all
 
+gc.freeze()
 gc.enable()
 if HEARD is _signal.default_int_handler:
     _signal.signal(_signal.SIGINT, HEARD)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import gc
 import shlex
 import sys
 from collections.abc import Iterator
@@ -67,7 +66,7 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
-    _make_ready()
+    native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
         measurements = load(logs, model_file)
@@ -85,12 +84,6 @@ def _diagnose(
     section = partial(present.section, result, then)
     finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
     return result
-
-
-def _make_ready() -> None:
-    """Nothing of what is loaded will be freed, and memory that the work frees it wants again."""
-    gc.freeze()
-    native.keep_memory()
 
 
 @contextmanager
@@ -235,7 +228,7 @@ def _explain(
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
     """
     verb = "explain" if formula else "explain --no-formula"
-    _make_ready()
+    native.keep_memory()  # what the work frees it wants again
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )

@@ -43,6 +43,7 @@ class LazyCommand(TyperCommand):
         app = typer.Typer()
         gc.disable()  # see __init__.py
         module = import_module(self.module)
+        gc.freeze()
         gc.enable()
         module.register(app)
         for command in app.registered_commands:
