@@ -309,18 +309,37 @@ TEST_P(EveryEffect, TakesSeveralRobotsAsEachAlone)
     const std::vector<double> values = Defaults(*GetParam());
     std::mt19937_64 engine(10);
     std::vector<Signals> alone;
-    std::vector<GroundSignals> together;
-    for (int robot = 0; robot < 19; ++robot)
-        alone.push_back(RandomSignals(engine, 0));
-    for (const Signals &s : alone)
-        together.push_back(GroundOf(s));
-    on->steps(together, {values});
-    for (size_t robot = 0; robot < alone.size(); ++robot)
+    EachPose pose;
+    Each vx_mps{}, vy_mps{}, omega_radps{};
+    for (size_t i = 0; i < kTogether; ++i)
     {
-        effect.Step(alone[robot], nullptr);
-        EXPECT_EQ(together[robot].vx_mps, alone[robot].vx_mps);
-        EXPECT_EQ(together[robot].vy_mps, alone[robot].vy_mps);
-        EXPECT_EQ(together[robot].omega_radps, alone[robot].omega_radps);
+        Signals s = RandomSignals(engine, 0);
+        s.moves = true;
+        const GroundSignals ground = GroundOf(alone.emplace_back(s));
+        pose.x_m[i] = ground.x_m;
+        pose.y_m[i] = ground.y_m;
+        pose.theta_rad[i] = ground.theta_rad;
+        pose.c[i] = ground.ahead.c;
+        pose.s[i] = ground.ahead.s;
+        vx_mps[i] = ground.vx_mps;
+        vy_mps[i] = ground.vy_mps;
+        omega_radps[i] = ground.omega_radps;
+    }
+    const Signals &any = alone.front();
+    for (const size_t count : {size_t{1}, size_t{5}, kTogether})
+    {
+        EachGround together{any.robot, any.t_s, any.dt_s, any.moves,  pose,
+                            count,     vx_mps,  vy_mps,   omega_radps};
+        on->steps(together, {values});
+        for (size_t i = 0; i < kTogether; ++i)
+        {
+            Signals own = alone[i];
+            if (i < count)
+                effect.Step(own, nullptr);
+            EXPECT_EQ(together.vx_mps[i], own.vx_mps);
+            EXPECT_EQ(together.vy_mps[i], own.vy_mps);
+            EXPECT_EQ(together.omega_radps[i], own.omega_radps);
+        }
     }
 }
 

@@ -214,5 +214,51 @@ TEST(Windows, AreTheSameInABatchAsAlone)
     }
 }
 
+// Fifteen are under way at once; of a part there is one, and its robot is alone.
+TEST(Windows, OfAPartAreThoseOfItsRow)
+{
+    const RandomDrive run;
+    const Model model =
+        With("floor_patch", {0.3, 0.2, 0.4, 0.3}, With("carpet_grain", {0.1, 0.05}, Base()));
+    std::vector<int64_t> starts, ends, part;
+    std::vector<double> strengths;
+    for (int64_t k = 0; k < 120; k += 4)
+    {
+        part.push_back(static_cast<int64_t>(starts.size()));
+        strengths.push_back(0.005 * static_cast<double>(k));
+        starts.push_back(k);
+        ends.insert(ends.end(), {k + 5, k + 60});
+    }
+    const std::vector<std::string> names{"floor_patch.strength"};
+    const auto whole = PredictWindowsBatch(model, run.track(), starts, ends, names, strengths);
+    const auto parts =
+        PredictWindowsBatch(model, run.track(), starts, ends, names, strengths, part);
+    ASSERT_EQ(parts.size(), 3 * ends.size());
+    for (size_t w = 0; w < starts.size(); ++w)
+        ExpectNear(std::span(parts).subspan(6 * w, 6),
+                   std::span(whole).subspan(w * 3 * ends.size() + 6 * w, 6), 0);
+}
+
+TEST(Windows, AreTheSameWhateverWasPredictedBefore)
+{
+    const RandomDrive run;
+    LastPlan last;
+    Track track = run.track();
+    track.last_plan = &last;
+    const std::vector<int64_t> starts{3, 11}, ends{30, 50};
+    for (int again = 0; again < 2; ++again)
+    {
+        for (const double offset_s : {0.03, 0.05})
+        {
+            Model model = Base();
+            model.clock.offset_s = offset_s;
+            ExpectNear(PredictWindows(model, track, run.starts, run.ends),
+                       PredictWindows(model, run.track(), run.starts, run.ends), 0);
+        }
+        ExpectNear(PredictWindows(Base(), track, starts, ends),
+                   PredictWindows(Base(), run.track(), starts, ends), 0);
+    }
+}
+
 }  // namespace
 }  // namespace twin::test

@@ -333,7 +333,17 @@ Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double
         Disturb(twist, dt_s, state, *random);
     if (!ground_.empty())
     {
-        GroundSignals s = BeforeGround(twist, rolling.moves, state.pose, ahead, t_s, dt_s);
+        GroundSignals s{robot_,
+                        t_s,
+                        dt_s,
+                        rolling.moves,
+                        state.pose.x_m,
+                        state.pose.y_m,
+                        state.pose.theta_rad,
+                        ahead,
+                        twist.vx_mps,
+                        twist.vy_mps,
+                        twist.omega_radps};
         Run(ground_, s, state);
         twist = {s.vx_mps, s.vy_mps, s.omega_radps};
     }

@@ -47,11 +47,19 @@ struct Plan
     }
 };
 
-// The plan of these samples: a known one, if it is theirs.
+// The plan of these samples: a known one, or the track's last one, if it is theirs.
 inline std::shared_ptr<const Plan> PlanOf(const Track &track, const std::vector<Sample> &measured,
                                           const std::shared_ptr<const Plan> &known)
 {
-    return known && known->IsAt(measured) ? known : std::make_shared<const Plan>(track, measured);
+    if (known && known->IsAt(measured))
+        return known;
+    if (!track.last_plan)
+        return std::make_shared<const Plan>(track, measured);
+    const std::scoped_lock lock(track.last_plan->held);
+    std::shared_ptr<const Plan> &last = track.last_plan->plan;
+    if (!last || !last->IsAt(measured))
+        last = std::make_shared<const Plan>(track, measured);
+    return last;
 }
 
 struct Recording

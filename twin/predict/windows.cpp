@@ -18,9 +18,13 @@ namespace
 struct Windows
 {
     const Track &track;
-    std::span<const int64_t> starts, ends;
+    std::span<const int64_t> starts, ends, part{};
 
     size_t Horizons() const { return starts.empty() ? 0 : ends.size() / starts.size(); }
+    bool AreOf(size_t row, size_t window) const
+    {
+        return part.empty() || part[window] == static_cast<int64_t>(row);
+    }
 };
 
 // Poses at which some window starts or ends.
@@ -115,6 +119,7 @@ struct Prediction
     const std::vector<Sample> &measured;
     const Recording &recording;
     double *out;
+    size_t row = 0;
 
     void Write() const { chain.IsHomogeneous() ? AlongOnePath() : EachFromItsStart(); }
 
@@ -126,6 +131,8 @@ private:
         const size_t horizons = windows.Horizons();
         for (size_t w = 0; w < windows.starts.size(); ++w)
         {
+            if (!windows.AreOf(row, w))
+                continue;
             start(events.At(windows.starts[w]));
             for (size_t h = w * horizons; h < (w + 1) * horizons && windows.ends[h] >= 0; ++h)
                 visit(events.At(windows.ends[h]), out + 3 * h);
@@ -149,60 +156,84 @@ private:
                 [&](size_t to, double *seen) { WriteSeen(chain, shifted.At(path[to]), seen); });
     }
 
-    // A window under way: where its robot is, and which of its ends come next.
+    // A window under way: which of its ends come next, and what effects remember of its robot.
     struct Walker
     {
-        Course course;
-        std::vector<double> memory;
         size_t next, last;
+        std::vector<double> memory;
     };
 
-    // All windows that are under way make a step together: the processor begins with one while it
-    // waits for what another one's step came to.
+    // Windows under way: the course of the i-th is the one at i % kTogether of courses[i /
+    // kTogether].
+    struct UnderWay
+    {
+        std::vector<Walker> walkers;
+        std::vector<Courses> courses;
+
+        Course CourseOf(size_t i) const { return courses[i / kTogether].At(i % kTogether); }
+
+        void Begin(Walker walker, const Course &course)
+        {
+            const size_t i = walkers.size();
+            if (i == kTogether * courses.size())
+                courses.emplace_back();
+            courses[i / kTogether].Take(i % kTogether, course);
+            walkers.push_back(std::move(walker));
+        }
+
+        // The last one takes the place of the i-th.
+        void End(size_t i)
+        {
+            courses[i / kTogether].Take(i % kTogether, CourseOf(walkers.size() - 1));
+            std::swap(walkers[i], walkers.back());
+            walkers.pop_back();
+        }
+    };
+
+    // All windows that are under way make a step together.
     void EachFromItsStart() const
     {
         const auto remembered = Remembered(chain, measured, recording);
         const size_t horizons = windows.Horizons();
         const std::vector<double> nothing = chain.Start({}).effect_state;
-        std::vector<Walker> walkers;
-        std::vector<GroundSignals> signals;
+        UnderWay all;
         size_t window = 0, step = 0;
         for (size_t event = 0; event < measured.size(); ++event)
         {
             for (; step < recording.plan->reached[event]; ++step)
-                MoveAll(recording.plan->steps[step], recording.rolled[step], walkers, signals);
+                MoveAll(recording.plan->steps[step], recording.rolled[step], all);
             for (; window < windows.starts.size() && events.At(windows.starts[window]) == event;
                  ++window)
-                walkers.push_back({Course(measured[event].pose),
-                                   remembered.empty() ? nothing : remembered[event],
-                                   window * horizons, (window + 1) * horizons});
-            std::erase_if(walkers, [&](Walker &walker) { return IsThrough(walker, event); });
+                if (windows.AreOf(row, window))
+                    all.Begin({window * horizons, (window + 1) * horizons,
+                               remembered.empty() ? nothing : remembered[event]},
+                              Course(measured[event].pose));
+            for (size_t i = all.walkers.size(); i-- > 0;)
+                if (IsThrough(all.walkers[i], all.CourseOf(i).pose(), event))
+                    all.End(i);
         }
     }
 
-    // `signals` is room for those of the walkers.
-    void MoveAll(const Plan::Step &step, const Rolling &rolling, std::vector<Walker> &walkers,
-                 std::vector<GroundSignals> &signals) const
+    void MoveAll(const Plan::Step &step, const Rolling &rolling, UnderWay &all) const
     {
-        const Twist geared = chain.Geared(rolling);
-        signals.clear();
-        for (const Walker &walker : walkers)
-            signals.push_back(chain.BeforeGround(geared, rolling.moves, walker.course.pose(),
-                                                 walker.course.ahead(), step.t_s, step.dt_s));
-        chain.ActOnGround(std::span(signals), [&](size_t i) { return walkers[i].memory.data(); });
-        for (size_t i = 0; i < walkers.size(); ++i)
-            walkers[i].course.Follow({signals[i].vx_mps, signals[i].vy_mps, signals[i].omega_radps},
-                                     step.dt_s);
+        for (size_t first = 0; first < all.walkers.size(); first += kTogether)
+        {
+            Courses &courses = all.courses[first / kTogether];
+            const size_t count = std::min(kTogether, all.walkers.size() - first);
+            const auto memory = [&](size_t i) { return all.walkers[first + i].memory.data(); };
+            courses.Follow(
+                chain.OnFloor(rolling, courses.poses(), count, step.t_s, step.dt_s, memory));
+        }
     }
 
     // Writes what is seen at those of a window's ends that are at an event; true if no other comes.
-    bool IsThrough(Walker &walker, size_t event) const
+    bool IsThrough(Walker &walker, const Pose2 &pose, size_t event) const
     {
         for (; walker.next < walker.last && windows.ends[walker.next] >= 0; ++walker.next)
         {
             if (events.At(windows.ends[walker.next]) != event)
                 return false;
-            WriteSeen(chain, walker.course.pose(), out + 3 * walker.next);
+            WriteSeen(chain, pose, out + 3 * walker.next);
         }
         return true;
     }
@@ -286,9 +317,10 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                                         std::span<const int64_t> starts,
                                         std::span<const int64_t> ends,
                                         const std::vector<std::string> &names,
-                                        std::span<const double> values)
+                                        std::span<const double> values,
+                                        std::span<const int64_t> part)
 {
-    const Windows windows{track, starts, ends};
+    const Windows windows{track, starts, ends, part};
     const Events events(windows);
     const std::vector<Model> models = ModelsOf(model, names, values);
     const std::vector<size_t> firsts = FirstsAlike(model, names, values);
@@ -303,7 +335,8 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
     std::shared_ptr<const Plan> plan;
     if (!models.empty())
         plan = PlanOf(track, MeasuredAt(DriveChain(models[0]), track, events), nullptr);
-    std::vector<double> predicted(models.size() * 3 * ends.size(), kNaN);
+    const size_t size = 3 * ends.size(), apart = part.empty() ? size : 0;
+    std::vector<double> predicted(part.empty() ? models.size() * size : size, kNaN);
     const auto predict = [&](size_t b) {
         const DriveChain chain(models[b]);
         const auto measured = MeasuredAt(chain, track, events);
@@ -315,7 +348,8 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                    events,
                    measured,
                    shared ? first : recording,
-                   predicted.data() + b * 3 * ends.size()}
+                   predicted.data() + b * apart,
+                   b}
             .Write();
         if (awaited[b])
             recordings[b] = std::move(recording);
@@ -329,9 +363,10 @@ std::vector<double> WindowErrorsBatch(const Model &model, const Track &track,
                                       std::span<const int64_t> starts,
                                       std::span<const int64_t> ends,
                                       const std::vector<std::string> &names,
-                                      std::span<const double> values, const Displaced &displaced)
+                                      std::span<const double> values, const Displaced &displaced,
+                                      std::span<const int64_t> part)
 {
-    auto rows = PredictWindowsBatch(model, track, starts, ends, names, values);
+    auto rows = PredictWindowsBatch(model, track, starts, ends, names, values, part);
     MakeErrors(displaced, rows);
     return rows;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // twinmill_native: the catalogue, model files, short predictions and swarms for Python.
 #include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -47,12 +48,13 @@ struct PyTrack
     }
     Track View() const
     {
-        return {Span(command_t_s), Span(command), Span(battery_V),
-                Span(pose_t_s),    Span(pose),    Span(segment)};
+        return {Span(command_t_s), Span(command), Span(battery_V), Span(pose_t_s),
+                Span(pose),        Span(segment), &last_plan};
     }
     Vector command_t_s, battery_V, pose_t_s;
     Matrix command, pose;
     Indices segment;
+    mutable LastPlan last_plan;
 };
 
 nb::list Words(const std::vector<const char *> &words)
@@ -282,7 +284,7 @@ Array Windows(const Model &model, const PyTrack &track, Indices starts, IndexMat
 
 Array WindowErrorsOf(const Model &model, const PyTrack &track, Indices starts, IndexMatrix ends,
                      const std::vector<std::string> &names, Matrix values, Matrix start,
-                     Cube measured, Cube weight)
+                     Cube measured, Cube weight, const std::optional<Indices> &part)
 {
     const size_t count = starts.size(), width = 3 * ends.shape(1);
     if (ends.shape(0) != count || values.shape(1) != names.size())
@@ -290,13 +292,19 @@ Array WindowErrorsOf(const Model &model, const PyTrack &track, Indices starts, I
     if (start.size() != 3 * count || measured.size() != count * width ||
         weight.size() != count * width)
         throw std::invalid_argument("start must be (W, 3), measured and weight (W, H, 3), of ends");
+    if (part && part->size() != count)
+        throw std::invalid_argument("part must have one number per start");
+    for (const int64_t row : part ? Span(*part) : std::span<const int64_t>{})
+        if (row < 0 || static_cast<size_t>(row) >= values.shape(0))
+            throw std::invalid_argument("parts must be rows of values");
     std::vector<double> errors;
     {
         nb::gil_scoped_release unlocked;
         errors = WindowErrorsBatch(model, track.View(), Span(starts), Span(ends), names,
-                                   Span(values), {Span(start), Span(measured), Span(weight)});
+                                   Span(values), {Span(start), Span(measured), Span(weight)},
+                                   part ? Span(*part) : std::span<const int64_t>{});
     }
-    return ToNumpy(std::move(errors), {values.shape(0), count * width});
+    return ToNumpy(std::move(errors), {part ? 1 : values.shape(0), count * width});
 }
 
 Array OneStep(const Model &model, const PyTrack &track)
@@ -450,9 +458,10 @@ NB_MODULE(twinmill_native, m)
           "(W, H, 3) poses predicted at `ends` from the poses at `starts`.");
     m.def(
         "window_errors", &WindowErrorsOf, "model"_a, "track"_a, "starts"_a, "ends"_a, "names"_a,
-        "values"_a, "start"_a, "measured"_a, "weight"_a,
+        "values"_a, "start"_a, "measured"_a, "weight"_a, "part"_a = nb::none(),
         "(B, R) weighted errors for B rows of values, on all cores: displacements measured (W, H, "
-        "3) less predicted, seen from `start` (W, 3); 0 where there is none.");
+        "3) less predicted, seen from `start` (W, 3); 0 where there is none. With `part` (W,) (1, R): "
+        "each window by the row of its number alone.");
     m.def("mix", &MixedDuties, "speed_input_pct"_a, "turn_input_milli"_a,
           "Duties in percent (fl, fr, rl, rr) that the firmware gives at these inputs.");
     m.def("in_view", &InViewOf, "model"_a, "self"_a, "poses"_a, "position_m"_a, "heading_rad"_a,

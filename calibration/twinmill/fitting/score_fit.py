@@ -111,7 +111,8 @@ class ScoreFit:
         ]
         self.names = [[parts[c].name for c in own] for own in self.columns]
         self.passes = 0
-        self._begun: list[np.ndarray] = []  # rows of each data set at x, where they are known
+        # (P,) values at which the rows of each data set are known.
+        self._known: tuple[np.ndarray, list[np.ndarray]] | None = None
 
     def _unknowns(self) -> list[Unknown]:
         stated = [
@@ -181,10 +182,10 @@ class ScoreFit:
         """(R,) rows of each data set at (P,) values."""
         return [self.batch(i, x[None])[0] for i in range(len(self.datasets))]
 
-    def _slopes(
-        self, x: np.ndarray, known: Sequence[np.ndarray] = ()
-    ) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Rows of each data set, which may be known, and (R, P_i) slopes by its own columns."""
+    def _slopes(self, x: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Rows of each data set, and (R, P_i) slopes by its own columns."""
+        at, known = self._known or (None, [])
+        known = known if np.array_equal(at, x) else []
         up = np.where(x + self.step <= self.high, self.step, -self.step)
         both = self.central & (x + self.step <= self.high) & (x - self.step >= self.low)
         rows, slopes = [], []
@@ -361,7 +362,8 @@ class ScoreFit:
         rows = [self.batch(i, within) for i in range(len(self.datasets))]
         cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(within))]
         best = int(np.argmin(cost))
-        self.x, self._begun = within[best], [r[best] for r in rows]
+        self.x = within[best]
+        self._known = self.x, [r[best] for r in rows]
         self.usual[self._phases] = self.x[self._phases]
 
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
@@ -369,7 +371,7 @@ class ScoreFit:
         x, damping = self.x, 1e-3
         self.__dict__.pop("state", None)
         if len(x):
-            rows, slopes = self._slopes(x, self._begun)
+            rows, slopes = self._slopes(x)
             cost = self.cost(rows, x)
             for done in range(1, rounds + 1):
                 gram, pull = self._normal(rows, slopes, x)
@@ -387,12 +389,12 @@ class ScoreFit:
                     self.__dict__["state"] = (rows, slopes)
                     break
                 fell = cost - trial_cost
-                x, cost, rows, damping = moved, trial_cost, then, max(damping / 10, 1e-9)
+                x, cost, damping = moved, trial_cost, max(damping / 10, 1e-9)
+                self._known = x, then
                 converged = fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2)
                 if converged or done == rounds:  # slopes are found where they are asked for
                     break
-                rows, slopes = self._slopes(x, rows)
-            self._begun = rows
+                rows, slopes = self._slopes(x)
         self.x = x
         self.store()
         return self
@@ -426,7 +428,7 @@ class ScoreFit:
     @cached_property
     def state(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Rows and slopes at the values found."""
-        return self._slopes(self.x, self._begun)
+        return self._slopes(self.x)
 
     @property
     def scores(self) -> np.ndarray:
@@ -464,11 +466,15 @@ class ScoreFit:
         self._find_phases_elsewhere(points)
         if sum(len(r) for r in rows) < FEW_ROWS:
             points = [self._without_part(k, x) for k, x in enumerate(points)]
-        held = []
-        for i in range(len(rows)):
-            each = self.batch(i, np.array(points))
-            held.append(each[self.datasets[i].part, np.arange(each.shape[1])])
-        return held
+        return [self._each_part(i, np.array(points)) for i in range(len(rows))]
+
+    def _each_part(self, i: int, points: np.ndarray) -> np.ndarray:
+        """(R,) of data set i, each part at its own one of (PARTS, P) values."""
+        own = np.ascontiguousarray(points[:, self.columns[i]])
+        if not own.shape[1]:
+            return self.batch(i, points[:1])[0]
+        self.passes += len(points)
+        return self.datasets[i].rows_by_part(self.models[i], self.names[i], own)
 
     def _find_phases_elsewhere(self, points: Sequence[np.ndarray]) -> None:
         """Sets phases of (P,) values for each part to those that the other parts tell.

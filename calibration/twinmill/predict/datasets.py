@@ -62,6 +62,10 @@ class ErrorDataset(Dataset, Protocol):
         """(B, R) errors over floor for B rows of values; squares add up to the score's."""
         ...
 
+    def rows_by_part(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        """(R,) the same, each part by its own one of PARTS rows of values."""
+        ...
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -191,6 +195,15 @@ class Trajectory:
         return native.window_errors(
             model, run, windows.starts, windows.ends, names, values, *self._displaced
         )
+
+    def rows_by_part(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        """See ErrorDataset."""
+        windows, run = self.windows, self.measurement.started
+        part = self.part.reshape(len(windows.starts), -1)[:, 0].copy()
+        (rows,) = native.window_errors(
+            model, run, windows.starts, windows.ends, names, values, *self._displaced, part
+        )
+        return rows
 
     @cached_property
     def _displaced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -107,6 +107,11 @@ class SteadyStates:
         ratios = self._cut((self._measured() - predicted) / self.floor())
         return np.nan_to_num(ratios).reshape(len(values), -1) * np.sqrt(self.judged)
 
+    def rows_by_part(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
+        """(R,) the same, each part by its own one of PARTS rows of values."""
+        rows = self.rows(model, names, values)
+        return rows[self.part, np.arange(rows.shape[1])]
+
     @property
     def judged(self) -> np.ndarray:
         """(R,) share of the squared score that each row would make up if all were 1."""

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "effects/effect.h"
+#include "effects/together.h"
 
 namespace twin
 {
@@ -42,64 +41,62 @@ constexpr ParameterSpec kParameters[] = {
 // A robot's wheels reach a patch one by one: its edge is about as wide as the robot.
 constexpr double kEdge_m = 0.1;
 
-// Robots that are looked at together: the processor goes on with one while it waits for the root
-// or the exponential of another.
-constexpr size_t kTogether = 8;
-using Each = std::array<double, kTogether>;
-
 // Of `count` places. (1 - tanh(u)) / 2 is 1 / (1 + exp(2 u)).
 Each Factors(const Each &x_m, const Each &y_m, size_t count, const Numbers &v)
 {
+    const double strength = v[0], middle_x_m = v[1], middle_y_m = v[2], radius_m = v[3];
     Each factors{};
     for (size_t i = 0; i < count; ++i)
     {
-        const double dx_m = x_m[i] - v[1], dy_m = y_m[i] - v[2];
-        factors[i] = 2 / kEdge_m * (std::sqrt(dx_m * dx_m + dy_m * dy_m) - v[3]);
+        const double dx_m = x_m[i] - middle_x_m, dy_m = y_m[i] - middle_y_m;
+        factors[i] = 2 / kEdge_m * (std::sqrt(dx_m * dx_m + dy_m * dy_m) - radius_m);
     }
     for (size_t i = 0; i < count; ++i)
         factors[i] = std::exp(factors[i]);
     for (size_t i = 0; i < count; ++i)
-        factors[i] = 1 - v[0] / (1 + factors[i]);
+        factors[i] = 1 - strength / (1 + factors[i]);
     return factors;
 }
 
 // Takes the factor at the middle of the step's way: right to second order.
-void Some(std::span<GroundSignals> robots, const Numbers &v)
+void Steps(EachGround &robots, const Numbers &v)
 {
-    Each x_m{}, y_m{};
-    for (size_t i = 0; i < robots.size(); ++i)
+    if (v[0] == 0)
+        return;
+    const EachPose &pose = robots.pose;
+    const Each begun = Factors(pose.x_m, pose.y_m, robots.count, v);
+    Each half_s{}, turned_rad{}, x_m{}, y_m{};
+    for (size_t i = 0; i < robots.count; ++i)
     {
-        x_m[i] = robots[i].x_m;
-        y_m[i] = robots[i].y_m;
+        half_s[i] = robots.dt_s / 2 * begun[i];
+        turned_rad[i] = robots.omega_radps[i] * (half_s[i] / 2);
     }
-    const Each begun = Factors(x_m, y_m, robots.size(), v);
-    for (size_t i = 0; i < robots.size(); ++i)
+    const Turns turns(turned_rad, robots.count);
+    for (size_t i = 0; i < robots.count; ++i)
     {
-        const GroundSignals &s = robots[i];
-        const double half_s = s.dt_s / 2 * begun[i];
-        const auto [c, d] = s.AheadAfter(half_s / 2);
-        x_m[i] += half_s * (c * s.vx_mps - d * s.vy_mps);
-        y_m[i] += half_s * (d * s.vx_mps + c * s.vy_mps);
+        const Direction turn{turns.cos[i], turned_rad[i] * turns.sin_over[i]};
+        const auto [c, d] = Direction{pose.c[i], pose.s[i]}.Turned(turn);
+        x_m[i] = pose.x_m[i] + half_s[i] * (c * robots.vx_mps[i] - d * robots.vy_mps[i]);
+        y_m[i] = pose.y_m[i] + half_s[i] * (d * robots.vx_mps[i] + c * robots.vy_mps[i]);
     }
-    const Each middle = Factors(x_m, y_m, robots.size(), v);
-    for (size_t i = 0; i < robots.size(); ++i)
+    const Each middle = Factors(x_m, y_m, robots.count, v);
+    for (size_t i = 0; i < robots.count; ++i)
     {
-        robots[i].vx_mps *= middle[i];
-        robots[i].vy_mps *= middle[i];
-        robots[i].omega_radps *= middle[i];
+        robots.vx_mps[i] *= middle[i];
+        robots.vy_mps[i] *= middle[i];
+        robots.omega_radps[i] *= middle[i];
     }
-}
-
-void Steps(std::span<GroundSignals> robots, const Numbers &v)
-{
-    for (; v[0] != 0 && !robots.empty();
-         robots = robots.subspan(std::min(kTogether, robots.size())))
-        Some(robots.first(std::min(kTogether, robots.size())), v);
 }
 
 void Step(GroundSignals &s, const Numbers &v, double *)
 {
-    Steps({&s, 1}, v);
+    const EachPose pose{{s.x_m}, {s.y_m}, {s.theta_rad}, {s.ahead.c}, {s.ahead.s}};
+    EachGround alone{s.robot, s.t_s,      s.dt_s,     s.moves,        pose,
+                     1,       {s.vx_mps}, {s.vy_mps}, {s.omega_radps}};
+    Steps(alone, v);
+    s.vx_mps = alone.vx_mps[0];
+    s.vy_mps = alone.vy_mps[0];
+    s.omega_radps = alone.omega_radps[0];
 }
 
 }  // namespace

@@ -13,21 +13,25 @@ namespace twin
 // shares are multiplied: a division takes the time of many products.
 constexpr double kSmallSquare = 0.0025;
 
+inline double SmallSinOver(double square)
+{
+    return 1 - square * (1.0 / 6) * (1 - square * (1.0 / 20) * (1 - square * (1.0 / 42)));
+}
+
+inline double SmallCos(double square)
+{
+    return 1 - square * (1.0 / 2) * (1 - square * (1.0 / 12) * (1 - square * (1.0 / 30)));
+}
+
 // sin(a) / a
 inline double SinOver(double a)
 {
-    const double square = a * a;
-    return square < kSmallSquare
-               ? 1 - square * (1.0 / 6) * (1 - square * (1.0 / 20) * (1 - square * (1.0 / 42)))
-               : std::sin(a) / a;
+    return a * a < kSmallSquare ? SmallSinOver(a * a) : std::sin(a) / a;
 }
 
 inline double Cos(double a)
 {
-    const double square = a * a;
-    return square < kSmallSquare
-               ? 1 - square * (1.0 / 2) * (1 - square * (1.0 / 12) * (1 - square * (1.0 / 30)))
-               : std::cos(a);
+    return a * a < kSmallSquare ? SmallCos(a * a) : std::cos(a);
 }
 
 // A vector of length 1: cosine and sine of its angle.

@@ -23,6 +23,8 @@
 namespace twin
 {
 
+struct EachGround;  // in effects/together.h
+
 // A compiled formula, of those effects that have one.
 class Formula;
 // It was asked at steps, and had a finite value at none.
@@ -56,7 +58,7 @@ struct OnGround
     void (*step)(GroundSignals &, const Numbers &, double *state);
     // The same of several robots, where that is quicker than one after the other: of an effect
     // without state alone.
-    void (*steps)(std::span<GroundSignals>, const Numbers &) = nullptr;
+    void (*steps)(EachGround &, const Numbers &) = nullptr;
 };
 struct OnBody
 {

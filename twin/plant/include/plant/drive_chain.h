@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "effects/together.h"
 #include "model_file/model.h"
 #include "plant/kinematics.h"
 #include "plant/plant.h"
@@ -54,23 +55,32 @@ public:
             twist.vy_mps += kinematics_.SidewaysOfTurning(twist.omega_radps);
         return twist;
     }
-    // The second without noise, of several robots whose wheels move alike: their signals before the
-    // effects of the ground, and these. memory(i) is what effects remember of robot i.
-    GroundSignals BeforeGround(const Twist &geared, bool moves, const Pose2 &pose,
-                               const Direction &ahead, double t_s, double dt_s) const
-    {
-        return {robot_,         t_s,   dt_s,          moves,         pose.x_m,          pose.y_m,
-                pose.theta_rad, ahead, geared.vx_mps, geared.vy_mps, geared.omega_radps};
-    }
+    // The second without noise, of the first `count` of several robots whose wheels move alike.
+    // memory(i) is what effects remember of robot i.
     template <class Memory>
-    void ActOnGround(std::span<GroundSignals> robots, Memory memory) const
+    EachGround OnFloor(const Rolling &rolling, const EachPose &pose, size_t count, double t_s,
+                       double dt_s, Memory memory) const
     {
+        EachGround robots{robot_, t_s, dt_s, rolling.moves, pose, count};
+        const Twist geared = Geared(rolling);
+        robots.vx_mps.fill(geared.vx_mps);
+        robots.vy_mps.fill(geared.vy_mps);
+        robots.omega_radps.fill(geared.omega_radps);
         for (const Bound<OnGround> &bound : ground_)
+        {
             if (bound.act.steps)
+            {
                 bound.act.steps(robots, bound.numbers);
-            else
-                for (size_t i = 0; i < robots.size(); ++i)
-                    bound.act.step(robots[i], bound.numbers, memory(i) + bound.state_offset);
+                continue;
+            }
+            for (size_t i = 0; i < count; ++i)
+            {
+                GroundSignals alone = robots.At(i);
+                bound.act.step(alone, bound.numbers, memory(i) + bound.state_offset);
+                robots.Take(i, alone);
+            }
+        }
+        return robots;
     }
 
     // Observe stage: the pose and time stamp that motion capture reports, and the way back.

@@ -18,13 +18,20 @@ Pose2 AlongArc(const Pose2 &from, const Twist &twist, double dt_s);
 class Course
 {
 public:
-    explicit Course(const Pose2 &start) : pose_(start), ahead_(Direction::Of(start.theta_rad)) {}
+    explicit Course(const Pose2 &start) : Course(start, Direction::Of(start.theta_rad)) {}
+    Course(const Pose2 &start, const Direction &ahead) : pose_(start), ahead_(ahead) {}
 
     void Follow(const Twist &v, double dt_s)
     {
         const double half_rad = v.omega_radps * dt_s / 2;
-        const double over = SinOver(half_rad), chord_s = dt_s * over;
-        const Direction turn{Cos(half_rad), half_rad * over}, middle = ahead_.Turned(turn);
+        Follow(v, dt_s, half_rad, Cos(half_rad), SinOver(half_rad));
+    }
+
+    // The same with the cosine of half the turn, and its sine over it.
+    void Follow(const Twist &v, double dt_s, double half_rad, double cos, double sin_over)
+    {
+        const double chord_s = dt_s * sin_over;
+        const Direction turn{cos, half_rad * sin_over}, middle = ahead_.Turned(turn);
         pose_.x_m += chord_s * (middle.c * v.vx_mps - middle.s * v.vy_mps);
         pose_.y_m += chord_s * (middle.s * v.vx_mps + middle.c * v.vy_mps);
         pose_.theta_rad += 2 * half_rad;
@@ -37,6 +44,45 @@ public:
 private:
     Pose2 pose_;
     Direction ahead_;
+};
+
+// Courses of a few robots that are moved together.
+class Courses
+{
+public:
+    const EachPose &poses() const { return poses_; }
+
+    Course At(size_t i) const
+    {
+        return {{poses_.x_m[i], poses_.y_m[i], poses_.theta_rad[i]}, {poses_.c[i], poses_.s[i]}};
+    }
+
+    void Take(size_t i, const Course &course)
+    {
+        poses_.x_m[i] = course.pose().x_m;
+        poses_.y_m[i] = course.pose().y_m;
+        poses_.theta_rad[i] = course.pose().theta_rad;
+        poses_.c[i] = course.ahead().c;
+        poses_.s[i] = course.ahead().s;
+    }
+
+    void Follow(const EachGround &robots)
+    {
+        Each half_rad{};
+        for (size_t i = 0; i < robots.count; ++i)
+            half_rad[i] = robots.omega_radps[i] * robots.dt_s / 2;
+        const Turns turns(half_rad, robots.count);
+        for (size_t i = 0; i < robots.count; ++i)
+        {
+            Course course = At(i);
+            course.Follow({robots.vx_mps[i], robots.vy_mps[i], robots.omega_radps[i]}, robots.dt_s,
+                          half_rad[i], turns.cos[i], turns.sin_over[i]);
+            Take(i, course);
+        }
+    }
+
+private:
+    EachPose poses_;
 };
 
 // Moves one robot by `dt_s`: wheels, ground velocity, then the exact arc at constant velocity.

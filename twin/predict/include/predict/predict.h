@@ -5,6 +5,8 @@
 #define PREDICT_PREDICT_H
 
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,6 +15,14 @@
 
 namespace twin
 {
+
+// The steps of a track between some of its poses.
+struct Plan;
+struct LastPlan
+{
+    std::mutex held;
+    std::shared_ptr<const Plan> plan;
+};
 
 // A measured run of one robot; the arrays belong to the caller. Times ascend.
 struct Track
@@ -23,6 +33,8 @@ struct Track
     std::span<const double> pose_t_s;     // (N), capture's clock
     std::span<const double> pose;         // (N, 3): x_m, y_m, theta_rad of the marker body
     std::span<const int64_t> segment;  // (N), -1 = unusable; poses of one segment belong together
+    // Where the plan of one call is kept for the next one, which most often needs the same.
+    LastPlan *last_plan = nullptr;
 };
 
 // For each pose the one predicted from the pose before it: (N, 3), NaN at the start of a segment.
@@ -40,12 +52,14 @@ std::vector<double> PredictWindows(const Model &model, const Track &track,
                                    std::span<const int64_t> starts, std::span<const int64_t> ends);
 
 // The same for many parameter vectors, (B, W, H, 3), on all cores. Row b of `values` (B, P) sets
-// the quantities `names` of `model`.
+// the quantities `names` of `model`. With `part` (W) each window is predicted by the row of its
+// number alone: (1, W, H, 3).
 std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                                         std::span<const int64_t> starts,
                                         std::span<const int64_t> ends,
                                         const std::vector<std::string> &names,
-                                        std::span<const double> values);
+                                        std::span<const double> values,
+                                        std::span<const int64_t> part = {});
 
 // What predictions over windows are compared with, as it is seen from the start of each.
 struct Displaced
@@ -61,7 +75,8 @@ std::vector<double> WindowErrorsBatch(const Model &model, const Track &track,
                                       std::span<const int64_t> starts,
                                       std::span<const int64_t> ends,
                                       const std::vector<std::string> &names,
-                                      std::span<const double> values, const Displaced &displaced);
+                                      std::span<const double> values, const Displaced &displaced,
+                                      std::span<const int64_t> part = {});
 
 // What motion capture would have reported had this model driven: (N, 3), each segment started at
 // its first measured pose, with the model's drive and sensor noise.
