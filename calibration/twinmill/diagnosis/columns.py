@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hundreds of columns over the rows of logs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,11 +22,21 @@ class Columns:
     pieces: Sequence[np.ndarray]
 
     @classmethod
-    def beside(cls, logs: Sequence[Sequence[np.ndarray]]) -> "Columns":
-        """Of pieces of each log, as many of each; the logs' rows one after the other."""
-        if len(logs) == 1:
-            return cls(logs[0])
-        return cls([np.concatenate(own) for own in zip(*logs, strict=True)])
+    def beside(cls, logs: Iterable[Sequence[np.ndarray]], count: int) -> "Columns":
+        """Of pieces of each log, as many of each; the logs' rows, `count`, one after the other.
+
+        Each log's pieces are made once those before are copied, into the memory that they leave.
+        """
+        pieces: list[np.ndarray] = []
+        first = 0
+        for own in logs:
+            if len(own[0]) == count:
+                return cls(own)
+            pieces = pieces or [np.empty((count, p.shape[1])) for p in own]
+            for whole, part in zip(pieces, own, strict=True):
+                whole[first : first + len(part)] = part
+            first += len(own[0])
+        return cls(pieces)
 
     @cached_property
     def _place(self) -> np.ndarray:

@@ -5,7 +5,7 @@ Of the body: terms in its velocity, its changes, heading, place, time and voltag
 in its command. Each comes with how the rows of a fit change by it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,19 +72,21 @@ def library(
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     families = families_of(opened, velocities)
-    pieces = []
-    for k, (own, model) in enumerate(pairs):
-        body = _body_columns(own, velocities[k], values[k], sizes)
-        swells = [
-            w.columns(own, velocities[k], a[k])
-            for w, a in zip(waves, (times_s, ways_m), strict=True)
-        ]
-        narrow = [f.columns(own, velocities[k]) for f in families]
-        of_wheel = _wheel_columns(own, model, of_wheels)
-        pieces.append([body, body @ parts, *swells, *narrow, of_wheel])
+
+    def pieces() -> Iterator[list[np.ndarray]]:
+        for k, (own, model) in enumerate(pairs):
+            body = _body_columns(own, velocities[k], values[k], sizes)
+            swells = [
+                w.columns(own, velocities[k], a[k])
+                for w, a in zip(waves, (times_s, ways_m), strict=True)
+            ]
+            narrow = [f.columns(own, velocities[k]) for f in families]
+            yield [body, body @ parts, *swells, *narrow, _wheel_columns(own, model, of_wheels)]
+
     of_families = [t for f in families for t in f.terms]
     every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
-    return every, Columns.beside(pieces), velocities
+    columns = Columns.beside(pieces(), sum(own.data.weight.size for own in opened))
+    return every, columns, velocities
 
 
 def _across(group: str, formula: str, to: str) -> str:

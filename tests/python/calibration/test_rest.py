@@ -495,3 +495,11 @@ def test_products_are_those_of_what_is_left_beside_what_is_free():
         assert products.moments[k, :4] == pytest.approx(left[here] @ rows[here][:, :4])
         assert products.energy[k, :4] == pytest.approx((rows[here][:, :4] ** 2).sum(0))
     assert not products.energy[:, 4].any() and not products.moments[:, 4].any()
+
+
+def test_columns_of_several_logs_stand_one_log_after_the_other():
+    random = np.random.default_rng(8)
+    logs = [[random.normal(size=(rows, width)) for width in (2, 3)] for rows in (4, 6)]
+    columns = Columns.beside(iter(logs), 10)
+    assert np.array_equal(columns.some(np.arange(5)), np.vstack([np.hstack(own) for own in logs]))
+    assert Columns.beside(iter(logs[:1]), 4).pieces is logs[0]  # of one log nothing is copied
