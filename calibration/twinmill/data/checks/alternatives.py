@@ -259,13 +259,16 @@ class Search:
             own: the columns as they are, at one shift.
             fewest: stretches before the jump, and after it.
         """
+        counts = np.arange(fewest, len(self.starts) - fewest + 1)
         found: list[Jump] = []
         for lag_s in self.felt:
             sums = self._by_shift(lag_s)
-            found += [
-                self._jump(replace(own, lag_s=lag_s), sums, split)
-                for split in range(fewest, len(self.starts) - fewest + 1)
-            ]
+            before = _left_by_first(sums, self.fold, counts)
+            power, along, total = sums
+            turned = power[:, ::-1], along[:, ::-1], total[::-1]
+            after = _left_by_first(turned, self.fold[::-1], len(total) - counts)
+            split = int(counts[np.argmin(before.min(axis=0) + after.min(axis=0))])
+            found.append(self._jump(replace(own, lag_s=lag_s), sums, split))
         return min(found, key=lambda jump: jump.explained.left)
 
     def _jump(
@@ -414,6 +417,27 @@ class Search:
         linear_p, linear_m = power[:, :, 1].sum(axis=1), along[:, :, 1].sum(axis=1)
         moves = linear_p > NEGLIGIBLE * linear_p.max(axis=1, keepdims=True)
         return left, np.where(moves, linear_m / np.maximum(linear_p, 1e-12), 0.0)
+
+
+def _left_by_first(
+    sums: tuple[np.ndarray, np.ndarray, np.ndarray], fold: np.ndarray, counts: np.ndarray
+) -> np.ndarray:
+    """(A, K) squares left of the first `counts` (K,) stretches, judged as by `Search._judged`.
+
+    Args: sums of stretches, as there; fold (B,) half that each stretch belongs to.
+    """
+    power, along, total = sums
+    halves = [
+        [np.cumsum(s * (fold == h)[:, None, None], axis=1)[:, counts - 1] for s in (power, along)]
+        for h in (0, 1)
+    ]
+    left = np.cumsum(total)[counts - 1]
+    for (here_p, here_m), (p, m) in (halves, halves[::-1]):
+        gain = np.maximum(m, 0) / np.maximum(p, 1e-12)
+        shape = np.argmax(gain * m, axis=2)[:, :, None]  # (A, K, 1, C)
+        best, p, m = (np.take_along_axis(a, shape, axis=2) for a in (gain, here_p, here_m))
+        left = left + (best**2 * p - 2 * best * m).sum(axis=(2, 3))
+    return left
 
 
 def _inverse(place: tuple[int, ...]) -> list[int]:
