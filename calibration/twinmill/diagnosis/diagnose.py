@@ -32,6 +32,7 @@ from twinmill.diagnosis.findings import (
     with_stale_numbers,
 )
 from twinmill.diagnosis.notes import (
+    answers_notes,
     disturbed_notes,
     few_commands_notes,
     geometry_notes,
@@ -102,6 +103,7 @@ TWO_CLOCKS = (
     "use one clock, say so (twinmill import "
     "--same-clock), or fit a calibration log on the same clocks first"
 )
+ANSWERED = "the commands answer how the robot strayed, and noise may look like it then"
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
 ONE_LOG = "it begins at a moment of one run, and these are several; diagnose one robot's log alone"
 CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
@@ -342,6 +344,11 @@ def _concluded(
         random=random,
         without=in_doubt,
     )
+    answers = answers_notes(known)
+    if answers and last.held_score <= SETTINGS.answered:
+        rest = rest.as_answers()
+    if answers and start.held_score <= SETTINGS.answered:
+        findings = [f if f.effect == REFIT else doubted(f, ANSWERED) for f in findings]
     if rest.proven and rest.proven.is_late:
         late = [f.effect for f in findings if f.effect in needing("changes")]
         instead = None if rest.proven.instead_of else _lacking(late, less, known)
@@ -416,6 +423,7 @@ def _concluded(
             *marker_notes(modelled),
             *heading_notes(last.fit.datasets, last.state.models),
             *few,
+            *answers,
             *weighed.notes,
             *([f"{to_look_at[0].upper()}{to_look_at[1:]}."] if alone else []),
         ],

@@ -152,6 +152,19 @@ def heading_notes(datasets: Sequence[ErrorDataset], models: Sequence[native.Mode
     ]
 
 
+def answers_notes(opened: Sequence[Opened]) -> list[str]:
+    """A sentence where commands answer how the robot strayed: what that leaves open."""
+    own = [o.measurement.label for o in opened if o.floor and o.floor.answered]
+    if not own:
+        return []
+    return [
+        f"{', '.join(own)}: the commands answer how the robot strayed, as a controller's do, so "
+        f"that they tell of noise. What is left up to {SETTINGS.answered} times the noise may be "
+        "that, and is not told; a drive by a script, that does not look at the robot, would tell "
+        "more."
+    ]
+
+
 def few_commands_notes(opened: Sequence[Opened]) -> list[str]:
     """A sentence where the logs have few commands: the model at others is a guess."""
     few = of_few_commands(opened)

@@ -124,6 +124,12 @@ class Rest:
         """As no news: what it depends on, the model missed on the logs that it was fitted to."""
         return replace(self, firm=False, depends_on=[], old=(*self.old, *self.depends_on))
 
+    def as_answers(self) -> "Rest":
+        """As what a controller's answers may make of noise, of which nothing can be told."""
+        return replace(
+            self, firm=False, far=False, depends_on=[], likely=False, term=None, proven=None
+        )
+
     def at_few_commands(self) -> "Rest":
         """Without steady speeds, where little is left: at few commands the base may make them."""
         if not self.little:

@@ -119,6 +119,7 @@ class Settings(Numbers):
     formula_goes_on: float = number(
         0.5, "share of its gain on the last 40 % of a log that the first 60 % must predict"
     )
+    answered: float = number(1.5, "score up to which answers of a controller may be all")
     no_noise: float = number(
         1.5, "errors of so many times the noise are none, however few there are"
     )

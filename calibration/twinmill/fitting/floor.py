@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import twinmill_native as native
 
+from twinmill.fitting.answers import are_answers
 from twinmill.fitting.dependence import (
     INSTANT_S,
     beat,
@@ -58,6 +59,7 @@ class NoiseFloor:
         lateness_s: lag and delay of the base refitted to the log; NaN where the clocks are two.
         across: (W, H, 3) errors of the response on parts that it was not fitted to.
         response: itself.
+        answered: later commands tell of earlier errors, so that the floor is too low.
     """
 
     rms: np.ndarray
@@ -69,6 +71,7 @@ class NoiseFloor:
     lateness_s: float
     across: np.ndarray
     response: Response | None
+    answered: bool = False
 
     def thinned(self, every: int) -> "NoiseFloor":
         """The same, seen from every Nth start alone."""
@@ -118,6 +121,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         lateness_s=base.get(LAG) + (base.get("input_delay.delay_s") if same_clock else np.nan),
         across=response.across,
         response=response,
+        answered=are_answers(data.measured - moved, across, data.start_s),
     )
 
 

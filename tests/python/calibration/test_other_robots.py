@@ -17,9 +17,12 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.notes import geometry_notes
 from twinmill.experiment.design import Limits, check, design
 from twinmill.fitting.add import add
+from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_run
+
+CART_S, LOST_S, GAIN_PER_S = 0.02, 0.5, 2.5  # of a cart whose turns are disturbed
 
 OMNI4 = """
 name = "omni4"
@@ -264,6 +267,40 @@ def strafing_log(folder, number, held_rad, random, period_s=0.05):
     log = folder / f"run{number}.lcmlog"
     import_log(poses, commands, log, options=ImportOptions(robot_id=number, same_clock=True))
     return log
+
+
+def strays(random):
+    """Turns that nobody told, rad/s: first order, 0.5 s, 0.06 rad/s."""
+    kicks = 0.06 * np.sqrt(2 * CART_S / LOST_S) * random.normal(size=6000)
+    return lfilter([1], [1, CART_S / LOST_S - 1], kicks)
+
+
+def drive(stray_radps, sees):
+    """(K, 2) told and driven, by a controller that sees how it strays or not; 4 s a course."""
+    random, heading, told = np.random.default_rng(8), 0.0, []
+    course = np.repeat(random.uniform(-1.5, 1.5, len(stray_radps) // 200), 200)
+    for wanted, stray in zip(course, stray_radps, strict=True):
+        turn = float(np.clip(GAIN_PER_S * (wanted - heading), -1.0, 1.0))
+        heading += CART_S * (turn + stray * sees)
+        told.append((0.2, turn))
+    told = np.array(told)
+    return told, told + np.column_stack([0 * stray_radps, stray_radps])
+
+
+@pytest.mark.parametrize("seed", [17, 27])
+def test_what_a_controller_answers_is_not_called_missing(seed, tmp_path):
+    """The model is right, and what disturbs the cart is chance, which its controller sees."""
+    told, driven = drive(strays(np.random.default_rng(seed)), sees=True)
+    log = cart_log(tmp_path, "run", told, driven, np.random.default_rng(9))
+    found = diagnose(load_measurements([log]), model_file(tmp_path, CART))
+    assert found.before.score > 1.3  # it looks as if something were missing
+    assert found.opened[0].floor.answered
+    assert any("answer how the robot strayed" in note for note in found.notes)
+    assert not found.rest.firm and not found.found and found.verdict != "outside_catalogue"
+    told, driven = drive(strays(np.random.default_rng(seed)), sees=False)
+    blind = cart_log(tmp_path, "blind", told, driven, np.random.default_rng(9))
+    (opened,) = open_measurements(load_measurements([blind]), model_file(tmp_path, CART))
+    assert not opened.floor.answered
 
 
 def diagnosed_cart(folder, told, driven, random, period_s=0.02):

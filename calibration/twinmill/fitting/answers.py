@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether commands answer how the robot strayed, as those of a controller do that sees it.
+
+What the robot is told can say nothing of what disturbed it before. Where a controller closes the
+loop, it does: commands late in a prediction tell of errors early in it, and a response to commands
+that is fitted to where predictions end is better than any physics can be (Ljung 1999, section
+13.4). The noise floor is too low then.
+"""
+
+import numpy as np
+
+from twinmill.predict.windows import HORIZONS_S
+
+EARLY, LATE = HORIZONS_S.index(1.0), HORIZONS_S.index(2.0)
+BLOCK_S = 8.0  # stretches whose errors are taken as independent
+FEWEST = 4  # of them
+LEAST = 0.2  # early error for each metre or radian that late commands add
+SURE = 3.0  # standard errors
+
+
+def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bool:
+    """Whether what late commands make a response add goes with errors from before them.
+
+    By least squares beside what early commands add, in any channel; standard errors by leaving out
+    a stretch at a time.
+
+    Args:
+        errors: (W, H, 3) of a physical model's predictions.
+        left: (W, H, 3) of a response's, on parts that it was not fitted to; NaN where not judged.
+        start_s: (W,) begins of the predictions.
+    """
+    added = errors - left
+    late = added[:, LATE] - added[:, EARLY]
+    block = np.floor((start_s - start_s[0]) / BLOCK_S).astype(int)
+    return any(
+        _goes_with(left[:, EARLY, c], added[:, EARLY, c], late[:, c], block) for c in range(3)
+    )
+
+
+def _goes_with(y: np.ndarray, beside: np.ndarray, late: np.ndarray, block: np.ndarray) -> bool:
+    rows = np.column_stack([beside, late, y])
+    seen = np.isfinite(rows).all(axis=1)
+    if not seen.any():
+        return False
+    rows, (_, own) = rows[seen], np.unique(block[seen], return_inverse=True)
+    grams = np.zeros((own.max() + 1, 3, 3))
+    np.add.at(grams, own, rows[:, :, None] * rows[:, None, :])
+    whole = grams.sum(axis=0)
+    if len(grams) < FEWEST or np.linalg.matrix_rank(whole[:2, :2], hermitian=True) < 2:
+        return False
+    without = whole - grams
+    slopes = np.linalg.solve(without[:, :2, :2], without[:, :2, 2:])[:, 1, 0]
+    slope = np.linalg.solve(whole[:2, :2], whole[:2, 2])[1]
+    std = np.sqrt((len(slopes) - 1) * np.var(slopes))
+    return bool(slope > max(LEAST, SURE * std))

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands that answer how the robot strayed, by the algebra of least squares."""
+
+import numpy as np
+
+from twinmill.fitting.answers import are_answers
+
+WINDOWS, HORIZONS, EVERY_S = 480, 5, 0.25
+
+
+def predictions(random, answer):
+    """(W, H, 3) errors of a model and of a response, and (W,) starts; 1 m of early error.
+
+    Commands add 1 m at random early and late, and late what they answer to the early error.
+    """
+    early, before, script, noise = random.normal(size=(4, WINDOWS))
+    late = script + answer * early
+    errors, left = np.full((2, WINDOWS, HORIZONS, 3), np.nan)
+    left[:, 3, 0], errors[:, 3, 0] = early, early + before
+    errors[:, 4, 0] = early + before + late + noise
+    left[:, 4, 0] = early + noise
+    return errors, left, EVERY_S * np.arange(WINDOWS)
+
+
+def test_late_commands_that_hold_early_errors_are_answers():
+    """Early error on late commands has the slope a / (1 + a^2), by least squares."""
+    random = np.random.default_rng(1)
+    assert all(are_answers(*predictions(random, 0.5)) for _ in range(20))
+    by_script = [are_answers(*predictions(random, 0.0)) for _ in range(200)]
+    assert np.mean(by_script) < 0.02  # three standard errors to one side: 0.1 %
