@@ -125,7 +125,12 @@ class Rest:
         return replace(self, firm=False, depends_on=[], old=(*self.old, *self.depends_on))
 
     def as_answers(self) -> "Rest":
-        """As what a controller's answers may make of noise, of which nothing can be told."""
+        """As what a controller's answers may make of noise, of which nothing can be told.
+
+        What follows place or time, or comes at moments, no answer makes.
+        """
+        if {PLACE, TIME, MOMENTS} & set(self.depends_on):
+            return self
         return replace(
             self, firm=False, far=False, depends_on=[], likely=False, term=None, proven=None
         )
