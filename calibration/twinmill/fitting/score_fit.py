@@ -625,22 +625,32 @@ class ScoreFit:
         """(P,) how many times wider than by blocks data sets scatter; 1 where that may be chance.
 
         Blocks of one run share what differs from run to run: then runs are what counts as
-        independent (Cameron and Miller 2015, section II). By leaving out a data set at a time.
+        independent (Cameron and Miller 2015, section II). By where each of them would be alone:
+        left out, one that disagrees moves little, since it has little weight.
 
         Args:
             within: (P,) variances by leaving out blocks.
         """
-        members = [len(u.members) for u in self.unknowns]
+        members = np.array([len(u.members) for u in self.unknowns], int)
         wider = np.ones(len(members))
         if max(members, default=0) < FEWEST_BLOCKS:
             return wider
-        whole = [np.zeros(len(d.block), int) for d in self.datasets]
-        square = sum(self._moved_without_each(i, one)[0] ** 2 for i, one in enumerate(whole))
-        for c, count in enumerate(members):
-            ratio = square[c] * (count - 1) / count / max(within[c], 1e-300)
-            if count >= FEWEST_BLOCKS and f_above(ratio, count - 1, self.blocks - 1) < CHANCE:
+        square = sum(self._alone(i) ** 2 for i in range(len(self.datasets)))
+        for c in np.flatnonzero(members >= FEWEST_BLOCKS):
+            count = int(members[c])
+            ratio = square[c] / (count * (count - 1)) / max(within[c], 1e-300)
+            if f_above(ratio, count - 1, self.blocks - 1) < CHANCE:
                 wider[c] = np.sqrt(ratio)
         return wider
+
+    def _alone(self, i: int) -> np.ndarray:
+        """(P,) Newton's step of data set i by itself; what it does not tell stays."""
+        rows, slopes, own = self.state[0][i], self.state[1][i], self.columns[i]
+        weighted = slopes * self.weight(i, rows)[:, None]
+        gram = weighted.T @ slopes + np.diag(1 / self.std[own] ** 2)
+        step = np.zeros(len(self.x))
+        step[own] = -np.linalg.lstsq(gram, weighted.T @ rows, rcond=None)[0]
+        return step
 
     def _jackknife(self, block_s: float | None) -> np.ndarray:
         """(P, P) covariance by leaving out blocks of this length; None: as the data sets have them.
