@@ -333,7 +333,7 @@ def _concluded(
     fitted = {id(o.measurement): o.with_fitted(m) for o, m in models}
     after = [fitted.get(id(o.measurement), o) for o in opened]
     modelled = [r.modelled.fitted(o.model) for r, o in zip(before.robots, after, strict=True)]
-    scatters = scatters_of(opened, [s.noise and s.noise_at_speed for s in modelled], model_file)
+    scatters = scatters_of(after, [s.noise and s.noise_at_speed for s in modelled], model_file)
     random = is_random(scatters, last.held_score)
     rest = rest_of(
         formulas,
@@ -370,7 +370,7 @@ def _concluded(
     if rest.firm and unsure and not rest.depends_on:
         rest = rest.most_likely(acted_on(findings, 0.0))
     disturbed = [] if events else disturbed_notes(after)
-    noise = irregularity_notes(opened, scatters)
+    noise = irregularity_notes(after, scatters)
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]
     faint_names = [name for name, _ in faint]
@@ -394,7 +394,7 @@ def _concluded(
     if weighed.verdict == "outside_catalogue":
         rest = rest.with_first(acted_on(findings, rest.least))
         weighed = replace(weighed, rest=rest)
-    drives = drives_for(faint_names, _shown(done, faint), first.model.wheel_kind)
+    drives = drives_for(faint_names, _shown(done, named), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
     late = lateness(done, findings, same_clock)
     drive = _next(findings, drives, faint, weighed.verdict, same_clock=same_clock)
@@ -502,9 +502,9 @@ def _instead_of_drift(score: float, done: Search, first: State, usual: float) ->
     return instead_of_drift(first, done.rounds[0].before, done.settings)
 
 
-def _shown(done: Search, hidden: Sequence[tuple[str, str]]) -> list[str]:
-    """Effects that would be seen if they were there."""
-    names = {name for name, _ in hidden} | {REFIT}
+def _shown(done: Search, named: Collection[str]) -> list[str]:
+    """Effects that were named, or would be if one more of them were there."""
+    names = {name for name, _ in done.without_trace if name not in named} | {REFIT}
     return [s.name for s in done.rounds[-1].screened if s.name not in names]
 
 

@@ -2,6 +2,7 @@
 """What logs and a fitted base say beside effects: stamps, wheel geometry, irregular motion."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import twinmill_native as native
@@ -14,7 +15,7 @@ from twinmill.model.parameters import HEADING, drives_sideways
 from twinmill.predict.datasets import ErrorDataset, Trajectory
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import ChannelNoise, Noise
-from twinmill.predict.windows import HORIZONS_S
+from twinmill.predict.windows import HORIZONS_S, rms
 
 MOST_TOLD = 3  # stretches
 NOTABLE = 0.01  # change of a gain that is worth a sentence
@@ -61,7 +62,7 @@ def scatters_of(
     """How many times less regular each log is than the model's noise says; 0 where none is known.
 
     Args:
-        opened: logs over their floors; tables have no noise.
+        opened: logs over their floors, with what was found in them; tables have no noise.
         noises: that each shows.
         model_file: what it states of the disturbance was told by another log.
     """
@@ -69,9 +70,21 @@ def scatters_of(
     if model.get("noise.drive_mps") <= 0:
         return [0.0] * len(opened)
     return [
-        irregularity(own, noise, model, known_mps) if noise and own.data else 0.0
+        irregularity(_no_more_than_left(own), noise, model, known_mps)
+        if noise and own.data
+        else 0.0
         for own, noise in zip(opened, noises, strict=True)
     ]
+
+
+def _no_more_than_left(own: Opened) -> Opened:
+    """The same over a floor that is nowhere above what its model leaves.
+
+    The smooth response is the same all the time: a loss for a while, or a slew, it cannot follow,
+    and has it for noise. What a model explains is none.
+    """
+    left = np.where(own.data.keep[:, None, None], own.data.errors(own.model), np.nan)
+    return replace(own, floor=replace(own.floor, rms=np.fmin(own.floor.rms, rms(left))))
 
 
 def is_random(scatters: Sequence[float], score: float) -> bool:
@@ -89,8 +102,8 @@ def irregularity_notes(opened: Sequence[Opened], scatters: Sequence[float]) -> l
     """A sentence for each log that is far less regular than the model's noise says.
 
     The floor of a log is what no smooth response to its commands follows. Where it is far above the
-    disturbance that the model file states, something is there that such a response cannot follow
-    either: play, joints between tiles, drop-outs, or more noise.
+    disturbance that the model file states, and what was found leaves no less, something is there
+    that such a response cannot follow either: play, joints between tiles, drop-outs, or more noise.
     """
     return [
         f"{own.measurement.label}: the unexplained scatter is {scatter:.1f} times the noise in "

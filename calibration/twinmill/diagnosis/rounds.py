@@ -64,7 +64,16 @@ class Search:
 
     @property
     def faint(self) -> list[tuple[str, str]]:
-        """Effects that could be there and not be seen, and why; none that a trial made likely."""
+        """Effects that could be there and not be seen, and why; none that the model has.
+
+        Beside a slew limit that is in the model, another one does nothing: so it has no trace.
+        """
+        had = {name.split("#")[0] for name in self.last.state.model.effects}
+        return [(name, why) for name, why in self.without_trace if name not in had]
+
+    @property
+    def without_trace(self) -> list[tuple[str, str]]:
+        """Effects of which one more would not be seen, and why; none that a trial made likely."""
         trials = [t for t in self.rounds[-1].trials if t.evidence > self.settings.evidence]
         seen = {REFIT, *(n for t in trials for n in t.names)}
         hidden = []

@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import FEW, MOMENTS, NOISE, Rest
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.ties import of_levels
@@ -56,6 +57,7 @@ class VerdictInputs:
         if self._within_told:
             return "cannot_tell"
         outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
+        outweighed = outweighed or self._proven_instead
         if self.effects and not outweighed:
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
@@ -161,6 +163,20 @@ class VerdictInputs:
         if self._continuous and self.rest.share > SETTINGS.much:
             return True
         return self.rest.firm and self.rest.share > min(self._taken, SETTINGS.much_left)
+
+    @property
+    def _proven_instead(self) -> Formula | None:
+        """A formula that was proven in place of all effects that were found, all of them doubtful.
+
+        It takes more than they do, on stretches that neither chose nor fitted it.
+        """
+        proven = self.rest.proven
+        if not (proven and self.effects):
+            return None
+        instead = all(
+            f.certainty == "doubtful" and f.effect in proven.instead_of for f in self.effects
+        )
+        return proven if instead else None
 
     @property
     def _taken(self) -> float:
@@ -293,16 +309,20 @@ class VerdictInputs:
         events = self.rest.events.sentence
         if events and not self._outside:
             return f"What is missing acts at single moments alone. {events}"
-        named = [_plain(f) for f in self.effects]
+        proven = self._proven_instead
+        named = [] if proven else [_plain(f) for f in self.effects]
         named += ["a refit of the base"] if len(self.effects) < len(self.findings) else []
         also = f" Part of it is explained by {' and '.join(named)}." if named else ""
+        if proven:
+            also += f" It was found in place of {_in_turn([_named(f) for f in self.effects])}."
         depends = self.rest.depends_on and not self.rest.likely
         if self.noises and not (depends or self.rest.firm):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{self._most_likely}{also}"
         on = self.rest.on
         depends = f"it depends {on}" if on else "no formula that was tried describes it"
-        return f"Something outside the catalogue is there; {depends}.{also} {events}".rstrip()
+        what = f": {proven.equals}" if proven else ""
+        return f"Something outside the catalogue is there{what}; {depends}.{also} {events}".rstrip()
 
     @property
     def notes(self) -> list[str]:

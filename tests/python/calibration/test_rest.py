@@ -418,6 +418,34 @@ def test_much_that_is_left_and_depends_on_something_outweighs_a_doubtful_effect(
 
 
 @pytest.mark.parametrize(
+    ("certainty", "instead_of", "verdict"),
+    [
+        ("doubtful", ("heading_bias", "wheel_gain"), "outside_catalogue"),
+        ("sure", ("heading_bias", "wheel_gain"), "effect_missing"),
+        ("doubtful", ("heading_bias",), "effect_missing"),
+        ("doubtful", (), "effect_missing"),
+    ],
+)
+def test_a_formula_in_place_of_all_that_is_doubtful_is_told_first(certainty, instead_of, verdict):
+    """A robot that crabs by the square of its speed: two effects make up 0.1 vx |vx| between them.
+
+    Nothing is left beside them, so that what is left outweighs none of them.
+    """
+    equals = "vy_mps += 0.1*vx*abs(vx)"
+    found = [
+        Finding("heading_bias", None, [], 0.65, certainty, "a formula takes more"),
+        Finding("wheel_gain", None, [], 0.34, "doubtful", "a formula takes more"),
+    ]
+    proven = SimpleNamespace(equals=equals, instead_of=instead_of)
+    rest = Rest(0.01, False, ["speed"], proven=proven)
+    weighed = VerdictInputs(1.75, 1.75, 1.75, 1.01, found, rest, [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    outside = f"Something outside the catalogue is there: {equals}; it depends on speed."
+    assert weighed.sentence.startswith(outside) == (verdict == "outside_catalogue")
+    assert all(f.effect in weighed.sentence for f in found)
+
+
+@pytest.mark.parametrize(
     ("of_base", "of_effect", "verdict"),
     [
         (0.55, 0.43, "effect_missing"),  # together they take all that was above the noise
