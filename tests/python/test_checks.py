@@ -359,6 +359,31 @@ def test_wheels_on_which_alike_commands_are_a_turn_are_not_called_astray(robot):
     assert track.astray_rad == pytest.approx(-np.pi / 2, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("headings_rad", "turned_rad", "flipped", "astray_rad"),
+    [
+        ((0.3, 1.5, 2.7, -0.9), 0.0, None, 0.0),
+        ((0.3, 1.5, 2.7, -0.9), 0.8, None, 0.8),
+        ((0.3, 1.5, 2.7, -0.9), 0.0, "x", 0.0),
+        ((0.3, 1.5, 2.7, -0.9), 0.0, "y", 0.0),
+        ((1.0, 1.4), 0.0, "y", 0.0),  # one angle leads 92 % of the way there
+    ],
+)
+def test_a_mirrored_axis_is_no_turned_marker(robot, headings_rad, turned_rad, flipped, astray_rad):
+    """Straight ahead along one heading after the other, by algebra."""
+    per = len(robot.pose_t_s) // len(headings_rad) + 1
+    theta = np.repeat(headings_rad, per)[: len(robot.pose_t_s)]
+    step_m = 0.2 * np.diff(robot.pose_t_s, prepend=robot.pose_t_s[0])
+    at = {"x": np.cumsum(step_m * np.cos(theta)), "y": np.cumsum(step_m * np.sin(theta))}
+    if flipped:
+        at[flipped] = -at[flipped]
+    alike = np.full(robot.command.shape, 0.5)
+    posed = _with_pose(robot, **at, theta=theta - turned_rad)
+    track = make_track(replace(posed, command=alike))
+    assert track.astray_rad == pytest.approx(astray_rad, abs=0.02)
+    assert any("turn the poses" in note for note in track.notes) == bool(astray_rad)
+
+
 def test_commands_of_another_run_are_told(robot):
     _one([replace(robot, command=_robot(seed=7).command)], "do not explain the motion")
 

@@ -19,6 +19,7 @@ FROZEN_S = 0.5  # a pose that keeps its very bits for longer while driven is no 
 REST_S = 1.5  # coasting ends within 0.5 s; the rest is for lag and clocks
 SMOOTH_S = 0.026  # half width of the heading's smoothing: three poses of 120 Hz to each side
 ASTRAY_RAD = 0.35  # more than any heading bias: the marker body's axes are turned
+ONE_ANGLE = 0.9  # share of the straight way that one angle must lead to where it went
 SPIN_RAD = 0.2  # in a quarter of a second: on these wheels alike commands are no way straight ahead
 
 
@@ -339,10 +340,21 @@ def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float
     if np.count_nonzero(steady) < half:
         return 0.0
     step = (pose[last, :2] - pose[first, :2])[steady] * np.sign(forward[steady, :1])
-    angle = np.arctan2(step[:, 1], step[:, 0]) - pose[middle[steady], 2]
-    weight = np.hypot(step[:, 0], step[:, 1])
-    astray_rad = float(np.angle(np.sum(weight * np.exp(1j * angle))))
+    turn = _one_turn(step[:, 0] + 1j * step[:, 1], pose[middle[steady], 2])
+    astray_rad = float(np.angle(turn)) if turn else 0.0
     return astray_rad if abs(astray_rad) > ASTRAY_RAD else 0.0
+
+
+def _one_turn(ahead_m: np.ndarray, heading_rad: np.ndarray) -> complex:
+    """Mean of a robot's steps ahead, complex, seen from its heading; 0 if they show no one turn.
+
+    A marker that is turned leads all of them astray by one angle. An axis that is mirrored leads
+    each along another one, by twice its heading: the steps mirrored back then lie on the heading.
+    """
+    back = np.exp(-1j * heading_rad)
+    turn, flip = (np.sum(s * back) / np.sum(np.abs(s)) for s in (ahead_m, np.conj(ahead_m)))
+    mirrored = 1 - abs(flip.real) < (1 - abs(turn)) / 2
+    return 0 if abs(turn) < ONE_ANGLE or mirrored else turn
 
 
 def _bend_rad(pose: np.ndarray, first: np.ndarray, middle: np.ndarray, last: np.ndarray):
