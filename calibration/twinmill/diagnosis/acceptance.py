@@ -4,8 +4,8 @@
 import numpy as np
 
 from twinmill.diagnosis.settings import Settings
-from twinmill.diagnosis.starts import MARGIN
 from twinmill.diagnosis.trials import REFIT, Trial
+from twinmill.fitting.starts import MARGIN
 from twinmill.model.parameters import (
     GAINS,
     NO_SIZE,

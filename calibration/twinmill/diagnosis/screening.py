@@ -9,9 +9,9 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.settings import SETTINGS, Settings
-from twinmill.diagnosis.starts import Left, Starts, starts_of
 from twinmill.diagnosis.trials import REFIT, State, Trial, with_effects
 from twinmill.fitting.detection_fit import DetectionFit
+from twinmill.fitting.starts import Left, Starts, projected, starts_of
 from twinmill.model.parameters import (
     LAG,
     LAG_EFFECT,
@@ -88,23 +88,18 @@ def screen(
         return [_screened_bits(name, before) for name in candidates(state)]
     starts = {} if starts is None else starts
     rows, _ = fit.state
-    weights = [np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)]
-    left, columns, _ = fit.whitened(range(len(rows)))
-    free = np.vstack([columns, np.diag(1 / fit.std)]) if len(fit.x) else np.zeros((len(left), 0))
-    padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1]) if len(fit.x) else left
-    basis = np.linalg.qr(free)[0] if len(fit.x) else free
-    rest = padded - basis @ (basis.T @ padded)
-    ends = np.cumsum([len(r) for r in rows])[:-1]
-    parts = (np.split(whole[: len(left)], ends) for whole in (rest, basis))
-    what_is_left = Left(weights, *parts)
+    basis, rest = projected(fit)
+    left = Left.of(fit, basis, rest)
     found = []
     for name in candidates(state) if names is None else names:
         if name not in starts or with_role(name, "limit"):
             of = starts_of(name, state.models, state.datasets, rows)
             starts |= {name: of} if of else {}
-        start = starts[name].best(what_is_left) if name in starts else {}
+        start = starts[name].best(left) if name in starts else {}
         found.append(
-            _screened(name, state, rows=rows, weights=weights, basis=basis, rest=rest, start=start)
+            _screened(
+                *(name, state), rows=rows, weights=left.weights, basis=basis, rest=rest, start=start
+            )
         )
     return found
 

@@ -13,9 +13,9 @@ from twinmill.diagnosis.acceptance import began_before, best_of, cost, proven, w
 from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.screening import Screened, candidates, likely_pairs, promising, screen
 from twinmill.diagnosis.settings import SETTINGS, Settings
-from twinmill.diagnosis.starts import Starts
 from twinmill.diagnosis.ties import ties_of
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted, without_effect
+from twinmill.fitting.starts import Starts
 from twinmill.model.parameters import lasts_for_a_while, with_role
 
 PAUSE_S = 2.0  # between the end of what lasts for a while and its next begin

@@ -30,10 +30,12 @@ from twinmill.fitting.formula_start import sized, with_time_constants
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import Opened, judged, open_measurements, wide_gains
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.starts import Left, projected, starts_of
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
     CAMERA_STAGES,
     GAINS,
+    WHERE_OR_WHEN,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
@@ -42,11 +44,14 @@ from twinmill.model.parameters import (
     effect_parameters,
     is_of_camera,
     stated_names,
+    with_role,
 )
+from twinmill.predict.datasets import Trajectory
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import all_detections
 
-WORSE = 1.02  # times the held-out score; less is chance
+WORSE = 1.02  # times the held-out score; less is chance ...
+AGREE_T = 2.0  # ... unless blocks agree on it by this t
 OWN_GAINS = "gains"  # of one robot: its speed and its rate of turn
 
 
@@ -64,6 +69,7 @@ class AddResult:
         heldout_refit: its quantities refitted without the effect.
         heldout_after: refitted with it.
         path: of the new model.
+        blocks_t: how well left-out blocks agree that it predicts them better, as a t.
         robot_id: of the robot that alone has it; None if all have.
         unsteady: labels of logs within which the offset of the clocks changes.
     """
@@ -77,6 +83,7 @@ class AddResult:
     heldout_refit: HeldOut
     heldout_after: HeldOut
     path: Path
+    blocks_t: float
     robot_id: int | None = None
     unsteady: Sequence[str] = ()
 
@@ -92,14 +99,15 @@ class AddResult:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences where left-out data are worse predicted with it, or no clock is written."""
+        """Sentences where left-out data gain nothing by it, or no clock is written."""
         told = without_clock(self.unsteady)
         without, after = self.heldout_refit.score, self.heldout_after.score
-        if not after > WORSE * without:
+        if without > WORSE * after or (self.blocks_t > AGREE_T and after < without):
             return told
+        how = "worse" if after > WORSE * without else "no better"
         return [
             *told,
-            f"Held-out predictions are worse with it ({without:.3g} to {after:.3g}): leave it out; "
+            f"Held-out predictions are {how} with it ({without:.3g} to {after:.3g}): leave it out; "
             "or, if its fit began too far off, put better values into the new model with "
             "`twinmill set` and fit that again with `twinmill fit`.",
         ]
@@ -175,6 +183,8 @@ def add(
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     _check_not_new(held, fresh)
     old = without_held([*base, *all_effect_parameters(model_file.model)], held)
+    without = fitted(opened, old)[1]
+    fresh = begun_at_best(effect, fresh, without, robot_id)
     enlarged = [o.with_model(richer) for o in opened]
     if texts:
         fresh = with_time_constants(fresh, texts, enlarged)
@@ -186,7 +196,7 @@ def add(
     else:
         moved, found = fitted(with_own(enlarged, robot_id, fresh), old, fresh)
     _check_acts(found, fresh, texts or {})
-    held = [HeldOut.of(f) for f in (fitted(opened, [])[1], fitted(opened, old)[1], found)]
+    held = [HeldOut.of(f) for f in (fitted(opened, [])[1], without, found)]
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
     after = replace(after, about=robot_id)
@@ -212,7 +222,9 @@ def add(
     )
     estimates += own
     return AddResult(
-        *(name, before.model_name, before, after, estimates, *held, Path(out), robot_id),
+        *(name, before.model_name, before, after, estimates, *held, Path(out)),
+        blocks_t=found.against(without)[2],
+        robot_id=robot_id,
         unsteady=unsteady_clocks(found),
     )
 
@@ -252,7 +264,8 @@ def _add_to_camera(
     child = Fitted(fitted_model, found.estimates, logs, before.score, after.score)
     write_child(model_file, child, out, command, force=force)
     name = model_file.path.name
-    return AddResult(effect, name, before, after, found.estimates, *heldout, Path(out))
+    blocks_t = found.against(without)[2]
+    return AddResult(effect, name, before, after, found.estimates, *heldout, Path(out), blocks_t)
 
 
 def with_effect(
@@ -273,6 +286,32 @@ def with_effect(
             f"before it, as in 'p0*({text})'."
         )
     return richer, name, fresh
+
+
+def begun_at_best(
+    effect: str, fresh: Sequence[Parameter], without: ScoreFit, robot_id: int | None
+) -> list[Parameter]:
+    """What is new, its place or moments begun where it takes most of what is left.
+
+    Args:
+        effect: its name.
+        fresh: what is to be fitted of it.
+        without: a fit that lacks it, finished or not; what is free in it may take its share.
+        robot_id: of the robot that alone has it; None if all have.
+    """
+    members = [
+        i
+        for i, d in enumerate(without.datasets)
+        if isinstance(d, Trajectory) and robot_id in (None, d.robot_id)
+    ]
+    if not members or not any(with_role(effect, role) for role in WHERE_OR_WHEN):
+        return list(fresh)
+    rows, models, datasets = (
+        [of[i] for i in members] for of in (without.state[0], without.models, without.datasets)
+    )
+    starts = starts_of(effect, models, datasets, rows)
+    best = starts.best(Left.of(without, *projected(without)).at(members))
+    return [p.at(best.get(p.name, p.value)) for p in fresh]
 
 
 def _begun(model: native.Model, fresh: Sequence[Parameter]) -> native.Model:

@@ -22,7 +22,7 @@ from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, clean_measurements
 from twinmill.data.steady_table import is_steady_table
 from twinmill.files import replacing
-from twinmill.fitting.add import with_effect, with_own
+from twinmill.fitting.add import begun_at_best, with_effect, with_own
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import Opened, on_clock_of_others, open_measurements
 from twinmill.fitting.score_fit import ScoreFit
@@ -312,6 +312,9 @@ class Session:
             model, _, fresh = with_effect(model, effect, {}, robot_id)
         members = self._foremost(index)
         known = [_from_here(self.settled(number, k)) for k in members]
+        if fresh:
+            without = ScoreFit([o.data for o in known], [o.model for o in known], free)
+            fresh = begun_at_best(effect, fresh, without, robot_id)
         if robot_id is not None:
             known, shared = with_own(known, robot_id, fresh), free
         else:

@@ -107,8 +107,9 @@ def test_what_spoils_left_out_predictions_is_told(adding):
     assert "worse with it" in note and "twinmill set" in note
 
 
-def test_what_left_out_predictions_do_not_mind_is_not(adding):
-    assert adding("p0*vx*vx").notes == []
+def test_what_left_out_predictions_do_not_mind_is_told(adding):
+    (note,) = adding("p0*vx*vx").notes
+    assert "no better with it" in note
 
 
 def test_a_number_at_its_bound_is_told_as_such():

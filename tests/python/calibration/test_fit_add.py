@@ -123,6 +123,7 @@ def test_added_effect_helps_where_it_was_not_fitted(coasting):
     assert coasting.heldout_after.score < 0.7 * coasting.heldout_refit.score
     assert coasting.heldout_after.score < 1.3
     assert coasting.heldout_refit.score <= 1.02 * coasting.heldout_before.score
+    assert coasting.notes == []
 
 
 def test_added_effect_that_is_not_there_does_not_help(tanh_robot, measure, fitted, tmp_path):
@@ -133,6 +134,8 @@ def test_added_effect_that_is_not_there_does_not_help(tanh_robot, measure, fitte
     (width,) = (e for e in found.parameters if e.name == "dead_zone.width")
     assert width.value < 3 * width.std + 0.002
     assert found.heldout_after.score > 0.97 * found.heldout_refit.score
+    (note,) = found.notes
+    assert note.startswith("Held-out predictions are no better with it")
 
 
 def picked_up(pose, valid):

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.starts import Left, starts_of
+from twinmill.fitting.add import add
 from twinmill.fitting.opening import open_measurements
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.starts import Left, starts_of
 from twinmill.model.parameters import catalogue_of, effect_parameters
 
 EULER_S = 1 / 480  # step of the robots here
@@ -76,6 +77,26 @@ def test_a_loss_in_the_one_stretch_that_was_driven_elsewhere_may_be_of_the_floor
     found = diagnose([run], true_model)
     assert found.verdict == "ambiguous"
     assert set(found.findings[0].group) == {"transient_loss", "floor_patch"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "low_s", "high_s"), [("transient_loss", 20.0, 40.0), ("abrupt_loss", 35.0, 99.0)]
+)
+@pytest.mark.parametrize("robot_id", [None, 3])  # the log's
+def test_a_loss_that_is_added_begins_where_it_was(
+    effect, low_s, high_s, robot_id, tanh_robot, measure, true_model, tmp_path
+):
+    """Truth: when the robot was weaker, and by how much."""
+    run = measure(weaker(tanh_robot, low_s, high_s, 0.25), 4, 60.0)
+    path = tmp_path / "m.toml"
+    found = add(effect, [run], true_model, out=path, command="", robot_id=robot_id)
+    told = {e.name.split(".")[1]: e for e in found.added}
+    assert told["loss"].value == pytest.approx(0.25, abs=2 * told["loss"].std + 0.005)
+    assert told["from_s"].value == pytest.approx(low_s, abs=1.0)
+    if effect == "transient_loss":
+        assert told["until_s"].value == pytest.approx(high_s, abs=1.0)
+    assert found.heldout_after.score < 1.3 < found.heldout_refit.score / 2
+    assert found.notes == []
 
 
 def test_a_heading_that_errs_once_a_turn_is_named(tanh_robot, measure, true_model):

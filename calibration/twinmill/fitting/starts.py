@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 import twinmill_native as native
 
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     Parameter,
     catalogue,
@@ -91,6 +92,19 @@ class Left:
     rests: Sequence[np.ndarray]
     bases: Sequence[np.ndarray]
 
+    @classmethod
+    def of(cls, fit: ScoreFit, basis: np.ndarray, rest: np.ndarray) -> "Left":
+        """Of a fit; see `projected`."""
+        rows, _ = fit.state
+        ends = np.cumsum([len(r) for r in rows])
+        parts = (np.split(whole[: ends[-1]], ends[:-1]) for whole in (rest, basis))
+        return cls([np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)], *parts)
+
+    def at(self, members: Sequence[int]) -> "Left":
+        """Of some data sets alone: a candidate changes nothing in the others."""
+        kinds = (self.weights, self.rests, self.bases)
+        return Left(*([kind[i] for i in members] for kind in kinds))
+
     def products(self, columns: Iterable[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """(S, k) products of S times k changes with what is left, and (S, k, k) with each other.
 
@@ -104,6 +118,20 @@ class Left:
             gram = gram + whitened @ whitened.swapaxes(1, 2)
             free = free + whitened @ basis
         return moment, gram - free @ np.swapaxes(free, 1, 2)
+
+
+def projected(fit: ScoreFit) -> tuple[np.ndarray, np.ndarray]:
+    """What is free in a fit, and what it leaves of all rows, whitened, its prior's P rows last.
+
+    Returns:
+        (R + P, P) orthonormal columns of what is free; (R + P,) rows less their part along these.
+    """
+    left, columns, _ = fit.whitened(range(len(fit.datasets)))
+    if not len(fit.x):
+        return np.zeros((len(left), 0)), left
+    padded = np.concatenate([left, (fit.usual - fit.x) / fit.std * -1])
+    basis = np.linalg.qr(np.vstack([columns, np.diag(1 / fit.std)]))[0]
+    return basis, padded - basis @ (basis.T @ padded)
 
 
 class Starts(Protocol):
