@@ -9,13 +9,14 @@ that is fitted to where predictions end is better than any physics can be (Ljung
 
 import numpy as np
 
+from twinmill.chance import t_quantile
 from twinmill.predict.windows import HORIZONS_S
 
 EARLY, LATE = HORIZONS_S.index(1.0), HORIZONS_S.index(2.0)
 BLOCK_S = 8.0  # stretches whose errors are taken as independent
 FEWEST = 4  # of them
 LEAST = 0.2  # early error for each metre or radian that late commands add
-SURE = 3.0  # standard errors
+CHANCE = 0.005  # of so large a slope where commands tell of no error
 
 
 def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bool:
@@ -52,4 +53,4 @@ def _goes_with(y: np.ndarray, beside: np.ndarray, late: np.ndarray, block: np.nd
     slopes = np.linalg.solve(without[:, :2, :2], without[:, :2, 2:])[:, 1, 0]
     slope = np.linalg.solve(whole[:2, :2], whole[:2, 2])[1]
     std = np.sqrt((len(slopes) - 1) * np.var(slopes))
-    return bool(slope > max(LEAST, SURE * std))
+    return bool(slope > max(LEAST, t_quantile(1 - CHANCE, len(slopes) - 1) * std))
