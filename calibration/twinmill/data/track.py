@@ -341,7 +341,7 @@ def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float
         return 0.0
     step = (pose[last, :2] - pose[first, :2])[steady] * np.sign(forward[steady, :1])
     turn = _one_turn(step[:, 0] + 1j * step[:, 1], pose[middle[steady], 2])
-    astray_rad = float(np.angle(turn)) if turn else 0.0
+    astray_rad = float(np.angle(turn))
     return astray_rad if abs(astray_rad) > ASTRAY_RAD else 0.0
 
 

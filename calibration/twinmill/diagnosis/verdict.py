@@ -57,8 +57,7 @@ class VerdictInputs:
         if self._within_told:
             return "cannot_tell"
         outweighed = self._noise_outweighs or self._rest_outweighs or self._of_another_form
-        outweighed = outweighed or self._proven_instead
-        if self.effects and not outweighed:
+        if self.effects and not (outweighed or self._proven_instead):
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or (self.effects and self.score > MISSING):

@@ -10,11 +10,11 @@ that is fitted to where predictions end is better than any physics can be (Ljung
 import numpy as np
 
 from twinmill.chance import t_quantile
+from twinmill.predict.datasets import BLOCK_S
 from twinmill.predict.windows import HORIZONS_S
 
 EARLY, LATE = HORIZONS_S.index(1.0), HORIZONS_S.index(2.0)
-BLOCK_S = 8.0  # stretches whose errors are taken as independent
-FEWEST = 4  # of them
+FEWEST = 4  # blocks
 LEAST = 0.2  # early error for each metre or radian that late commands add
 CHANCE = 0.005  # of so large a slope where commands tell of no error
 

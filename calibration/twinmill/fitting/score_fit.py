@@ -351,8 +351,7 @@ class ScoreFit:
     def _with_best(self, c: int, x: np.ndarray, values: np.ndarray) -> np.ndarray:
         """(P,) values with one of a single data set's own as it is, or at the best of others."""
         (i,) = self.unknowns[c].members
-        points = np.repeat(x[None], 1 + len(values), axis=0)
-        points[1:, c] = values
+        points = _each_beside(x, c, values)
         missed = [self._misfit(i, rows) for rows in self.batch(i, points)]
         return points[int(np.argmin(missed))]
 
@@ -483,8 +482,7 @@ class ScoreFit:
         """
         for c in self._phases:
             (i,) = self.unknowns[c].members
-            tried = np.repeat(self.x[None], 1 + len(PHASES_RAD), axis=0)
-            tried[1:, c] = PHASES_RAD
+            tried = _each_beside(self.x, c, PHASES_RAD)
             rows = self.batch(i, tried)
             for k, point in enumerate(points):
                 others = rows * (self.datasets[i].part != k)
@@ -787,6 +785,13 @@ class ScoreFit:
         """Of data set i alone: its clock and what its robot has of its own."""
         count = len(self.shared_estimates())
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
+
+
+def _each_beside(x: np.ndarray, c: int, values: np.ndarray) -> np.ndarray:
+    """(1 + V, P) some values as they are, and with each of V in the place of one."""
+    points = np.repeat(x[None], 1 + len(values), axis=0)
+    points[1:, c] = values
+    return points
 
 
 def _divisions(data: ErrorDataset, block_s: float | None) -> list[np.ndarray]:
