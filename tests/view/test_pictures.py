@@ -137,7 +137,8 @@ class Screen:
     def __init__(self, *arguments):
         read, write = os.pipe()
         self.server = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x900x24"],
+            # Without -noreset it starts anew, and refuses all, whenever its last client leaves.
+            ["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0", "1280x900x24"],
             pass_fds=[write],
             stderr=subprocess.DEVNULL,
         )
