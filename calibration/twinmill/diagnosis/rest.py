@@ -600,7 +600,8 @@ class Products:
     def each_held_out(self, flips: int = 0, ridge: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """(T,) and (F, T): what `together_held_out` gives for each column alone."""
         energy, moments = self.energy, self.moments
-        scatter = moments - energy * (moments.sum(0) / (energy.sum(0) + ridge))
+        without = (moments.sum(0) - moments) / (energy.sum(0) - energy + ridge)
+        scatter = moments - energy * without
         signs = _signs(flips, len(energy))
         gain = np.zeros((1 + flips, energy.shape[1]))
         for k in range(FOLDS):
@@ -625,7 +626,9 @@ class Products:
     ) -> tuple[np.ndarray, np.ndarray]:
         """(N,) fall by each of N sets of columns, (N, k) `places`, and (N, F) what chance brings.
 
-        Chance: random signs of what each block still scatters after the columns are fitted to all.
+        Chance: random signs of what each block scatters about a fit of the columns to all others.
+        About a fit that has the block itself it scatters too little, where columns are many and
+        blocks few (Cameron and Miller 2015, section VI.B).
         """
         moments = np.moveaxis(self.moments[:, places], 1, 0)  # (N, B, k)
         folds = np.array([g.folds for g in grams])  # (N, FOLDS, k, k)
@@ -633,9 +636,10 @@ class Products:
         tests = [self.fold == k for k in range(FOLDS)]
         judged = np.stack([moments[:, test].sum(1) for test in tests], axis=1)[:, :, None]
         if flips:
-            numbers = np.linalg.solve(whole, moments.sum(1)[..., None])
             blocks = np.array([g.blocks for g in grams])
-            scatter = moments - (blocks @ numbers[:, None])[..., 0]
+            others = moments.sum(1, keepdims=True) - moments
+            numbers = np.linalg.solve(whole[:, None] - blocks, others[..., None])
+            scatter = moments - (blocks @ numbers)[..., 0]
             signs = _signs(flips, len(self.fold))
             by_chance = np.stack([signs[:, test] @ scatter[:, test] for test in tests], axis=1)
             judged = np.concatenate([judged, by_chance], axis=2)  # (N, FOLDS, 1 + F, k)

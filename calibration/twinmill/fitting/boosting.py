@@ -191,8 +191,8 @@ class Learners:
 
 def boosted(
     learners: Learners, wanted: np.ndarray, independent: float
-) -> Iterator[tuple[int, float]]:
-    """Number and ridge of each group taken, in order.
+) -> Iterator[tuple[int, float, float]]:
+    """Number and ridge of each group taken, in order, and how many times beyond chance it is.
 
     Args:
         learners: of rows.
@@ -202,12 +202,12 @@ def boosted(
     """
     if not len(learners):
         return
-    by_chance = np.log(len(learners)) / independent
-    least = max(FLOOR_SETTINGS.group_worth, FLOOR_SETTINGS.group_chance * by_chance)
+    by_chance = FLOOR_SETTINGS.group_chance * np.log(len(learners)) / independent
     wanted = wanted.astype(np.float32)
     for _ in range(FLOOR_SETTINGS.most_groups):
         fall, number, ridge, each = learners.best(wanted)
-        if fall < least * float(wanted @ wanted):
+        share = fall / max(float(wanted @ wanted), 1e-30)
+        if share < max(FLOOR_SETTINGS.group_worth, by_chance):
             return
         wanted = learners.left(wanted, number, each).astype(np.float32)
-        yield number, ridge
+        yield number, ridge, share / by_chance

@@ -75,7 +75,7 @@ def unseen(data: ErrorDataset, model: native.Model) -> list[str]:
     own = [p.name.split(".")[0] for p in phases(model)] if isinstance(data, Trajectory) else []
     for name in dict.fromkeys(own):
         without, with_it = (np.sum(errors_of(data, m) ** 2) for m in (_without(model, name), model))
-        if data.n_eff * np.log(without / with_it) < SHOWN:
+        if data.n_eff.sum() * np.log(without / with_it) < SHOWN:
             found.append(
                 f"{data.label}: does not show {name}, which recurs in time: at no moment of its "
                 "period does it predict this log better than without; the robot may lack it now."

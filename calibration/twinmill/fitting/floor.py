@@ -6,7 +6,7 @@ geometry), with numbers refitted to this very log. So better predictions never g
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import twinmill_native as native
@@ -21,6 +21,7 @@ from twinmill.fitting.dependence import (
     small_changes,
     wheel_angles,
 )
+from twinmill.fitting.independence import independent_shares
 from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -59,6 +60,7 @@ class NoiseFloor:
         lateness_s: lag and delay of the base refitted to the log; NaN where the clocks are two.
         across: (W, H, 3) errors of the response on parts that it was not fitted to.
         response: itself.
+        independent: (3,) share of the errors of each channel that are.
         answered: later commands tell of earlier errors, so that the floor is too low.
     """
 
@@ -71,6 +73,7 @@ class NoiseFloor:
     lateness_s: float
     across: np.ndarray
     response: Response | None
+    independent: np.ndarray = field(default_factory=lambda: np.ones(3))
     answered: bool = False
 
     def thinned(self, every: int) -> "NoiseFloor":
@@ -121,6 +124,7 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
         lateness_s=base.get(LAG) + (base.get("input_delay.delay_s") if same_clock else np.nan),
         across=response.across,
         response=response,
+        independent=independent_shares(across, data.start_s),
         answered=are_answers(data.measured - moved, across, data.start_s),
     )
 

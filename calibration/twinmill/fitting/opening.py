@@ -156,7 +156,12 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
     if floor.kind is None:
         return Opened(measurement, None, model, floor, same_clock)
     ratio = floor.response.radius_ratio
-    data = replace(data.over(floor.rms, floor.keep), first_part=number, radius_ratio=ratio)
+    data = replace(
+        data.over(floor.rms, floor.keep),
+        first_part=number,
+        radius_ratio=ratio,
+        independent=floor.independent,
+    )
     return Opened(measurement, data, model, floor, same_clock).aligned(model)
 
 

@@ -26,6 +26,7 @@ from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
 from twinmill.fitting.boosting import Learners, Parts, boosted, squares
 from twinmill.fitting.dependence import Features, Group, Motion, even_step_s
+from twinmill.fitting.independence import independent_shares
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import EVERY_S, difference, rms
@@ -77,6 +78,23 @@ class Rows:
     weight: np.ndarray
     wanted: np.ndarray
     parts: Parts
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A group that boosting added.
+
+    Attributes:
+        features: of each axis.
+        ridge: over its mean square.
+        axes: that it was chosen for, of the plane or of turning.
+        times: how many times it takes what chance would bring if errors were independent.
+    """
+
+    features: Features
+    ridge: float
+    axes: Sequence[int]
+    times: float
 
 
 @dataclass(frozen=True)
@@ -446,8 +464,24 @@ class Response:
         return np.nan_to_num(errors).T, np.nan_to_num(made).T
 
     def boost(self, groups: Sequence[Group]) -> None:
-        """Adds what is left and left-out blocks agree on, a group of features at a time."""
-        scale = self.errors
+        """Adds what is left and left-out blocks agree on, a group of features at a time.
+
+        Where the errors that then remain are not independent, those groups go that chance may
+        bring.
+        """
+        scale, before = self.errors, copy(self)
+        chosen = self._chosen(groups, scale)
+        if not chosen:
+            return
+        self._fit_with(chosen, scale)
+        shares = independent_shares(self.across, self.data.start_s)
+        sure = [c for c in chosen if c.times * shares[list(c.axes)].mean() >= 1]
+        if len(sure) < len(chosen):
+            vars(self).update(vars(before))
+            if sure:
+                self._fit_with(sure, scale)
+
+    def _chosen(self, groups: Sequence[Group], scale: np.ndarray) -> list["Chosen"]:
         left, chosen = self._left(scale), []
         independent = len(self.starts) * EVERY_S / MEMORY_S
         for part, axes in enumerate(AXES):
@@ -459,19 +493,18 @@ class Response:
             learners = Learners(
                 ((self._led(part, rows, pieces), own) for pieces, own in batches), rows.parts
             )
-            for number, ridge in boosted(learners, rows.wanted, independent):
-                chosen.append((_only(axes, used[number]), ridge))
-        if chosen:
-            self._fit_with(chosen, scale)
+            for number, ridge, times in boosted(learners, rows.wanted, independent):
+                chosen.append(Chosen(_only(axes, used[number]), ridge, axes, times))
+        return chosen
 
-    def _fit_with(self, chosen: Sequence[tuple[Features, float]], scale: np.ndarray) -> None:
+    def _fit_with(self, chosen: Sequence["Chosen"], scale: np.ndarray) -> None:
         """Fits the features so far and chosen groups together, each group at its own ridge."""
         axes, first = range(3), len(self.ridges[0])
-        added = [[group[axis] for group, _ in chosen] for axis in axes]
+        added = [[c.features[axis] for c in chosen] for axis in axes]
         numbers = [[np.full(f.shape[1], first + k) for k, f in enumerate(own)] for own in added]
         self.features = [np.hstack([self.features[axis], *added[axis]]) for axis in axes]
         self.groups = [np.concatenate([self.groups[axis], *numbers[axis]]) for axis in axes]
-        fresh = [ridge for _, ridge in chosen]
+        fresh = [c.ridge for c in chosen]
         self._fit(scale, [np.concatenate([own, fresh]) for own in self.ridges])
 
     def _left(self, scale: np.ndarray) -> np.ndarray:

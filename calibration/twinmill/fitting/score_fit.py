@@ -64,7 +64,7 @@ class _LeftOut:
     def __init__(self, whole: ErrorDataset, kept: np.ndarray) -> None:
         self._whole, self._kept = whole, kept
         self.judged = whole.judged * kept
-        self.n_eff = max(whole.n_eff * self.judged.sum() / whole.judged.sum(), 1e-9)
+        self.n_eff = whole.n_eff * max(self.judged.sum() / whole.judged.sum(), 1e-9)
 
     def __getattr__(self, name: str) -> object:
         return getattr(self._whole, name)
@@ -96,6 +96,8 @@ class ScoreFit:
         # (G,) share of each data set's score that each scale makes up.
         pairs = zip(self.scales, self.datasets, strict=True)
         self.judged = [np.bincount(scale, d.judged) for scale, d in pairs]
+        # (G,) number of independent errors of each scale.
+        self.counts = [d.n_eff if by_channel else d.n_eff.sum(keepdims=True) for d in datasets]
         self.models = [m.copy() for m in models]
         self.unknowns = self._unknowns()
         parts = [u.parameter for u in self.unknowns]
@@ -217,7 +219,7 @@ class ScoreFit:
     @property
     def sizes(self) -> np.ndarray:
         """(D,) independent errors of each data set."""
-        return np.array([d.n_eff for d in self.datasets])
+        return np.array([n.sum() for n in self.counts])
 
     def cost(self, rows: list[np.ndarray], x: np.ndarray) -> float:
         """The cost that the module states: of (R,) rows of each data set, at (P,) values."""
@@ -235,7 +237,7 @@ class ScoreFit:
         judged = self.judged[i]
         square = np.bincount(scale, rows**2, len(judged))
         share = judged / max(judged.sum(), 1e-12)
-        n = self.datasets[i].n_eff * (judged > 0) / max(np.count_nonzero(judged), 1)
+        n = self.counts[i] * (judged > 0)
         square = np.where(judged > 0, square / np.where(judged > 0, share, 1), 1.0)
         return np.maximum(square, LEAST_SQUARE), n
 
@@ -533,7 +535,7 @@ class ScoreFit:
             )
             left, share = squares.sum(0) - squares, judged.sum(0) - judged
             known = share > 1e-9
-            n = d.n_eff * share.sum(1, keepdims=True) / d.judged.sum() / known.sum(1, keepdims=True)
+            n = self.counts[i] * share.sum(1, keepdims=True) / d.judged.sum()
             square = np.maximum(left / np.where(known, share, 1.0), LEAST_SQUARE)
             costs.append(rest + np.sum(np.where(known, n * np.log(square), 0.0), axis=1))
         return np.concatenate(costs)

@@ -49,14 +49,14 @@ class ErrorDataset(Dataset, Protocol):
         part: (R,) number of the part of the data with which each row is left out.
         channel: (R,) number of the channel that each row belongs to.
         judged: (R,) share of the squared score that each row would make up if all were 1.
-        n_eff: number of independent errors.
+        n_eff: (C,) number of independent errors of each channel.
     """
 
     own: Sequence[Parameter]
     part: np.ndarray
     channel: np.ndarray
     judged: np.ndarray
-    n_eff: float
+    n_eff: np.ndarray
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
         """(B, R) errors over floor for B rows of values; squares add up to the score's."""
@@ -83,6 +83,7 @@ class Trajectory:
         every_s: between two starts.
         radius_ratio: of the wheels, over the model's radius, as errors that swing with their angle
             tell it; 1 if none do.
+        independent: (3,) share of the errors of each channel that are, as the floor tells.
     """
 
     measurement: Measurement
@@ -94,6 +95,7 @@ class Trajectory:
     first_part: int = 0
     every_s: float = EVERY_S
     radius_ratio: float = 1.0
+    independent: np.ndarray = field(default_factory=lambda: np.ones(3))
     weight: np.ndarray = field(init=False, repr=False)
     block: np.ndarray = field(init=False, repr=False)
     part: np.ndarray = field(init=False, repr=False)
@@ -180,10 +182,10 @@ class Trajectory:
         return float(np.count_nonzero(self.keep)) * self.every_s
 
     @property
-    def n_eff(self) -> float:
+    def n_eff(self) -> np.ndarray:
         """See ErrorDataset."""
-        channels = np.count_nonzero(np.isfinite(self.floor).any(axis=0))
-        return max(channels * self.covered_s / INDEPENDENT_S, 1.0)
+        judged = np.isfinite(self.floor).any(axis=0)
+        return judged * self.independent * max(self.covered_s / INDEPENDENT_S, 1.0)
 
     def errors(self, model: native.Model) -> np.ndarray:
         """(W, H, 3) measured less predicted."""

@@ -70,9 +70,9 @@ class SteadyStates:
         return np.tile(np.arange(len(CHANNELS)), len(self.commands))
 
     @property
-    def n_eff(self) -> float:
-        """Number of values that were measured, each independent; at least 1."""
-        return float(max(np.isfinite(self._measured()).sum(), 1))
+    def n_eff(self) -> np.ndarray:
+        """(C,) number of values that were measured, each independent."""
+        return np.isfinite(self._measured()).sum(axis=0).astype(float)
 
     def with_model(self, model: native.Model) -> "SteadyStates":
         """The same table with another model."""

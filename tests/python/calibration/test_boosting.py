@@ -27,7 +27,7 @@ def test_takes_the_groups_that_made_the_values_the_larger_first(seed):
     wide, narrow = 2 * wide / np.linalg.norm(wide), narrow / np.linalg.norm(narrow)
     made = groups.rows_of(1) @ wide + groups.rows_of(3) @ narrow
     wanted = made + NOISE * random.normal(size=ROWS)
-    assert [number for number, _ in boosted(groups, wanted, ROWS)][:2] == [1, 3]
+    assert [number for number, *_ in boosted(groups, wanted, ROWS)][:2] == [1, 3]
 
 
 @pytest.mark.parametrize("seed", range(10))
