@@ -157,7 +157,7 @@ def test_the_floor_follows_a_castor_that_swings_round(tanh_robot, measure, one_c
 def test_heading_that_the_capture_lets_drift_depends_on_time(measure, one_clock_base):
     def spoil(pose, valid):
         t_s = np.arange(len(pose)) / 120
-        return pose + 0.08 * np.sin(2 * np.pi * t_s / 43)[:, None] * (0, 0, 1), valid
+        return pose + 0.12 * np.sin(2 * np.pi * t_s / 43)[:, None] * (0, 0, 1), valid
 
     found = diagnose([measure(seed=102, duration_s=80.0, spoil=spoil)], one_clock_base)
     assert found.rest.depends_on[:1] == ["time"]
