@@ -81,6 +81,7 @@ LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
 NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
+OF_ROBOTS = ((Real, Mapping), "a number, or a dictionary of numbers by robot")
 SWITCH = (bool, "True or False")
 # Options of `import_log`, named as those of `twinmill import` and in its sentences: the field of
 # `ImportOptions`, the kinds that it may be of, and these in words.
@@ -90,8 +91,8 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "mapping": ("mapping", (str, Path), A_PATH),
     "flip": ("flips", *NAMES),
     "up": ("up", str, "`y` or `z`"),
-    "pose_shift_s": ("pose_shift_s", *NUMBER),
-    "pose_clock_ppm": ("pose_clock_ppm", *NUMBER),
+    "pose_shift_s": ("pose_shift_s", *OF_ROBOTS),
+    "pose_clock_ppm": ("pose_clock_ppm", *OF_ROBOTS),
     "heading_from_path": ("path_heading", *SWITCH),
     "same_clock": ("same_clock", *SWITCH),
     "pose": ("pose_topics", *NAMES),
@@ -1498,9 +1499,10 @@ def import_log(
         robot_id: whose the rows are, for files that do not say.
         heading_offset_deg: from the tracked body's x axis to the robot's front, left positive.
         options: `robot` (numbers by name) and `rename` (our column by the file's), dictionaries;
-            `mapping`, a path; `flip`, a list of our columns; `up`, `pose_shift_s`,
-            `pose_clock_ppm`, `heading_from_path`, `same_clock`; of a bag `pose` and `command`
-            (lists of topics), `receive_stamps`, `wheelbase_m`, `full_duty`.
+            `mapping`, a path; `flip`, a list of our columns; `up`; `pose_shift_s` and
+            `pose_clock_ppm`, numbers, or dictionaries by robot; `heading_from_path`,
+            `same_clock`; of a bag `pose` and `command` (lists of topics), `receive_stamps`,
+            `wheelbase_m`, `full_duty`.
 
     Returns:
         A log; its file goes with the object unless it is saved.
@@ -1547,6 +1549,10 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
     for name in known("option", options, IMPORT_OPTIONS):
         field, kinds, wanted = IMPORT_OPTIONS[name]
         told[field] = checked(name, options[name], kinds, wanted)
+        if isinstance(told[field], Mapping) and OF_ROBOTS[0] == kinds:
+            for robot, number in told[field].items():
+                checked(f"{name} of {robot!r}", number, Real, "a number")
+                checked(f"{robot!r} in {name}", robot, Integral, "the number of a robot")
     if "mapping" in told:
         told["mapping"] = Path(told["mapping"])
     if "flips" in told:

@@ -47,6 +47,11 @@ def known(what: str, names: Iterable[str], all_names: Collection[str]) -> tuple[
 def in_python(sentence: str) -> str:
     """A sentence of a program, with its options as arguments of the library."""
     sentence = sentence.replace(" (--help lists the options)", "").replace("--force", "force=True")
+    sentence = re.sub(
+        r"--(pose-\w+-\w+) R(\d+)=(-?\d+(?:\.\d+)?)",
+        lambda own: f"{own[1].replace('-', '_')}={{{int(own[2])}: {own[3]}}}",
+        sentence,
+    )
     return re.sub(
         r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), sentence
     )

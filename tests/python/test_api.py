@@ -310,6 +310,10 @@ WRONG_TYPES = {  # what is called, and what the sentence says
         lambda log, model: tm.import_log("a.csv", "b.csv", pose_shift_s="1"),
         "pose_shift_s: is '1', and must be a number",
     ),
+    "shift of a robot": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", pose_shift_s={"R02": 1}),
+        "'R02' in pose_shift_s: is 'R02', and must be the number of a robot",
+    ),
     "poses": (lambda log, model: tm.import_log(5, 6), "poses: is 5, and must be a table"),
     "card": (lambda log, model: tm.effect(None), "name: is a NoneType, and must be"),
     "progress": (

@@ -541,7 +541,15 @@ def test_command_prints_one_json_object(put, tmp_path):
     )
     summary = json.loads(result.stdout)
     assert summary["robots"] == [
-        {"robot_id": 4, "command_kind": "duty", "commands": 46, "poses": 3, "poses_valid": 3}
+        {
+            "robot_id": 4,
+            "command_kind": "duty",
+            "commands": 46,
+            "command_rows": 2,
+            "command_changes": 1,
+            "poses": 3,
+            "poses_valid": 3,
+        }
     ]
     assert summary["duration_s"] == 1.0 and summary["out"].endswith("o.lcmlog")
 

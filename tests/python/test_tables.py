@@ -267,7 +267,7 @@ def test_an_empty_cell_of_a_command_holds_the_one_before(imported):
     gaps = COMMANDS.assign(vx_mps=COMMANDS.vx_mps.where(COMMANDS.index % 50 != 20))
     robots, warnings = imported(commands=gaps)
     np.testing.assert_allclose(robots[4].command_t_s, gaps.t_s[gaps.vx_mps.notna()], atol=2e-6)
-    assert any("6 rows have an empty cell (the first is row 22)" in w for w in warnings)
+    assert any("6 rows have an empty cell or NaN (the first is row 22)" in w for w in warnings)
 
 
 @pytest.mark.parametrize("cut", [5, 25])

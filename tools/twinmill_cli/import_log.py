@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -23,11 +24,28 @@ if working():  # not for --help
     from twinmill.data.importers.ros_messages import STEERED
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import Table as TableFile
+    from twinmill.data.measurement_table import is_number
     from twinmill.files import replacing
     from twinmill.report import show
     from twinmill.report.tables import Cell, Table
 
 SHOWN = 10  # warnings in the terminal; --json has all
+
+
+def _of_robots(option: str, given: list[str] | None) -> dict[int | None, float]:
+    """Sums by robot; None stands for all of them."""
+    sums: dict[int | None, float] = {}
+    for text in given or []:
+        robot, equals, number = text.rpartition("=")
+        digits = robot.removeprefix("R")
+        if not is_number(number) or (equals and not digits.isdecimal()):
+            wrong = f"{text} is no number, and not that of one robot, as R02=0.4 is."
+            raise typer.BadParameter(wrong, param_hint=f"'{option}'")
+        if not math.isfinite(float(number)):
+            raise typer.BadParameter(f"{text} is no finite number.", param_hint=f"'{option}'")
+        key = int(digits) if equals else None
+        sums[key] = sums.get(key, 0.0) + float(number)
+    return sums
 
 
 def register(app: typer.Typer) -> None:
@@ -145,10 +163,21 @@ def _command(
             help="Axis that is up in the export, y or z; default: Motive's y, Vicon's z.",
         ),
     ] = None,
-    pose_shift_s: Annotated[float, typer.Option(help="Added to the times of poses.")] = 0.0,
+    pose_shift_s: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[ROBOT=]SECONDS",
+            help="Added to the times of poses: of all, or as R02=0.4 of one robot; what is given "
+            "several times adds up.",
+        ),
+    ] = None,
     pose_clock_ppm: Annotated[
-        float, typer.Option(help="By which the poses' clock gains on the commands', taken out.")
-    ] = 0.0,
+        list[str] | None,
+        typer.Option(
+            metavar="[ROBOT=]PPM",
+            help="By which the poses' clock gains on the commands', taken out; likewise.",
+        ),
+    ] = None,
     heading_offset_deg: Annotated[
         float,
         typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
@@ -177,6 +206,8 @@ def _command(
 
     Example: twinmill import --poses poses.csv --commands commands.csv -o run.lcmlog
     """
+    shifts_s = _of_robots("--pose-shift-s", pose_shift_s)
+    gains_ppm = _of_robots("--pose-clock-ppm", pose_clock_ppm)
     if beside:
         raise LogError(
             f"{beside[0]}: stands alone; write the option before each file, or quote the "
@@ -198,7 +229,7 @@ def _command(
     options = ImportOptions(
         mapping=mapping,
         flips=frozenset(flip or []),
-        pose_clock_ppm=pose_clock_ppm,
+        pose_clock_ppm=gains_ppm,
         pose_topics=tuple(pose or []),
         command_topics=tuple(command or []),
         receive_stamps=receive_stamps,
@@ -211,7 +242,7 @@ def _command(
             for name, number in (_pair(text, "--robot NAME=ID") for text in robot or [])
         },
         up=up,
-        pose_shift_s=pose_shift_s,
+        pose_shift_s=shifts_s,
         path_heading=path_heading,
         same_clock=same_clock,
         force=force,
@@ -338,7 +369,8 @@ def _print(summary: dict) -> None:
     columns = {
         "robot_id": "robot",
         "command_kind": "driven by",
-        "commands": "commands",
+        "command_rows": "commands",
+        "command_changes": "changes",
         "poses": "poses",
         "poses_valid": "of them valid",
     }

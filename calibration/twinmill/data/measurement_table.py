@@ -29,7 +29,7 @@ DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
-LOST = ("", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost measurement
+LOST = ("", "nan", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost one
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
 UNNAMED = "column_{}"  # what columns are called in a file that does not name them
 BEGINNING_BYTES = 65536  # tell the encoding
@@ -77,6 +77,14 @@ def _encoding(binary: io.BufferedReader) -> str:
     except UnicodeDecodeError:
         return "cp1252" if b"\0" not in beginning else "utf-8"
     return "utf-8-sig"
+
+
+class CellError(LogError):
+    """A cell of `row` that is no measurement; the rows of other robots may well be."""
+
+    def __init__(self, sentence: str, row: list[str]) -> None:
+        super().__init__(sentence)
+        self.row = row
 
 
 @dataclass(frozen=True)
@@ -144,28 +152,36 @@ class Table:
 
         Args:
             column: its name.
-            empty_is_nan: take empty cells, and LOST words, for lost measurements.
+            empty_is_nan: take empty cells, LOST words and infinity for lost measurements.
 
         Raises:
-            LogError: the column is missing, or a cell is no number (its row is named).
+            LogError: the column is missing.
+            CellError: a cell is no number (its row is named).
         """
         cells = self.cells(column)
         if empty_is_nan:
             cells = ["nan" if cell.lower() in LOST else cell for cell in cells]
         try:
             values = np.array([float(cell) for cell in cells])
+            if empty_is_nan:
+                values[np.isinf(values)] = np.nan
             return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
         except ValueError:
             bad = next(k for k, cell in enumerate(cells) if not is_number(cell))
-            raise LogError(
+            raise CellError(
                 f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', not a "
-                "number; correct or remove the row."
+                "number; correct or remove the row.",
+                self.rows[bad],
             ) from None
 
     def finite(self, column: str) -> np.ndarray:
         """Like numbers, but NaN and infinity are errors too."""
         values = self.numbers(column)
-        self.refuse(~np.isfinite(values), column, values, "must be a finite number")
+        if not np.isfinite(values).all():
+            k = int(np.isfinite(values).argmin())
+            raise CellError(
+                self._refusal(k, column, values[k], "must be a finite number"), self.rows[k]
+            )
         return values
 
     def flags(self, column: str) -> np.ndarray:
@@ -198,9 +214,10 @@ class Table:
             spans = pd.to_timedelta(pd.Series(cells), errors="coerce")
         if spans.isna().any():
             bad = int(spans.isna().to_numpy().argmax())
-            raise LogError(
+            raise CellError(
                 f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', no time like the "
-                "rows before; correct or remove the row."
+                "rows before; correct or remove the row.",
+                self.rows[bad],
             )
         seconds = (spans // pd.Timedelta(microseconds=1)).to_numpy(float) / 1e6
         return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=DAY_S)
@@ -209,10 +226,13 @@ class Table:
         """Raises LogError on the first row that is bad, with its value and why."""
         if bad.any():
             k = int(np.argmax(bad))
-            raise LogError(
-                f"{self.name}: row {self.line[k]}: {column} is {values[k]:g}, but "
-                f"{why}; correct or remove the row."
-            )
+            raise LogError(self._refusal(k, column, values[k], why))
+
+    def _refusal(self, k: int, column: str, value: float, why: str) -> str:
+        return (
+            f"{self.name}: row {self.line[k]}: {column} is {value:g}, but {why}; correct or remove "
+            "the row."
+        )
 
     def missing(self, column: str) -> LogError:
         """The error to raise where this column is needed and not there."""

@@ -352,7 +352,10 @@ def _one_turn(ahead_m: np.ndarray, heading_rad: np.ndarray) -> complex:
     each along another one, by twice its heading: the steps mirrored back then lie on the heading.
     """
     back = np.exp(-1j * heading_rad)
-    turn, flip = (np.sum(s * back) / np.sum(np.abs(s)) for s in (ahead_m, np.conj(ahead_m)))
+    way_m = np.sum(np.abs(ahead_m))
+    if not way_m:
+        return 0
+    turn, flip = (np.sum(s * back) / way_m for s in (ahead_m, np.conj(ahead_m)))
     mirrored = 1 - abs(flip.real) < (1 - abs(turn)) / 2
     return 0 if abs(turn) < ONE_ANGLE or mirrored else turn
 

@@ -17,11 +17,18 @@ from twinmill.data.checks.commands import (
     check_foreign,
 )
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
-from twinmill.data.checks.series import check_commanded, check_length, check_poses, check_track
+from twinmill.data.checks.series import (
+    check_changes,
+    check_commanded,
+    check_length,
+    check_poses,
+    check_track,
+)
 from twinmill.data.track import Track
 
 __all__ = [
     "InputFinding",
+    "check_changes",
     "check_commanded",
     "check_driven",
     "check_poses",

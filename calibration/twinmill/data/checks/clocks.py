@@ -142,7 +142,8 @@ def _is_step(search: Search, own: Explained, jump: Jump) -> bool:
 
 def _of_drift(checked: CheckedTrack, drift: str, rate: float) -> InputFinding:
     """A rate that crystals have; at others several steps may be behind it, which look alike."""
-    apart, anew = "the two clocks run apart", f"import anew with --pose-clock-ppm={1e6 * rate:.0f}"
+    apart = "the two clocks run apart"
+    anew = f"import anew with {checked.option('--pose-clock-ppm')}{1e6 * rate:.0f}"
     if abs(rate) <= 1e-6 * CHECKS.most_ppm:
         return checked.finding(apart, drift, f"{OWN_CLOCKS}, or {anew}", fatal=False)
     later = "later and later" if rate > 0 else "sooner and sooner"

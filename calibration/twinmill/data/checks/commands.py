@@ -186,7 +186,8 @@ def _shifted(
         f"the commands explain {1 - own.left:.0%} of the motion as it is stamped, and "
         f"{1 - far.left:.0%} with that shift",
         "stamp both with one clock, or import anew with "
-        f"--pose-shift-s={0.1 - far.late_s:.1f}; what is then left of the shift is searched",
+        f"{checked.option('--pose-shift-s')}{0.1 - far.late_s:.1f}; what is then left of the "
+        "shift is searched",
     )
 
 

@@ -50,6 +50,10 @@ class CheckedTrack:
     track: Track
     body: np.ndarray
 
+    def option(self, name: str) -> str:
+        """An option of `twinmill import` up to its number: of this robot, not of all."""
+        return f"{name} R{self.track.robot_id:02d}="
+
     def finding(
         self, what: str, evidence: str, remedy: str, *, fatal: bool = True, steady: bool = True
     ) -> InputFinding:

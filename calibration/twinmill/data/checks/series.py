@@ -24,6 +24,27 @@ def check_commanded(robot: RobotLog, label: str) -> list[InputFinding]:
     return _absurd(robot, label) or _under_one_number(robot, label)
 
 
+def check_changes(robot: RobotLog, label: str) -> list[InputFinding]:
+    """A finding where a robot is told one thing from its first pose to its last."""
+    first_s, last_s = robot.pose_t_s[[0, -1]]
+    told = robot.command[max(0, np.searchsorted(robot.command_t_s, first_s, "right") - 1) :]
+    told = told[: max(1, len(told) - np.count_nonzero(robot.command_t_s > last_s))]
+    if np.any(np.diff(told, axis=0)):
+        return []
+    return [
+        InputFinding(
+            "its command never changes",
+            f"one is held for all {last_s - first_s:.0f} s of its poses",
+            "check that all rows of its commands are there, or drive it with several, since how a "
+            "robot follows its commands shows where they change, and hardly anything else of it can "
+            "be learned",
+            False,
+            label,
+            robot.robot_id,
+        )
+    ]
+
+
 def _under_one_number(robot: RobotLog, label: str) -> list[InputFinding]:
     """A finding where commands go to and fro faster than any robot follows.
 

@@ -2,14 +2,20 @@
 """Makes a log from motion capture exports and command tables of others."""
 
 import hashlib
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import tomlkit
 
-from twinmill.data.checks import check_commanded, check_driven, check_poses, check_recorded
+from twinmill.data.checks import (
+    check_changes,
+    check_commanded,
+    check_driven,
+    check_poses,
+    check_recorded,
+)
 from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
@@ -46,6 +52,8 @@ SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in leng
 SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
+OfRobots = float | Mapping[int | None, float]  # of all robots; or by robot_id, None for all
+
 
 @dataclass(frozen=True)
 class ImportOptions:
@@ -59,8 +67,8 @@ class ImportOptions:
         mapping: file that says which column is what, in place of `rename`.
         flips: our columns that are to change their sign.
         up: "y" or "z", the axis that an export of Motive or Vicon calls up; None: its default.
-        pose_shift_s: added to the stamps of all poses.
-        pose_clock_ppm: by which the poses' clock gains on the commands', taken out.
+        pose_shift_s: added to the stamps of poses; of a robot that is named, to that of all.
+        pose_clock_ppm: by which the poses' clock gains on the commands', taken out; likewise.
         heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
         path_heading: take the heading from the path, where positions alone were recorded.
         same_clock: one clock stamped poses and commands: no offset is estimated.
@@ -77,8 +85,8 @@ class ImportOptions:
     mapping: Path | None = None
     flips: frozenset[str] = frozenset()
     up: str | None = None
-    pose_shift_s: float = 0.0
-    pose_clock_ppm: float = 0.0
+    pose_shift_s: OfRobots = 0.0
+    pose_clock_ppm: OfRobots = 0.0
     heading_offset_rad: float = 0.0
     path_heading: bool = False
     same_clock: bool = False
@@ -116,8 +124,9 @@ def import_log(
         options: how to read them.
 
     Returns:
-        out, robots[] {robot_id, command_kind, commands, poses, poses_valid}, messages (commands and
-        poses), duration_s, warnings[].
+        out, robots[] {robot_id, command_kind, commands, command_rows, command_changes, poses,
+        poses_valid}, messages (commands and poses), duration_s, warnings[]. A row of duties may be
+        many commands, since it is repeated while it is held.
 
     Raises:
         LogError: one sentence on what is wrong; nothing was written.
@@ -178,6 +187,7 @@ def import_log(
         [own for own in series if own.robot_id not in left_out]
         for series in (pose_series, command_series)
     )
+    rows = {own.robot_id: len(own.utime_us) for own in command_series}
     if options.path_heading:
         pose_series = _headed(pose_series, command_series)
     by_robot = {series.robot_id: series for series in pose_series}
@@ -191,7 +201,7 @@ def import_log(
         write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
         warnings = [f"Left out: {why}" for why in left_out.values()]
         warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
-        return _summary(read_log(temporary), out, warnings)
+        return _summary(read_log(temporary), out, warnings, rows)
 
 
 def _read_capture(
@@ -298,6 +308,15 @@ def _check_names(options: ImportOptions, ids: list[int]) -> None:
             raise LogError(
                 f"--robot {name}={number}: no robot in the files has that name; correct it."
             )
+    of_poses = {"--pose-shift-s": options.pose_shift_s, "--pose-clock-ppm": options.pose_clock_ppm}
+    for option, given in of_poses.items():
+        named = set(given) - {None} if isinstance(given, Mapping) else set()
+        if unknown := named - set(ids):
+            raise LogError(
+                f"{option} R{min(unknown):02d}={given[min(unknown)]:g}: no robot in the files has "
+                f"that number, they are {', '.join(f'R{k:02d}' for k in sorted(set(ids)))}; "
+                "correct it."
+            )
 
 
 def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
@@ -306,7 +325,7 @@ def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
     turn = np.array([np.cos(half), 0, 0, np.sin(half)])
     return PoseSeries(
         series.robot_id,
-        _on_our_clock(series.utime_us, options),
+        _on_our_clock(series, options),
         series.position_m,
         multiply(series.orientation_wxyz, turn),
         series.valid,
@@ -328,10 +347,19 @@ def _headed(poses: list[PoseSeries], commands: list[CommandSeries]) -> list[Pose
     ]
 
 
-def _on_our_clock(utime_us: np.ndarray, options: ImportOptions) -> np.ndarray:
+def _on_our_clock(series: PoseSeries, options: ImportOptions) -> np.ndarray:
     """Stamps without the drift, counted from the first, and shifted."""
-    since_us = (utime_us - utime_us[0]) / (1 + 1e-6 * options.pose_clock_ppm)
-    return utime_us[0] + np.round(since_us).astype(np.int64) + round(options.pose_shift_s * 1e6)
+    first_us, number = series.utime_us[0], series.robot_id
+    gains = 1 + 1e-6 * _of(number, options.pose_clock_ppm)
+    since_us = np.round((series.utime_us - first_us) / gains).astype(np.int64)
+    return first_us + since_us + round(1e6 * _of(number, options.pose_shift_s))
+
+
+def _of(robot_id: int, given: OfRobots) -> float:
+    """What is given for a robot: of all and its own added, so that a remedy is added to options."""
+    if isinstance(given, Mapping):
+        return given.get(None, 0.0) + given.get(robot_id, 0.0)
+    return given
 
 
 def _of_no_run(
@@ -358,19 +386,34 @@ def _of_no_run(
             f"robot has both; number them alike, for example with --robot {ids[0]}="
             f"{poses[0].robot_id}."
         )
-    wrong = {}
-    for p, c in pairs:
-        try:
-            _check_times(p, c, shift)
-        except LogError as error:
-            wrong[p.robot_id] = error
+    wrong = _wrong_times(pairs, shift, own=True)
     if len(wrong) == len(pairs):
-        raise next(iter(wrong.values()))
+        raise next(iter(_wrong_times(pairs, shift, own=False).values()))
     return wrong
 
 
-def _check_times(p: PoseSeries, c: CommandSeries, shift: bool) -> None:
-    """Raises LogError unless poses and commands of a robot are of one time, without long holds."""
+def _wrong_times(
+    pairs: list[tuple[PoseSeries, CommandSeries]], shift: bool, own: bool
+) -> dict[int, LogError]:
+    """Errors of `_check_times` by robot."""
+    wrong = {}
+    for p, c in pairs:
+        try:
+            _check_times(p, c, shift, own)
+        except LogError as error:
+            wrong[p.robot_id] = error
+    return wrong
+
+
+def _check_times(p: PoseSeries, c: CommandSeries, shift: bool, own: bool) -> None:
+    """Raises LogError unless poses and commands of a robot are of one time, without long holds.
+
+    Args:
+        p: poses of one robot.
+        c: its commands.
+        shift: the remedy is a shift of the poses ...
+        own: ... of this robot alone, since others' are right as they are.
+    """
     first_s, last_s = p.utime_us[[0, -1]] / 1e6
     start_s, end_s = c.utime_us[[0, -1]] / 1e6
     _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
@@ -378,7 +421,7 @@ def _check_times(p: PoseSeries, c: CommandSeries, shift: bool) -> None:
     if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
         remedy = (
             "shift the poses, for example so that both start together: --pose-shift-s "
-            f"{start_s - first_s:.3f}"
+            f"{f'R{p.robot_id:02d}=' if own else ''}{start_s - first_s:.3f}"
             if shift
             else "take the times of receipt of both: --receive-stamps"
         )
@@ -431,8 +474,8 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "up": options.up or "",
                 "path_heading": options.path_heading,
                 "same_clock": options.same_clock,
-                "pose_shift_s": options.pose_shift_s,
-                "pose_clock_ppm": options.pose_clock_ppm,
+                "pose_shift_s": _in_toml(options.pose_shift_s),
+                "pose_clock_ppm": _in_toml(options.pose_clock_ppm),
                 "pose_topics": list(options.pose_topics),
                 "command_topics": list(options.command_topics),
                 "wheelbase_m": options.wheelbase_m or 0.0,
@@ -446,8 +489,22 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
     )
 
 
-def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
-    """What import_log returns, by reading the log as everybody else will."""
+def _in_toml(given: OfRobots) -> float | dict[str, float]:
+    """A number, or by robot."""
+    if not isinstance(given, Mapping):
+        return given
+    return {"all" if k is None else f"R{k:02d}": value for k, value in given.items()}
+
+
+def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> dict:
+    """What import_log returns, by reading the log as everybody else will.
+
+    Args:
+        log: as it was written.
+        out: where it will be.
+        warnings: of the sources.
+        rows: of commands in the sources, by robot.
+    """
     warnings = warnings + log.warnings
     robots, end_s = [], 0.0
     for robot in log.robots.values():
@@ -458,6 +515,8 @@ def _summary(log: Log, out: Path, warnings: list[str]) -> dict:
                 "robot_id": robot.robot_id,
                 "command_kind": robot.command_kind,
                 "commands": len(robot.command_t_s),
+                "command_rows": rows.get(robot.robot_id, 0),
+                "command_changes": int(np.diff(robot.command, axis=0).any(axis=1).sum()),
                 "poses": len(robot.pose_t_s),
                 "poses_valid": int(robot.valid.sum()),
                 **({"detections": len(robot.seen)} if len(robot.seen) else {}),
@@ -490,6 +549,7 @@ def _judged(robot: RobotLog) -> list[str]:
         track = make_track(robot)
         tracks = [("", track)]
         found = [f for f in check_recorded(tracks, None) if f.fatal] or check_driven(tracks, None)
+        found += check_changes(robot, "")
         notes = [] if any(f.fatal for f in found) else track.notes
     said = [f"{f.what}: {f.evidence}; {f.remedy}." for f in found]
     return [f"robot {robot.robot_id}: {words}" for words in (*notes, *said)]

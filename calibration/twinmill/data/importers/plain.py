@@ -2,9 +2,10 @@
 """Poses and commands from plain CSV files, as described under `twinmill import --help`."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import turbopi
@@ -20,7 +21,7 @@ from twinmill.data.importers.series import (
 )
 from twinmill.data.importers.stamps import sound_rows
 from twinmill.data.log import CommandKind, LogError
-from twinmill.data.measurement_table import Table, is_number
+from twinmill.data.measurement_table import LOST, CellError, Table, is_number
 from twinmill.model.mixing import duties_from_inputs
 
 HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
@@ -41,6 +42,7 @@ OF_COMMANDS = frozenset(
 )
 OF_DETECTIONS = frozenset({"t_s", "robot_id", "seen", "range_m", "bearing_rad"})
 KNOWN = OF_POSES | OF_COMMANDS
+Series = TypeVar("Series", PoseSeries, CommandSeries, DetectionSeries)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,10 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = columns.read(path, OF_POSES)
+    return _of_sound_robots(columns.read(path, OF_POSES), columns, _poses)
+
+
+def _poses(table: Table, columns: Columns) -> list[PoseSeries]:
     table, utime_us, ids, notes = _stamped(table, columns)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
@@ -107,13 +112,16 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
     Args:
         path: CSV with t_s, robot_id and one group of VALUES, INPUTS or WORLD (inputs may stand
             beside duties, omega_radps beside WORLD); each row is held until the next, and over rows
-            with an empty cell.
+            with a cell that is empty or NaN.
         columns: how to read it.
 
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = columns.read(path, OF_COMMANDS)
+    return _of_sound_robots(columns.read(path, OF_COMMANDS), columns, _commands)
+
+
+def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
     kind, world = _kind(table), table.has(*WORLD)
     table = _complete(table, kind)
     table, utime_us, ids, notes = _stamped(table, columns)
@@ -155,7 +163,10 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    table = columns.read(path, OF_DETECTIONS)
+    return _of_sound_robots(columns.read(path, OF_DETECTIONS), columns, _seen)
+
+
+def _seen(table: Table, columns: Columns) -> list[DetectionSeries]:
     table, utime_us, ids, notes = _stamped(table, columns)
     seen = table.flags("seen")
     table.refuse((seen != 0) & (seen != 1), "seen", seen, "must be 0 or 1")
@@ -184,6 +195,30 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
         )
         for number, rows, notes in _by_robot(table, ids, utime_us, notes)
     ]
+
+
+def _of_sound_robots(
+    table: Table, columns: Columns, read: Callable[[Table, Columns], list[Series]]
+) -> list[Series]:
+    """Series of the robots whose cells can all be read; of others the reason is told.
+
+    Raises:
+        CellError: those of no robot can.
+    """
+    left_out: list[str] = []
+    while True:
+        try:
+            found = read(table, columns)
+        except CellError as error:
+            ids, _ = _robot_ids(table, columns)
+            number = next(i for i, row in zip(ids, table.rows, strict=True) if row is error.row)
+            left_out.append(f"Left out: robot {number}: {error}")
+            table = table.where(ids != number)
+            if not table.rows:
+                raise
+            continue
+        found[0].warnings.extend(left_out)
+        return found
 
 
 def _input(table: Table, name: str) -> np.ndarray:
@@ -223,14 +258,17 @@ def _columns_of(table: Table, kind: CommandKind) -> tuple[str, ...]:
 
 
 def _complete(table: Table, kind: CommandKind) -> Table:
-    """Without the rows that have an empty cell: the command before is held over them."""
+    """Without the rows that have an empty cell or NaN: the command before is held over them."""
     needed = [table.cells(name) for name in _columns_of(table, kind)]
-    whole = np.array([all(cells) for cells in zip(*needed, strict=True)])
+    whole = np.array(
+        [not any(cell.lower() in LOST for cell in cells) for cells in zip(*needed, strict=True)]
+    )
     if whole.all() or not whole.any():
         return table
     note = (
-        f"{table.name}: {np.count_nonzero(~whole)} rows have an empty cell (the first is row "
-        f"{table.line[int((~whole).argmax())]}); left out: the command before is held."
+        f"{table.name}: {np.count_nonzero(~whole)} rows have an empty cell or NaN (the first is "
+        f"row {table.line[int((~whole).argmax())]}); left out: the command before is held, if there "
+        "is one."
     )
     return replace(table.where(whole), notes=[*table.notes, note])
 
