@@ -35,9 +35,8 @@ def check_changes(robot: RobotLog, label: str) -> list[InputFinding]:
         InputFinding(
             "its command never changes",
             f"one is held for all {last_s - first_s:.0f} s of its poses",
-            "check that all rows of its commands are there, or drive it with several, since how a "
-            "robot follows its commands shows where they change, and hardly anything else of it can "
-            "be learned",
+            "check that all its commands are there, or drive it with several: how a robot follows "
+            "them shows where they change, and hardly anything else of this one can be learned",
             False,
             label,
             robot.robot_id,

@@ -267,8 +267,8 @@ def _complete(table: Table, kind: CommandKind) -> Table:
         return table
     note = (
         f"{table.name}: {np.count_nonzero(~whole)} rows have an empty cell or NaN (the first is "
-        f"row {table.line[int((~whole).argmax())]}); left out: the command before is held, if there "
-        "is one."
+        f"row {table.line[int((~whole).argmax())]}); left out: the command before is held, if "
+        "there is one."
     )
     return replace(table.where(whole), notes=[*table.notes, note])
 
