@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables and progress in terminals of any width: no word or number of them is cut."""
 
+from collections.abc import Sequence
+
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.measure import Measurement
@@ -32,32 +34,50 @@ class Fitting:
 
     Args:
         made: the table; its columns are as wide as their longest word, or cell if they do not wrap.
-            Where that is too wide, columns that stand left wrap.
+            Where that is too wide, columns that stand left wrap. Its caption goes over the whole
+            width.
+        listed: columns of lists with commas; where it is too wide, each entry has a line.
     """
 
-    def __init__(self, made: Table) -> None:
-        self.made = made
+    def __init__(self, made: Table, listed: Sequence[int] = ()) -> None:
+        self.made, self.listed = made, listed
+        self.caption, made.caption = made.caption, None
         self._set_least()
 
-    def _set_least(self) -> None:
-        for column in self.made.columns:
-            parts = str.splitlines if column.no_wrap else str.split
+    def _set_least(self, listed: Sequence[int] = ()) -> None:
+        for k, column in enumerate(self.made.columns):
+            parts = str.splitlines if column.no_wrap or k in listed else str.split
             cells = (str(cell) for cell in (column.header, *column.cells))
             column.min_width = max((cell_len(part) for c in cells for part in parts(c)), default=0)
+
+    def _one_a_line(self) -> None:
+        """Entries of lists, of which no number stands apart from its name."""
+        for k in self.listed:
+            column = self.made.columns[k]
+            column._cells = [
+                Text(str(cell).replace(", ", ",\n"), getattr(cell, "style", ""))
+                for cell in column.cells
+            ]
+        self._set_least(self.listed)
 
     def _fits(self, console: Console, options: ConsoleOptions) -> bool:
         wide = options.update(max_width=MOST_WIDE)
         return Measurement.get(console, wide, self.made).minimum <= options.max_width
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        whole = Measurement.get(console, options.update(max_width=MOST_WIDE), self.made).maximum
+        if self.listed and whole > options.max_width:
+            self._one_a_line()
         if not self._fits(console, options):
             for column in self.made.columns:
                 column.no_wrap &= column.justify != "left"
+            self._set_least(self.listed)
+        if not self._fits(console, options):
             self._set_least()
         if self._fits(console, options):
             yield self.made
-            if self.made.caption:
-                yield Text()
+            if self.caption:
+                yield from self._below()
             return
         if self.made.title:
             yield Text(str(self.made.title), "bold")
@@ -66,8 +86,11 @@ class Fitting:
             named = zip(heads, row, strict=True)
             told = [Text.assemble((f"{head} ", "dim"), c) for head, c in named if str(c).strip()]
             yield Text("; ").join(told)
-        if self.made.caption:
-            yield Text(str(self.made.caption), "dim")
+        yield from self._below()
+
+    def _below(self) -> RenderResult:
+        if self.caption:
+            yield Text(str(self.caption), "dim")
         yield Text()
 
 

@@ -45,6 +45,20 @@ def test_a_table_whose_first_column_need_not_wrap_wraps_it_before_it_stops_being
     assert "45 to 81 %" in narrow and "share 45" not in narrow
 
 
+def test_a_list_that_is_too_wide_has_a_line_for_each_entry_and_the_caption_all_columns():
+    """An estimate of which the name stands on one line and the number on the next reads badly."""
+    entries = ["loss 0.82 ± 0.2", "from_s 20.2 ± 3 s", "until_s 28.8 ± 3 s"]
+    for columns in (44, 80):
+        table = Table(box=None, caption="A caption of words that fit no narrow table but these.")
+        table.add_column("effect", no_wrap=True)
+        table.add_column("estimates")
+        table.add_row("transient_loss", ", ".join(entries))
+        told = [line.strip() for line in printed(Fitting(table, listed=(1,)), columns).splitlines()]
+        ends = [line.removeprefix("transient_loss").strip(" ,") for line in told]
+        assert entries == ends[1:4] if columns == 44 else ", ".join(entries) in ends[1]
+        assert any(line.startswith("A caption of words that fit no narrow") for line in told)
+
+
 @pytest.mark.parametrize("columns", WIDTHS)
 def test_progress_keeps_its_words_and_numbers(columns, monkeypatch):
     monkeypatch.setenv("COLUMNS", str(columns))

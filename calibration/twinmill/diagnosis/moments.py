@@ -29,20 +29,22 @@ HORIZON = HORIZONS_S.index(0.5)
 LESS, MORE = 0.9, 1.1  # of the predicted way
 BACK = -0.1  # of it: noise of a robot that is held is less
 STANDS = 0.1  # of the usual way: where less is predicted, no share of it means anything
+TOLD = 0.5  # of the usual way: where as much is predicted and it stands, a robot is held ...
+HELD_S = 2.0  # ... if that lasts
 HARDLY = 0.05  # share of the way: events that all change it by less must be twice as many
 
 What = Literal["less", "back", "more", "elsewhere", "unasked"]
 DID: dict[What, str] = {
-    "less": "it went {way} of the predicted way in half a second",
-    "back": "it drove backwards, {way} of the predicted way in half a second",
-    "more": "it went {way} of the predicted way in half a second",
+    "less": "it went {way} the predicted way in half a second",
+    "back": "it drove backwards, {way} the predicted way in half a second",
+    "more": "it went {way} the predicted way in half a second",
     "elsewhere": "it went elsewhere, or turned",
     "unasked": "it moved where it was told to stand",
 }
 AS_WHERE: dict[What, str] = {
     "less": "a motor or the supply drops out, or wheels slip or are held",
     "back": "it is pushed back, or a command was lost",
-    "more": "it is pushed or a command was not recorded",
+    "more": "it is pushed, rolls on after a command, or a command was not recorded",
     "elsewhere": "a command was lost or came late",
     "unasked": "it is pushed, or a command to stand was lost",
 }
@@ -234,6 +236,25 @@ def left_out(own: Opened) -> list[Stretch]:
     return found
 
 
+def held(own: Opened) -> list[tuple[float, float]]:
+    """From when to when, s, a robot stood that was told to drive; whiles of HELD_S or more."""
+    data = own.data
+    measured, missed = (
+        np.nan_to_num(d[:, HORIZON]) * ARM for d in (data.measured, data.errors(own.model))
+    )
+    size, went = (np.linalg.norm(way, axis=1) for way in (measured - missed, measured))
+    usual = float(np.sqrt(np.mean(size**2)))
+    told = np.flatnonzero(size > TOLD * usual)
+    stood = went[told] < STANDS * usual
+    runs = np.split(told, np.flatnonzero(np.diff(stood)) + 1) if len(told) else []
+    whiles = [
+        (float(data.start_s[run[0]]), float(data.start_s[run[-1]] + HORIZONS_S[HORIZON]))
+        for run in runs
+        if went[run[0]] < STANDS * usual
+    ]
+    return [(begin_s, end_s) for begin_s, end_s in whiles if end_s - begin_s > HELD_S]
+
+
 def _ways(data: Trajectory, errors: np.ndarray) -> np.ndarray:
     """(W,) share of the predicted way that was gone along it in half a second."""
     measured, missed = (np.nan_to_num(d[:, HORIZON]) * ARM for d in (data.measured, errors))
@@ -269,5 +290,6 @@ def _listed(moments: Sequence[Moment]) -> str:
 
 
 def did(what: What, way: float) -> str:
-    """What a robot did, in a clause."""
-    return DID[what].format(way=f"{abs(100 * way):.0f} %")
+    """What a robot did, in a clause: a share of the way, or so many times that."""
+    size = abs(way)
+    return DID[what].format(way=f"{100 * size:.0f} % of" if size <= 1 else f"{size:.1f} times")

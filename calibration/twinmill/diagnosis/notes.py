@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.diagnosis.moments import left_out
+from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.moments import held, left_out
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.opening import Opened, of_few_commands
 from twinmill.model.model_file import ModelFile
@@ -18,6 +19,7 @@ from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
 MOST_TOLD = 3  # stretches
+WHILE = "transient_loss"  # for a while
 NOTABLE = 0.01  # change of a gain that is worth a sentence
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 
@@ -125,6 +127,27 @@ def disturbed_notes(opened: Sequence[Opened]) -> list[str]:
                 f"{own.measurement.label}: from {', from '.join(told[:MOST_TOLD])}{more}, unlike "
                 "all the rest. That is left out, as a push or a slip would be; if it was the floor "
                 "or the robot, drive there again, and longer."
+            )
+    return notes
+
+
+def held_notes(opened: Sequence[Opened], findings: Sequence[Finding]) -> list[str]:
+    """Where a loss for a while was found: a sentence on each robot that then did not move at all.
+
+    Args:
+        opened: with the models as given.
+        findings: of the motion.
+    """
+    if not any(WHILE in (f.effect, *(f.group or ())) for f in findings):
+        return []
+    notes = []
+    for own in opened:
+        whiles = held(own) if own.floor and own.data is not None else []
+        if whiles:
+            told = ", ".join(f"from {begin_s:.1f} to {end_s:.1f} s" for begin_s, end_s in whiles)
+            notes.append(
+                f"{own.measurement.label}: {told} it stood though it was told to drive: it was "
+                "held, or its motors were off."
             )
     return notes
 

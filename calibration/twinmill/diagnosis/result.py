@@ -10,7 +10,7 @@ from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
-from twinmill.diagnosis.rest import FIRM, Rest
+from twinmill.diagnosis.rest import FIRM, NOISE, Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT
@@ -114,6 +114,12 @@ class Diagnosis:
             return False
         return self.rest.share >= SETTINGS.nothing_left or self.verdict == "outside_catalogue"
 
+    @property
+    def rest_certainty(self) -> str:
+        """As `Rest.certainty`; what the verdict lets pass is not firm."""
+        passed = self.verdict in PASSES and self.rest.certainty == FIRM
+        return NOISE if passed else self.rest.certainty
+
     def to_json(self) -> dict:
         """The interface's object."""
         top = next((r.group for r in self.ranking if r.group is not None), None)
@@ -128,8 +134,8 @@ class Diagnosis:
             "findings": [f.to_json() for f in self.findings],
             "rest": {
                 "share": rest.share,
-                "firm": rest.firm and rest.certainty == FIRM and self.verdict not in PASSES,
-                "certainty": rest.certainty,
+                "firm": self.rest_certainty == FIRM,
+                "certainty": self.rest_certainty,
                 "told": self.is_left,
                 "depends_on": rest.depends_on,
                 "likely": rest.likely,

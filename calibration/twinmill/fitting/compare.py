@@ -193,24 +193,19 @@ class Comparison:
     def verdict(self) -> str:
         """What the score means, after what the input tells of when commands act."""
         told = unsteady([r.measurement for r in self.robots])
-        own = self._own_verdict
-        if told:
-            own = own.replace("nothing is missing", "nothing else is missing")
-        return " ".join([*told, own])
+        return " ".join([*told, self._own_verdict("nothing else" if told else "nothing")])
 
-    @property
-    def _own_verdict(self) -> str:
+    def _own_verdict(self, nothing: str) -> str:
         """What the score means; where some robots are missed and others not, of both."""
         missed = self.missed
         if not missed:
-            return _meaning(self.score)
+            return _meaning(self.score, nothing)
         others = [r.score for r in self.robots if r.score <= MISSING]
         named = [f"{r.measurement.label} (score {r.score:.3g})" for r in missed[:NAMED]]
         more = len(missed) - len(named)
         named += [f"{more} more"] if more else []
-        return (
-            f"Missed: {', '.join(named)}. {of_others(len(others), _meaning(total_score(others)))}"
-        )
+        rest = of_others(len(others), _meaning(total_score(others), nothing))
+        return f"Missed: {', '.join(named)}. {rest}"
 
     def to_json(self) -> dict:
         """The interface's object."""
@@ -233,14 +228,19 @@ def of_others(count: int, sentence: str) -> str:
     return f"{'The other' if one else 'All others'}: {sentence[0].lower()}{sentence[1:]}"
 
 
-def _meaning(score: float) -> str:
-    """What a score means, in a sentence."""
+def _meaning(score: float, nothing: str) -> str:
+    """What a score means, in a sentence.
+
+    Args:
+        score: to judge.
+        nothing: that, or nothing else where the input told something.
+    """
     if not np.isfinite(score):
         return "No score: no log tells its noise from the motion."
     if score < SUSPECT:
         return "Predicts better than the noise estimate: this log shows nothing to improve."
     if score <= GOOD:
-        return "As good as this log can tell: nothing is missing that it would show."
+        return f"As good as this log can tell: {nothing} is missing that it would show."
     if score <= MISSING:
         return (
             "Close to what this log can tell; a small effect may be missing, or parameters are "

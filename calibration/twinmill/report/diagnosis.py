@@ -72,7 +72,9 @@ def findings(diagnosis: Diagnosis) -> Table:
             [
                 Cell("left over", "dim"),
                 Cell(f"{100 * rest.share:.0f} %", "dim", rest.share),
-                Cell(rest.certainty if diagnosis.is_left else "no more than noise", "dim"),
+                Cell(
+                    diagnosis.rest_certainty if diagnosis.is_left else "no more than noise", "dim"
+                ),
                 Cell(on if diagnosis.is_left else "", "dim"),
             ]
         )
@@ -83,7 +85,8 @@ def findings(diagnosis: Diagnosis) -> Table:
         "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the "
         "data that were not fitted to. Estimates: ± is one standard error; a 95 % interval is "
         "about twice that to each side.",
-        words=(0, 2, 3),
+        words=(0, 2),
+        lists=(3,),
     )
 
 
@@ -110,7 +113,8 @@ def ranking(diagnosis: Diagnosis) -> Table:
         "share of what anything could explain; p: chance of such a fit if nothing were missing, "
         "for all effects together; effects of one group look alike in this log. Estimates of "
         "effects that were not found are those of the step that tried them.",
-        words=(0, 5),
+        words=(0,),
+        lists=(5,),
     )
 
 
@@ -168,7 +172,7 @@ def _alone(diagnosis: Diagnosis) -> str:
     told = [f for f in diagnosis.findings if f.effect in catalogue() and f.certainty != "doubtful"]
     others = [f" or {' or '.join(f.group[1:])}" if f.group else "" for f in told]
     words = [in_words(f.parameters) + other for f, other in zip(told, others, strict=True)]
-    return "; ".join(words) or "alone"
+    return "; ".join(words) or "the only one, so not compared"
 
 
 def _said_of(sentence: str) -> str:
@@ -195,7 +199,8 @@ def robots_off(diagnosis: Diagnosis) -> Table:
         rows,
         "Scores are of drives that were not fitted to: with the model of all, and with the robot's "
         "own. What the others lack was looked for without these robots.",
-        words=(1, 5),
+        words=(1,),
+        lists=(5,),
     )
 
 
@@ -205,7 +210,7 @@ def moments(diagnosis: Diagnosis) -> Table:
         [
             Cell(f"{m.log} R{m.robot_id:02d}"),
             Cell(f"{m.t_s:.1f}"),
-            Cell("-" if isnan(m.way) else f"{100 * m.way:.0f} %"),
+            Cell("-" if isnan(m.way) else f"{m.way:.2f}"),
             Cell(did(m.what, m.way).removeprefix("it ")),
         ]
         for m in diagnosis.rest.moments
@@ -215,7 +220,8 @@ def moments(diagnosis: Diagnosis) -> Table:
         ["log", "begins\ns", "of the\nway", "it"],
         rows,
         "From these on a robot did not do what was predicted; of the way: how much of the "
-        "predicted way it went in the half second that was farthest off; negative: backwards.",
+        "predicted way it went in the half second that was farthest off: 1 is all of it, less "
+        "than 0 backwards.",
         words=(0, 3),
     )
 

@@ -110,7 +110,8 @@ def effect(entry: dict) -> RenderableType:
     labels = ("equation", "stage", "leaves out", "measure by", "reference")
     keys = ("equation", "stage", "leaves_out", "measure", "reference")
     facts = [(label, entry[key]) for label, key in zip(labels, keys, strict=True)]
-    told = f"that are told {' or '.join(entry['drives'])}"
+    *others, last = entry["drives"]
+    told = f"that are told {' or '.join([', '.join(others), last] if others else [last])}"
     lines = _facts([*facts[:2], ("robots", told), *facts[2:]])
     return Group(
         Text.assemble((entry["name"], "bold"), f": {entry['summary']}"),
@@ -134,11 +135,11 @@ def table(data: Table) -> RenderableType:
         padding=(0, 1, 0, 0),
     )
     for i, column in enumerate(data.columns):
-        words = i in data.words
+        words = i in (*data.words, *data.lists)
         made.add_column(column, justify="left" if words else "right", no_wrap=not words or i == 0)
     for row in data.rows:
         made.add_row(*(_cell(cell) for cell in row))
-    return Fitting(made)
+    return Fitting(made, data.lists)
 
 
 def score_line(label: str, result: Comparison, number_too: bool = True) -> Text:

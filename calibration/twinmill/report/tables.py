@@ -41,13 +41,17 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """A table. Columns whose places are in `words` stand left and may wrap; a note goes below."""
+    """A table; a note goes below. By their places, columns of `words` stand left and may wrap.
+
+    Those of `lists` are words as well: entries with commas between them.
+    """
 
     title: str
     columns: list[str]
     rows: list[list[Cell]]
     note: str = ""
     words: tuple[int, ...] = (0,)
+    lists: tuple[int, ...] = ()
 
 
 def number(value: float | None, significant: int = 3) -> str:
@@ -90,15 +94,19 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading)),
         ("floor", robot.floor.reason or OF_RESPONSE),
-        (
-            "clock",
-            f"motion capture {number(1000 * abs(robot.time_offset_s))} ms "
-            f"{'ahead of' if robot.time_offset_s >= 0 else 'behind'} the robot",
-        ),
+        ("clock", _clock(robot)),
         *_held_heading(robot),
         *_wheel_angles(robot),
         *_phases(robot),
     ]
+
+
+def _clock(robot: RobotComparison) -> str:
+    """Of the poses, against that of the commands."""
+    if robot.measurement.track.same_clock and not robot.time_offset_s:
+        return "one stamped poses and commands"
+    side = "ahead of" if robot.time_offset_s >= 0 else "behind"
+    return f"motion capture {number(1000 * abs(robot.time_offset_s))} ms {side} the robot"
 
 
 def _held_heading(robot: RobotComparison) -> list[tuple[str, str]]:

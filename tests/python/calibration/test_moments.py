@@ -12,7 +12,8 @@ from twinmill.diagnosis.doubts import undetermined
 from twinmill.diagnosis.explain import _gained
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.later import Later, later_from
-from twinmill.diagnosis.moments import Moment, _begin_s, _done, sentence, to_look_at
+from twinmill.diagnosis.moments import Moment, _begin_s, _done, held, sentence, to_look_at
+from twinmill.diagnosis.notes import held_notes
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
 
@@ -55,6 +56,36 @@ def test_a_moment_is_told_by_what_happens_within_it(event_mps, way, what):
     assert told_way == pytest.approx(way, abs=0.05) and told == what
 
 
+@pytest.mark.parametrize(
+    ("event_mps", "lasts_s", "whiles"),
+    [(0.0, 8.0, 1), (0.0, 1.0, 0), (0.1, 8.0, 0), (-0.2, 8.0, 0)],
+    ids=["held", "shortly", "half as fast", "pushed back"],
+)
+def test_a_robot_that_stands_though_it_is_told_to_drive_was_held(
+    monkeypatch, event_mps, lasts_s, whiles
+):
+    monkeypatch.setattr(f"{__name__}.LASTS_S", lasts_s)
+    own = log_of((event_mps, 0.0))
+    own.data.errors = lambda _: own.errors
+    found = held(SimpleNamespace(data=own.data, model=None))
+    assert len(found) == whiles
+    for begin_s, end_s in found:
+        assert begin_s == pytest.approx(BEGINS_S, abs=0.15)
+        assert end_s == pytest.approx(BEGINS_S + lasts_s, abs=0.15)
+
+
+@pytest.mark.parametrize(("effect", "told"), [("transient_loss", True), ("motor_lag", False)])
+def test_that_a_robot_was_held_is_said_beside_a_loss_for_a_while(monkeypatch, effect, told):
+    monkeypatch.setattr(f"{__name__}.LASTS_S", 8.0)
+    own = log_of((0.0, 0.0))
+    own.data.errors = lambda _: own.errors
+    log = SimpleNamespace(
+        data=own.data, model=None, floor=True, measurement=SimpleNamespace(label="a.lcmlog R01")
+    )
+    notes = held_notes([log], [Finding("floor_patch", ("floor_patch", effect), [], 1.0, "group")])
+    assert [n.startswith("a.lcmlog R01: from 20.") for n in notes] == [True] * told
+
+
 def test_where_a_robot_is_told_to_stand_no_share_of_its_way_is_told():
     own = log_of((0.0, 0.0))
     data = own.data
@@ -71,6 +102,8 @@ def test_where_a_robot_is_told_to_stand_no_share_of_its_way_is_told():
     [
         ([(0.0, "less")] * 3, "it went 0 % of the predicted way"),
         ([(-1.0, "back")] * 2 + [(0.5, "less")], "it drove backwards, 100 % of the predicted way"),
+        ([(-2.5, "back")] * 3, "it drove backwards, 2.5 times the predicted way"),
+        ([(2.98, "more")] * 3, "it went 3.0 times the predicted way in half a second"),
         ([(1.0, "elsewhere")] * 3, "it went elsewhere, or turned"),
         ([(0.1, "less"), (-1.0, "back"), (2.0, "more")], "it did something else each time"),
     ],

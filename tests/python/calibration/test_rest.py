@@ -17,6 +17,7 @@ from twinmill.diagnosis.moments import Events
 from twinmill.diagnosis.notes import irregularity, is_random
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import FIRM, Dependence, Products, Rest, _standing_out, _tested
+from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT
@@ -375,6 +376,27 @@ def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, random, verdi
     assert words in weighed.sentence
     assert "depends most likely on starts or time" in weighed.sentence
     assert (rest.certainty == FIRM) == (last > 1.1)
+
+
+@pytest.mark.parametrize(
+    ("left", "verdict", "firm"),
+    [
+        (Rest(0.3, False, ["place"]), "outside_catalogue", True),
+        (Rest(0.3, True, []), "outside_catalogue", True),
+        (Rest(0.3, True, []), "model_adequate", False),
+        (Rest(0.3, False, ["place"]), "refit_enough", False),
+        (Rest(0.3, False, []), "ambiguous", False),
+    ],
+)
+def test_the_word_for_what_is_left_says_firm_where_the_flag_does(left, verdict, firm):
+    """`firm: false` had stood beside the word `firm` in one of two diagnoses with a rest."""
+    empty = SimpleNamespace(to_json=dict)
+    found = Diagnosis(
+        verdict, "", SimpleNamespace(score=1.5, robots=[], warnings=[]), 1.5, [], [], [], left,
+        None, SimpleNamespace(stopped=False, settings=SETTINGS, passes=1, last=empty),
+        [], [], [], [], None,
+    ).to_json()["rest"]  # fmt: skip
+    assert found["firm"] == firm == (found["certainty"] == FIRM)
 
 
 def test_what_a_model_missed_before_is_no_news_where_it_misses_less():
