@@ -61,6 +61,7 @@ rivals: build
 
 format: build
 	@scripts/lint --fix
+	@$(PYTHON) docs/site_hooks.py
 
 lint: build
 	@scripts/lint

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hooks of MkDocs: command blocks get the output of a run, the catalogue comes from the twin.
+"""Hooks of MkDocs: command blocks get the output of a run. Run by itself it renews the catalogue.
 
 A fenced block marked `console` holds commands, each after `$ `. All of a page that shows a part of
 `runs/<page>/` run one after the other in an empty folder; what they print goes below them, and the
@@ -19,7 +19,8 @@ BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"^`{3,}", re.MULTILINE)
 ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 PICTURES = {".svg", ".png", ".html"}
-MARK = "<!-- catalogue -->"
+EFFECTS = ROOT / "docs/effects.md"
+EQUATION = re.compile(r"^```equation\n(.*)\n```$", re.MULTILINE)
 FOREIGN = re.compile(
     r"""<(?:script|img|iframe)\b[^>]*\bsrc=["']?https?:[^>]*>|"""
     r"""<link\b[^>]*\brel=["']?(?:stylesheet|preload|icon)[^>]*https?:[^>]*>"""
@@ -74,16 +75,15 @@ def with_outputs(page: str, folder: Path) -> str:
     return BLOCK.sub(replaced, page)
 
 
-def catalogue() -> str:
-    """All effects: what each is, its equation, parameters, what it leaves out, and its source."""
-    from twinmill.model.parameters import catalogue as cards
+def page_of_effects() -> str:
+    """Its beginning as it stands, and all effects: equation, parameters, what is left out, source."""
+    from twinmill.model.parameters import catalogue
 
-    return "\n".join(_card(card) for _, card in sorted(cards().items()))
+    beginning = EFFECTS.read_text(encoding="utf-8").partition("\n## ")[0].rstrip()
+    return "\n".join([beginning, "", *(_card(card) for _, card in sorted(catalogue().items()))])
 
 
 def _card(card: dict) -> str:
-    from twinmill.workbench.typeset import typeset
-
     rows = [
         f"| `{p['name']}` | {'' if p['unit'] == '1' else p['unit']} | {p['default']:g} | "
         f"{p['min']:g} to {p['max']:g} | {p['neutral']:g} | {p['doc']} |"
@@ -94,9 +94,8 @@ def _card(card: dict) -> str:
         [
             f"## {card['name']}\n",
             f"{card['summary']}\n",
-            f'<div class="eq">{typeset(card["equation"])}</div>\n',
-            *(table if rows else []),
-            "",
+            f"```equation\n{card['equation']}\n```\n",
+            *([*table, ""] if rows else []),
             f"- Stage: `{card['stage']}`",
             f"- Leaves out: {card['leaves_out']}",
             f"- What to measure: {card['measure']}",
@@ -120,8 +119,9 @@ def on_page_markdown(markdown: str, page, config, files) -> str:
     """Called by MkDocs for each page."""
     from mkdocs.structure.files import File
 
-    if MARK in markdown:
-        markdown = markdown.replace(MARK, catalogue())
+    from twinmill.workbench.typeset import typeset
+
+    markdown = EQUATION.sub(lambda own: f'<div class="eq">{typeset(own[1])}</div>', markdown)
     if "runs/" in markdown:
         folder = Path(tempfile.mkdtemp(prefix="twinmill.docs."))
         markdown = with_outputs(markdown, folder)
@@ -139,3 +139,7 @@ def on_post_page(output: str, page, config) -> str:
             f"{page.file.src_path}: {foreign[0]}: needs the internet; ship it instead."
         )
     return output
+
+
+if __name__ == "__main__":
+    EFFECTS.write_text(page_of_effects(), encoding="utf-8")

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
-from site_hooks import catalogue, commands_of, on_post_page, run, with_outputs  # noqa: E402
+from site_hooks import commands_of, on_post_page, run, with_outputs  # noqa: E402
 
 PAGES = sorted((ROOT / "docs").glob("*.md"))
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]+)?\)")
@@ -105,9 +105,3 @@ def test_lists_within_lists_stand_as_far_in_as_the_site_asks_for(page):
     """Four columns, by Python-Markdown's documentation; with fewer it makes one list of both."""
     text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
     assert re.findall(r"^ {1,3}(?:[-*]|\d+\.) .*$", text, flags=re.MULTILINE) == []
-
-
-def test_the_catalogue_has_a_card_for_each_effect():
-    made = {path.stem for path in (ROOT / "twin/effects/catalogue").glob("*.cpp")}
-    shown = set(re.findall(r"^## (\w+)$", catalogue(), flags=re.MULTILINE))
-    assert shown and shown <= made

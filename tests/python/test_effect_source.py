@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`effects new`: an equation of a model as an effect's source and test, which a compiler takes."""
 
+import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,9 @@ from twinmill.model.model_file import ModelFile
 from twinmill_cli.main import run
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+from site_hooks import EFFECTS, page_of_effects  # noqa: E402
+
 # A formula in C++ and by muParser, with x = 3 and y = 7.
 BOTH = """
 #include <algorithm>
@@ -238,3 +243,10 @@ def test_a_push_of_two_values_is_not_written_as_an_effect(copy, model):
     path = model({"adds_to": "room_mps", "formula": "p0*vx, p1*vx"})
     with pytest.raises(ValueError, match="two values"):
         run(["effects", "new", "play", "--from", str(path), "--into", str(copy)])
+
+
+def test_the_page_of_effects_has_a_card_for_each_as_the_twin_has_it():
+    made = {path.stem for path in (ROOT / "twin/effects/catalogue").glob("*.cpp")}
+    page = EFFECTS.read_text(encoding="utf-8")
+    assert set(re.findall(r"^## (\w+)$", page, flags=re.MULTILINE)) == made
+    assert page == page_of_effects(), "renew docs/effects.md: make format"
