@@ -76,7 +76,7 @@ def with_outputs(page: str, folder: Path) -> str:
 
 
 def page_of_effects() -> str:
-    """Its beginning as it stands, and all effects: equation, parameters, what is left out, source."""
+    """Its beginning as it stands, and a card of each effect with its equation and parameters."""
     from twinmill.model.parameters import catalogue
 
     beginning = EFFECTS.read_text(encoding="utf-8").partition("\n## ")[0].rstrip()
