@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <string>
 
 #include "plant_mujoco/mujoco_plant.h"
 
@@ -84,10 +85,17 @@ TEST_P(Jams, RobotsThatPushEachOtherStayLevel)
     }
 }
 
+std::string NameOfPhysics(const testing::TestParamInfo<MujocoOptions> &physics)
+{
+    constexpr const char *kNames[] = {"TwinRun", "Finer", "Sweeps"};
+    return kNames[physics.index];
+}
+
 // What twin_run has, finer, and what sweeps have.
 INSTANTIATE_TEST_SUITE_P(Physics, Jams,
                          testing::Values(MujocoOptions{}, MujocoOptions{.timestep_s = 0.001},
-                                         SweepOptions(0)));
+                                         SweepOptions(0)),
+                         NameOfPhysics);
 
 }  // namespace
 }  // namespace twin

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <string>
 
 #include "plant/planar_plant.h"
 
@@ -91,11 +92,20 @@ TEST_P(IdealMotion, IsReachedWithinOnePercent)
     EXPECT_LT(std::sqrt(hop_m2), 2e-6) << "the wheels hop";
 }
 
+std::string NameOfMove(const testing::TestParamInfo<IdealMotion::ParamType> &move)
+{
+    const auto &[timestep_s, twist] = move.param;
+    return std::string(twist.vx_mps != 0 ? "Forward" : "") + (twist.vy_mps != 0 ? "Sideways" : "") +
+           (twist.omega_radps != 0 ? "Turn" : "") + "By" +
+           std::to_string(std::lround(1e3 * timestep_s)) + "ms";
+}
+
 INSTANTIATE_TEST_SUITE_P(Moves, IdealMotion,
                          testing::Combine(testing::Values(0.002, 0.005),
                                           testing::Values(Twist{0.3, 0, 0}, Twist{0, 0.3, 0},
                                                           Twist{0, 0, 2}, Twist{0.2, 0.2, 0},
-                                                          Twist{0.15, -0.1, 1})));
+                                                          Twist{0.15, -0.1, 1})),
+                         NameOfMove);
 
 TEST(MujocoPlant, RobotAtRestStays)
 {

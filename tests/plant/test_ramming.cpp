@@ -67,7 +67,8 @@ TEST_P(Ramming, StaysSaneForTenMinutes)
 
 // As twin_run has it, and as sweeps do.
 INSTANTIATE_TEST_SUITE_P(Uses, Ramming,
-                         testing::Values(MujocoOptions{.timestep_s = 0.002}, SweepOptions(0)));
+                         testing::Values(MujocoOptions{.timestep_s = 0.002}, SweepOptions(0)),
+                         [](const auto &use) { return use.index == 0 ? "TwinRun" : "Sweeps"; });
 
 }  // namespace
 }  // namespace twin

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <string>
 
 #include "plant_mujoco/mujoco_plant.h"
 #include "roller_robot.h"
@@ -110,10 +111,17 @@ TEST_P(RollerLosses, AreThoseOfTenFreeRollers)
     EXPECT_NEAR(plant, rollers, 0.03 * rollers);
 }
 
+std::string NameOfMove(const testing::TestParamInfo<RollerLosses::ParamType> &move)
+{
+    constexpr const char *kNames[] = {"Forward", "Left", "Turn"};
+    return kNames[std::get<0>(move.param)];
+}
+
 INSTANTIATE_TEST_SUITE_P(Moves, RollerLosses,
                          testing::Values(std::tuple{size_t{0}, Twist{0.4, 0, 0}},
                                          std::tuple{size_t{1}, Twist{0, 0.4, 0}},
-                                         std::tuple{size_t{2}, Twist{0, 0, 3}}));
+                                         std::tuple{size_t{2}, Twist{0, 0, 3}}),
+                         NameOfMove);
 
 }  // namespace
 }  // namespace twin
