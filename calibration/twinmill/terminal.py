@@ -61,12 +61,30 @@ class Fitting:
         self._set_least(self.listed)
 
     def _fits(self, console: Console, options: ConsoleOptions) -> bool:
-        wide = options.update(max_width=MOST_WIDE)
-        return Measurement.get(console, wide, self.made).minimum <= options.max_width
+        return self._measured(console, options).minimum <= options.max_width
+
+    def _measured(self, console: Console, options: ConsoleOptions) -> Measurement:
+        return Measurement.get(console, options.update(max_width=MOST_WIDE), self.made)
+
+    def _share_out(self, console: Console, options: ConsoleOptions) -> None:
+        """Takes what is too wide from the widest columns, and from none what it needs at least."""
+        columns = self.made.columns
+        most = [
+            max((cell_len(x) for c in (k.header, *k.cells) for x in str(c).splitlines()), default=0)
+            for k in columns
+        ]
+        room = options.max_width - self._measured(console, options).minimum
+        room += sum(k.min_width for k in columns)
+        widths = most
+        for level in range(max(most, default=0), 0, -1):
+            widths = [max(k.min_width, min(m, level)) for k, m in zip(columns, most, strict=True)]
+            if sum(widths) <= room:
+                break
+        for column, width in zip(columns, widths, strict=True):
+            column.width = width
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        whole = Measurement.get(console, options.update(max_width=MOST_WIDE), self.made).maximum
-        if self.listed and whole > options.max_width:
+        if self.listed and self._measured(console, options).maximum > options.max_width:
             self._one_a_line()
         if not self._fits(console, options):
             for column in self.made.columns:
@@ -75,6 +93,8 @@ class Fitting:
         if not self._fits(console, options):
             self._set_least()
         if self._fits(console, options):
+            if self._measured(console, options).maximum > options.max_width:
+                self._share_out(console, options)
             yield self.made
             if self.caption:
                 yield from self._below()

@@ -45,6 +45,19 @@ def test_a_table_whose_first_column_need_not_wrap_wraps_it_before_it_stops_being
     assert "45 to 81 %" in narrow and "share 45" not in narrow
 
 
+@pytest.mark.parametrize("columns", [60, 70, 80])
+def test_a_column_of_words_wraps_before_one_that_cannot_leaves_the_terminal(columns):
+    table = Table(box=None)
+    for name in ("certainty", "estimates"):
+        table.add_column(name)
+    table.add_row(
+        "no more than noise is left over here", "one_name_of_many_words_without_a_gap_in_it"
+    )
+    told = printed(Fitting(table), columns)
+    assert "one_name_of_many_words_without_a_gap_in_it" in told
+    assert max(len(line.rstrip()) for line in told.splitlines()) <= columns
+
+
 def test_a_list_that_is_too_wide_has_a_line_for_each_entry_and_the_caption_all_columns():
     """An estimate of which the name stands on one line and the number on the next reads badly."""
     entries = ["loss 0.82 ± 0.2", "from_s 20.2 ± 3 s", "until_s 28.8 ± 3 s"]
