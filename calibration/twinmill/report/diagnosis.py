@@ -85,7 +85,7 @@ def findings(diagnosis: Diagnosis) -> Table:
         "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the "
         "data that were not fitted to. Estimates: ± is one standard error; a 95 % interval is "
         "about twice that to each side.",
-        words=(0, 2),
+        words=(0, 2, 3),
         lists=(3,),
     )
 
@@ -113,7 +113,7 @@ def ranking(diagnosis: Diagnosis) -> Table:
         "share of what anything could explain; p: chance of such a fit if nothing were missing, "
         "for all effects together; effects of one group look alike in this log. Estimates of "
         "effects that were not found are those of the step that tried them.",
-        words=(0,),
+        words=(0, 5),
         lists=(5,),
     )
 
@@ -199,7 +199,7 @@ def robots_off(diagnosis: Diagnosis) -> Table:
         rows,
         "Scores are of drives that were not fitted to: with the model of all, and with the robot's "
         "own. What the others lack was looked for without these robots.",
-        words=(1,),
+        words=(1, 5),
         lists=(5,),
     )
 

@@ -135,7 +135,7 @@ def table(data: Table) -> RenderableType:
         padding=(0, 1, 0, 0),
     )
     for i, column in enumerate(data.columns):
-        words = i in (*data.words, *data.lists)
+        words = i in data.words
         made.add_column(column, justify="left" if words else "right", no_wrap=not words or i == 0)
     for row in data.rows:
         made.add_row(*(_cell(cell) for cell in row))

@@ -43,7 +43,7 @@ class Cell:
 class Table:
     """A table; a note goes below. By their places, columns of `words` stand left and may wrap.
 
-    Those of `lists` are words as well: entries with commas between them.
+    Those of them in `lists` are entries with commas between.
     """
 
     title: str
