@@ -10,7 +10,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
-from twinmill.fitting.equations import idle, unseen
+from twinmill.fitting.equations import idle, said_of_unseen, unseen
 from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
@@ -50,6 +50,7 @@ class RobotComparison:
         score: RMS over horizons and channels of error over floor; NaN without a floor.
         where: regimes.
         phases: moments of the periods of the model's formulas at which the log begins.
+        unseen: names of formulas that recur and that this log does not show.
     """
 
     modelled: ModelledLog
@@ -59,6 +60,7 @@ class RobotComparison:
     score: float
     where: list[Regime]
     phases: tuple[ParameterEstimate, ...] = ()
+    unseen: tuple[str, ...] = ()
 
     @property
     def measurement(self) -> Measurement:
@@ -257,9 +259,16 @@ def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     windows = Windows.of(own.measurement.track)
     errors = np.where(own.floor.keep[:, None, None], windows.errors(modelled), np.nan)
     regimes = where_it_fails(modelled, windows, errors, own.floor.rms) if own.data else []
+    gone = tuple(unseen(own.data, own.model)) if own.data else ()
+    phases = tuple(replace(p, seen=p.seen and _of(p) not in gone) for p in own.phases)
     return RobotComparison(
-        modelled, windows, errors, own.floor, own.score, regimes, phases=own.phases
+        modelled, windows, errors, own.floor, own.score, regimes, phases=phases, unseen=gone
     )
+
+
+def _of(phase: ParameterEstimate) -> str:
+    """The formula whose phase it is."""
+    return phase.name.split(".")[0]
 
 
 def comparison(
@@ -270,9 +279,10 @@ def comparison(
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
     known = [o for o in opened if o.data is not None]
     warnings += idle([o.data for o in known], [o.model for o in known])
-    warnings += [said for o in known for said in unseen(o.data, o.model)]
-    name = fitted_name or model_file.path.name
-    return Comparison(name, [compare_robot(o) for o in opened], warnings)
+    robots = [compare_robot(o) for o in opened]
+    logs = [r for r in robots if isinstance(r, RobotComparison)]
+    warnings += [said for r in logs for said in said_of_unseen(r.measurement.label, r.unseen)]
+    return Comparison(fitted_name or model_file.path.name, robots, warnings)
 
 
 def _warnings(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:

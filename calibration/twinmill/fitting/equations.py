@@ -49,6 +49,8 @@ def finite(data: ErrorDataset, model: native.Model) -> bool:
 def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[str]:
     """A sentence for each formula that changes no prediction, though its numbers are not zero.
 
+    One that recurs may just not be there within a log: of that `unseen` tells.
+
     Args:
         data: that can be judged.
         models: one for each.
@@ -57,6 +59,8 @@ def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[s
     for name, texts in _equations(models[0]).items() if data else ():
         named = [p for p in ("p0", "p1", "p2", "p3") if p in words(" ".join(texts.values()))]
         if named and not any(m.get(f"{name}.{p}") for m in models for p in named):
+            continue
+        if any(p.name.split(".")[0] == name for p in phases(models[0])):
             continue
         if not any(_acts(d, m, name) for d, m in zip(data, models, strict=True)):
             found.append(
@@ -67,7 +71,7 @@ def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[s
 
 
 def unseen(data: ErrorDataset, model: native.Model) -> list[str]:
-    """A sentence for each formula that recurs, and that a log does not show.
+    """Names of the formulas that recur, and that a log does not show.
 
     At the best moment of its period it must bring more than the best of so many would by chance.
     """
@@ -76,11 +80,17 @@ def unseen(data: ErrorDataset, model: native.Model) -> list[str]:
     for name in dict.fromkeys(own):
         without, with_it = (np.sum(errors_of(data, m) ** 2) for m in (_without(model, name), model))
         if data.n_eff.sum() * np.log(without / with_it) < SHOWN:
-            found.append(
-                f"{data.label}: does not show {name}, which recurs in time: at no moment of its "
-                "period does it predict this log better than without; the robot may lack it now."
-            )
+            found.append(name)
     return found
+
+
+def said_of_unseen(label: str, names: Sequence[str]) -> list[str]:
+    """A sentence for each of these formulas that a log does not show."""
+    return [
+        f"{label}: does not show {name}, which recurs in time: at no moment of its period does it "
+        "predict this log better than without; the robot may lack it now."
+        for name in names
+    ]
 
 
 def _without(model: native.Model, name: str) -> native.Model:

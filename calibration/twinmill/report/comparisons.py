@@ -61,6 +61,11 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
     robot = comparison.shown
     if isinstance(robot, SteadyComparison):
         return _steady_advice(robot)
+    if robot.unseen:
+        return (
+            f"{robot.measurement.label} does not show {' and '.join(robot.unseen)}, which the "
+            "model predicts: compare it with the model that was there before."
+        )
     phases = [r for r in robot.where if r.group == "phase"]
     if not phases:
         return "record a longer log with starts, stops and turns, then compare again."

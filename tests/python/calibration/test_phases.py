@@ -14,6 +14,7 @@ from twinmill.fitting.compare import GOOD, compare
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import all_effect_parameters, phases
+from twinmill.report.comparisons import advice
 
 STEP_S = 1 / 480  # of the robot
 PERIOD_S = 16.0
@@ -108,8 +109,13 @@ def test_a_log_that_does_not_show_what_recurs_says_so(
 ):
     log = measure(recurring(0.0, loss=0.0), 201, 80.0)
     assert diagnose([log], one_clock_base).rest.proven is None
-    (warning,) = [w for w in compare([log], explained).warnings if "recurs" in w]
+    found = compare([log], explained)
+    (warning,) = [w for w in found.warnings if "recurs" in w]
     assert "does not show equation" in warning
+    assert not any("always zero" in w for w in found.warnings)
+    assert not any(p.seen for p in found.robots[0].phases)
+    told = advice(found)
+    assert "does not show equation" in told and "input_delay" not in told
 
 
 @pytest.mark.parametrize(
