@@ -120,13 +120,16 @@ def _hint(measurements: Measurements, model_file: ModelFile) -> None:
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
     """What takes what was found into the model: why, and the command."""
     stem, told = Path(model).stem, []
-    if result.found or result.robots_off:
+    why = {"robots": "To give each robot its own numbers", "runs": "To take the middle of the runs"}
+    if result.lasting or result.robots_off or result.apart:
         to = Path(f"{stem}_explained.toml")
-        told.append(("To add what was found", command_line("explain", logs, model, to)))
+        added = result.lasting or result.robots_off
+        reason = "To add what was found" if added else why[result.apart.whose]
+        told.append((reason, command_line("explain", logs, model, to)))
     elif result.verdict == "refit_enough":
         to = Path(f"{stem}_fitted.toml")
         told.append(("To refit the base", command_line("fit", logs, model, to)))
-    explained = f"{stem}_explained.toml" if result.found else model
+    explained = f"{stem}_explained.toml" if result.lasting else model
     return [*told, *_adding(result, logs, given=model, explained=explained)]
 
 

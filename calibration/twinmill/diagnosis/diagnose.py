@@ -10,6 +10,7 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis import moments
+from twinmill.diagnosis.apart import apart, runs_with_own, tells_more
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import (
     acted_on,
@@ -22,7 +23,7 @@ from twinmill.diagnosis.doubts import (
     undone,
     within_the_table,
 )
-from twinmill.diagnosis.finding import Finding, doubted
+from twinmill.diagnosis.finding import Finding, doubted, of_all, part_of_all
 from twinmill.diagnosis.findings import (
     findings_of,
     lateness,
@@ -186,6 +187,15 @@ def _diagnosed(
             progress("looking again without them" if off else "looking again, each with its lag")
             first = first_state(known, model_file, {*excluded, *unseen})
             done = search(first, progress, known=usual, begun=course.searches.append)
+            course.searches.append(done)
+    if not off:
+        own = runs_with_own(known, first, done.last, usual)
+        if own:
+            progress("looking again, each run with its numbers")
+            own_first = first_state(own, model_file, {*excluded, *unseen})
+            own_done = search(own_first, progress, known=usual, begun=course.searches.append)
+            if tells_more(own_done.last, done.last):
+                known, first, done = own, own_first, own_done
             course.searches.append(done)
     progress("looking for what no effect explains")
     course.motion = _concluded(
@@ -377,6 +387,7 @@ def _concluded(
     faint_names = [name for name, _ in faint]
     hidden = [*faint, *unseen.items()]
     refit = _refit(done, findings)
+    own = apart(known, last)
     weighed = VerdictInputs(
         given,
         start.held_score,
@@ -391,6 +402,7 @@ def _concluded(
         disturbed,
         random,
         () if rest.events.later else unsteady([o.measurement for o in known]),
+        own,
     )
     if weighed.verdict == "outside_catalogue":
         rest = rest.with_first(acted_on(findings, rest.least))
@@ -406,10 +418,10 @@ def _concluded(
         sentence=weighed.sentence,
         before=before,
         score_refit=refit,
-        findings=findings,
+        findings=of_all(findings, rest.share),
         ranking=ranking_of(done, findings),
         not_identifiable=hidden,
-        rest=rest,
+        rest=replace(rest, share=part_of_all(findings, rest.share) * rest.share),
         late=late if any(o.floor for o in known) else None,
         search=done,
         opened=after,
@@ -433,6 +445,7 @@ def _concluded(
         robots_off=tuple(off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
+        apart=own,
     )
 
 
@@ -445,7 +458,8 @@ def _with_all_starts(own: Opened, opened: Sequence[Opened]) -> Opened:
     whole = next(o for o in opened if o.measurement is own.measurement)
     if own.floor is None:
         return own
-    return replace(own, data=replace(whole.data, own=own.data.own), floor=whole.floor)
+    data = replace(whole.data, own=own.data.own, by_run=own.data.by_run)
+    return replace(own, data=data, floor=whole.floor)
 
 
 def _beside_formula(

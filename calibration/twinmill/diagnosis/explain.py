@@ -10,15 +10,17 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.diagnosis.apart import middles, of_runs
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.stopped import stopped
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
-from twinmill.diagnosis.trials import REFIT, fitted, without_effect
+from twinmill.diagnosis.trials import REFIT, State, fitted, without_effect
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock, unsteady_clocks, without_clock
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import Fitted, ModelFile, child_of
 from twinmill.model.parameters import (
     GAINS,
@@ -34,7 +36,7 @@ from twinmill.model.parameters import (
     phases,
     with_role,
 )
-from twinmill.predict.datasets import total_score
+from twinmill.predict.datasets import Dataset, total_score
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,17 @@ class Explanation:
         return f"{now} {own.note}".rstrip()
 
     @property
+    def left_out(self) -> str:
+        """What was found and is not in the model, in a sentence; empty if nothing is."""
+        gone = self.diagnosis.passing
+        if not gone:
+            return ""
+        return (
+            f"Not in the new model: {' and '.join(gone)}, which may be of this run alone; another "
+            "log would be predicted worse by it."
+        )
+
+    @property
     def steps(self) -> list[tuple[str | None, float]]:
         """Those of the diagnosis, and the formula if the model has it."""
         own = self.diagnosis.steps
@@ -94,6 +107,7 @@ class Explanation:
             "formula": self.formula.to_json() if self.formula else None,
             "score_after": self.after.score,
             "gained": self.gained,
+            "passing": self.diagnosis.passing,
             "parameters": [e.to_json() for e in self.parameters],
             "model": str(self.path) if self.path else None,
         }
@@ -144,7 +158,7 @@ def explain(
             if not stoppable:
                 raise
             diagnosis = stopped(diagnosis, "Stopped before all was fitted together.")
-    if not (diagnosis.found or diagnosis.robots_off):
+    if not (diagnosis.lasting or diagnosis.robots_off):
         return Explanation(diagnosis, diagnosis.before, [], None)
     fit = diagnosis.search.last.fit
     return _written(diagnosis, model_file, fit, None, out=out, command=command, force=force)
@@ -185,8 +199,10 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
     follow no command pull them wherever they like. Where lateness changes within a log, a lag goes
     half of the way, and suits no other log.
     """
-    if diagnosis.camera or len(diagnosis.robots) > 1:
+    if diagnosis.camera or len(diagnosis.robots) > 1 or diagnosis.apart:
         return True  # common numbers are not all that is new
+    if diagnosis.found and not (diagnosis.lasting or (beyond and beyond.kept)):
+        return False
     start = diagnosis.search.rounds[0].before.fit
     if not (diagnosis.findings or (beyond and beyond.kept)):
         falls = np.concatenate(
@@ -242,7 +258,11 @@ def _written(
     model = _with_found(diagnosis, model_file, beyond)
     kept = beyond if beyond and beyond.kept else None
     shared = kept.estimates if kept else fit.shared_estimates()
-    estimates = [*shared, *fit.first_phases, *diagnosis.detection_estimates]
+    middle = middles(fit, diagnosis.apart) if diagnosis.apart else []
+    gone = {m.name for m in middle} | {e.name for e in shared if _passes(e, diagnosis)}
+    others = [e for e in shared if e.name not in gone]
+    estimates = [*others, *middle, *fit.first_phases, *diagnosis.detection_estimates]
+    covariance = kept.covariance if kept else fit.shared_covariance()
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
@@ -255,17 +275,30 @@ def _written(
         score_after=total_score(fit.held_scores),
         noise=noise,
         clock=_clock(diagnosis, fit),
-        base_told=bool(model_file.known_from_other_logs(logs.values())),
+        base_told=bool(model_file.known_from_other_logs(logs.values()) and not middle),
         left_over=_left_over(diagnosis, beyond),
         robots=_own_values(diagnosis, fit),
-        covariance=kept.covariance if kept else fit.shared_covariance(),
+        covariance=_with_middles(covariance.of([e.name for e in others]), middle),
     )
     child = child_of(model_file, told, Path(out), command)
     own = phases(child.model)
     opened = [(o.aligned if own else o.with_model)(child.model) for o in diagnosis.opened]
     after = comparison(child, opened)
+    if of_runs(diagnosis.apart):  # none of these has in the file what it had in the fit
+        child = child_of(model_file, replace(told, score_after=after.score), Path(out), command)
     child.write(force)
     return Explanation(diagnosis, after, estimates, child.path, beyond)
+
+
+def _passes(estimate: ParameterEstimate, diagnosis: Diagnosis) -> bool:
+    """Whether a number is of an effect that no other run has."""
+    return estimate.name.split(".")[0].split("#")[0] in diagnosis.passing
+
+
+def _with_middles(told: Covariance, middle: Sequence[ParameterEstimate]) -> Covariance:
+    """With what stands for numbers that differ, each by itself."""
+    names = tuple(e.name for e in middle)
+    return told.replaced_by(Covariance(names, np.diag([e.std**2 for e in middle])))
 
 
 def _clock(diagnosis: Diagnosis, fit: ScoreFit) -> dict[str, ParameterEstimate]:
@@ -302,7 +335,7 @@ def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | Non
     own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
     moved = diagnosis.model.effects[len(model.effects) :]
     kept = beyond.formula if beyond and beyond.kept else None
-    gone = kept.instead_of if kept else ()
+    gone = (*(kept.instead_of if kept else ()), *diagnosis.passing)
     moved = [name for name in moved if name.split("#")[0] not in gone]
     for effect in dict.fromkeys([*moved, *(f.effect for f in diagnosis.camera), *own_effects]):
         model.add_effect(effect.split("#")[0])
@@ -333,15 +366,21 @@ def _polished(diagnosis: Diagnosis) -> ScoreFit:
     whole = ScoreFit(state.datasets, state.models, free).fit()
     if total_score(whole.held_scores) <= last.held_score:
         return whole
-    as_found = ScoreFit(state.datasets, state.models, free)
+    as_found = ScoreFit(_begun(state), state.models, free)
     as_found.store()
     return as_found
+
+
+def _begun(state: State) -> list[Dataset]:
+    """Its data sets with what each has of its own begun at what was found."""
+    pairs = zip(state.datasets, state.models, strict=True)
+    return [replace(d, own=tuple(p.at(m.get(p.name)) for p in d.own)) for d, m in pairs]
 
 
 def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[ParameterEstimate]]:
     """By robot, what [robots.Rnn] states: its gains and lag, and the effects that only it has."""
     values: dict[int, dict[str, ParameterEstimate]] = {}
-    for i, data in enumerate(fit.datasets):
+    for i, data in enumerate([] if of_runs(diagnosis.apart) else fit.datasets):
         own = {n: e for n, e in fit.own_estimates(i).items() if n in (*GAINS, LAG)}
         if own:
             values.setdefault(data.robot_id, {}).update(own)

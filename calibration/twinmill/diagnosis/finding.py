@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a diagnosis says of one effect, of a ranking, and of how late the motion is."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from twinmill.model.parameters import ParameterEstimate
+from twinmill.diagnosis.term import TIME
+from twinmill.model.parameters import ParameterEstimate, with_role
+
+HARDLY = 0.005  # a share that is told as less than a percent
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,22 @@ class Finding:
     within_told: bool = False
 
     @property
+    def passes(self) -> bool:
+        """Whether it is of a moment of its run, or may be: no other run has it.
+
+        So is a place that may be a moment, or is in doubt, and a number that changed as time went.
+        """
+        alike = (self.effect, *(self.group or ()))
+        doubtful = self.certainty == "doubtful"
+        if with_role(self.effect, "place"):
+            return doubtful or any(with_role(name, "moment") for name in alike)
+        changes = doubtful and self.depends_on == TIME
+        return changes or bool(with_role(self.effect, "moment"))
+
+    @property
     def takes(self) -> str:
         """The share in words."""
-        return "< 1 %" if self.share < 0.005 else f"{100 * self.share:.0f} %"
+        return "< 1 %" if self.share < HARDLY else f"{100 * self.share:.0f} %"
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -78,6 +95,8 @@ class Late:
         sum_s, sum_std_s: lag and delay together; with the clocks' offset where that is not known.
         delay_s, lag_s, clock_s: its parts; None where the data cannot part them.
         parted: whether they can.
+        spread_s: standard deviation of lags of which each robot or run has its own, also in
+            sum_std_s; 0 where there is one.
     """
 
     sum_s: float
@@ -86,6 +105,7 @@ class Late:
     lag_s: float | None
     clock_s: float | None
     parted: bool
+    spread_s: float = 0.0
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -101,3 +121,23 @@ def doubted(finding: Finding, why: str, wrong_form: bool = False, depends_on: st
         wrong_form=finding.wrong_form or wrong_form,
         depends_on=finding.depends_on or depends_on,
     )
+
+
+def part_of_all(findings: Sequence[Finding], left: float) -> float:
+    """By what shares are multiplied where they are told, so that with what is left they make 1.
+
+    What findings take is judged at half a second, what is left at all horizons; and one that takes
+    less than nothing beside others counts as nothing.
+
+    Args:
+        findings: of one diagnosis.
+        left: share that they leave.
+    """
+    taken = sum(f.share for f in findings)
+    return 1 / (taken + left) if taken >= HARDLY else 1.0
+
+
+def of_all(findings: Sequence[Finding], left: float) -> list[Finding]:
+    """The findings with shares of all that was there."""
+    part = part_of_all(findings, left)
+    return [replace(f, share=part * f.share) for f in findings]

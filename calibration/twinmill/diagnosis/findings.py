@@ -430,12 +430,16 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     model, fit = done.last.state.model, done.last.fit
     names = [u.parameter.name for u in fit.unknowns]
     value = _late_values(done.last.state, same_clock)
+    lags_s = fit.x[[n == LAG for n in names]]  # one, or each robot's or run's own
+    spread_s = float(np.std(lags_s, ddof=1)) if len(lags_s) > 1 else 0.0
+    value["lag"] += float(np.mean(lags_s)) - model.get(LAG) if spread_s else 0.0
     every = [n for own in _late_parts(model).values() for n in own] + [CLOCK] * (not same_clock)
     # Of what each log or robot has of its own, the mean.
     mask = np.array([(n in every) / names.count(n) for n in names])
     free = bool(mask.any())
     apart = max((_late_apart_s(done, f, same_clock) for f in found if f.group), default=0.0)
-    std = float(np.sqrt(mask @ fit.covariance @ mask + (apart / NORMAL_95) ** 2)) if free else None
+    variance = mask @ fit.covariance @ mask + (apart / NORMAL_95) ** 2 + spread_s**2
+    std = float(np.sqrt(variance)) if free else None
     kinds = [{late[0] for n in f.group or () if (late := late_part(n))} for f in found]
     tied = any(len(k) > 1 for k in kinds)
     lag_tied = any(len(k) > 1 and "lag" in k for k in kinds)
@@ -447,6 +451,7 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
         float(value["lag"]) if not lag_tied else None,
         float(value["clock"]) if parted else None,
         bool(parted),
+        spread_s,
     )
 
 

@@ -41,7 +41,7 @@ from twinmill.diagnosis.forms import (
     sized,
 )
 from twinmill.diagnosis.formula import Formula
-from twinmill.diagnosis.formula_telling import TRIED, stability, told
+from twinmill.diagnosis.formula_telling import TRIED, drives_back, stability, told
 from twinmill.diagnosis.recurring import Recurring
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME, Term
@@ -122,6 +122,8 @@ def _borne_out(
             tried = len(pool.forms) + (clock.tried if first.recurs else 0)
             whole = _completed(rows, pool, proof, clock)
             formula = told(rows, whole, tried, again)
+            if drives_back(rows, formula):
+                continue
             goes_on = first.recurs and clock.goes_on(whole.chosen.raw[:, :1])
             return replace(formula, goes_on=goes_on)
     return None

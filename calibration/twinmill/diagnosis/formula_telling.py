@@ -9,7 +9,15 @@ import numpy as np
 
 from twinmill.chance import t_quantile
 from twinmill.diagnosis.evidence import Chosen, Evidence, Pool, Proof, Sums, best_of, made
-from twinmill.diagnosis.forms import ANGLES, USUAL, Form, names_in, variable_of
+from twinmill.diagnosis.forms import (
+    ANGLES,
+    CHANNELS,
+    SPEEDS,
+    USUAL,
+    Form,
+    names_in,
+    variable_of,
+)
 from twinmill.diagnosis.formula import Curve, Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.units import units_of
@@ -47,6 +55,31 @@ def told(rows: Evidence, proof: Proof, tried: int, again: float) -> Formula:
         holds={n: (float(v.min()), float(v.max())) for n, v in seen.items()},
         curve=_curve(rows, found.forms, numbers) if found.forms[0].of_one_value else None,
     )
+
+
+def drives_back(rows: Evidence, formula: Formula) -> bool:
+    """Whether a formula of a speed alone turns that speed round, somewhere that these logs reach.
+
+    On a drive that repeats itself a few speeds are passed at the same moments alone, and a formula
+    of the speed stands for what happens then. Held at that speed the robot would drive backwards.
+    """
+    forms = formula.forms
+    axis = {"motion": "", **dict(zip(CHANNELS, SPEEDS, strict=True))}.get(forms[0].adds_to)
+    others = {*names_in([t for f in forms for t in f.texts])} - {axis}
+    if axis is None or any(f.rates for f in forms) or (axis and others):
+        return False
+    numbers = np.array([n.value for n in formula.numbers if n.name])
+    for motion in rows.motions:
+        speed = motion.names[axis] if axis else np.ones(len(motion.velocity))
+        after = speed + np.hstack([motion.values(f) for f in forms]) @ numbers[: _shapes(forms)]
+        usual = np.sqrt(np.mean(speed[speed != 0] ** 2)) if speed.any() else np.inf
+        if np.min(after * np.sign(speed)) < -SETTINGS.formula_back * usual:
+            return True
+    return False
+
+
+def _shapes(forms: Sequence[Form]) -> int:
+    return sum(len(f.shapes) for f in forms)
 
 
 def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> Curve:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import twinmill_native as native
 
 from twinmill.data.checks.settings import CHECKS
+from twinmill.diagnosis.apart import Apart
 from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
@@ -52,6 +53,8 @@ class Diagnosis:
         camera: effects of the camera that were found.
         robots: how small a difference of each robot would have been seen.
         base_names: quantities of the base that these measurements move.
+        apart: numbers in which robots or runs differ, each of which has its own here; None where
+            one set of numbers does as well.
     """
 
     verdict: str
@@ -77,6 +80,7 @@ class Diagnosis:
     camera: tuple[Finding, ...] = ()
     base_names: tuple[str, ...] = ()
     robots: tuple[Resolution, ...] = ()
+    apart: Apart | None = None
 
     @property
     def lines(self) -> list[str]:
@@ -97,6 +101,16 @@ class Diagnosis:
         """All effects that were found."""
         return [*self.motion, *(f.effect for f in self.camera)]
 
+    @property
+    def passing(self) -> list[str]:
+        """Effects that were found and are of this run, or may be: no other run has them."""
+        return [f.effect for f in self.findings if f.passes]
+
+    @property
+    def lasting(self) -> list[str]:
+        """Effects that were found, but for those."""
+        return [name for name in self.found if name not in self.passing]
+
     def finding(self, effect: str) -> Finding | None:
         """What was found of an effect; None if it was not."""
         own = [f for f in (*self.findings, *self.camera) if f.effect == effect]
@@ -110,7 +124,7 @@ class Diagnosis:
     @property
     def is_left(self) -> bool:
         """Whether the rest is worth telling: more than nothing is left, or doubtful names are."""
-        if self.verdict in PASSES:
+        if self.verdict in PASSES or (self.apart and not self.rest.depends_on):
             return False
         return self.rest.share >= SETTINGS.nothing_left or self.verdict == "outside_catalogue"
 
@@ -165,6 +179,7 @@ class Diagnosis:
                 if getattr(r.measurement, "time_base", None)
             ],
             "robots": [r.to_json() for r in self.robots],
+            "apart": self.apart.to_json() if self.apart else None,
             "robots_off": [r.to_json() for r in self.robots_off],
             "camera": [f.to_json() for f in self.camera],
             "bits": self.detections.to_json() if self.detections else None,

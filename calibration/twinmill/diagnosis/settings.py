@@ -119,6 +119,9 @@ class Settings(Numbers):
     formula_goes_on: float = number(
         0.5, "share of its gain on the last 40 % of a log that the first 60 % must predict"
     )
+    formula_back: float = number(
+        0.25, "share of the usual speed at which a formula of that speed may drive back"
+    )
     answered: float = number(1.5, "score up to which answers of a controller may be all")
     no_noise: float = number(
         1.5, "errors of so many times the noise are none, however few there are"
@@ -148,6 +151,9 @@ class Settings(Numbers):
     )
     camera_spread_in_view: float = number(0.2, "... and over frames with a robot in view")
     resolved: float = number(4.0, "standard errors, from which a robot's difference would be seen")
+    within_runs: float = number(
+        0.25, "share of the excess that is left within runs, if they are told to differ"
+    )
     noisy: float = number(4.0, "times the sensor noise of the others, from which it is said")
 
     # The verdict.

@@ -8,6 +8,7 @@ was not weighed against what else could be.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from twinmill.diagnosis.finding import of_all, part_of_all
 from twinmill.diagnosis.findings import not_weighed
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.rest import Rest
@@ -58,6 +59,8 @@ class Course:
         steps = [(f, done.round_of(f).accepted.held_score) for f in dict.fromkeys(done.found)]
         refits = [t.held_score for t in done.rounds[0].trials if t.names == (REFIT,)]
         left, first = (max(t.fit.held_square - 1, 0.0) for t in (done.last, start))
+        rest = left / max(first, left, 1e-9)
+        part, found = part_of_all(found, rest), of_all(found, rest)
         own = [r.sentence for r in self.off]
         so_far = f"Stopped before all was tried. So far: {lacking(found)}" if found else NOTHING
         effects = [f for f in found if f.effect != REFIT]
@@ -70,7 +73,7 @@ class Course:
             findings=found,
             ranking=[],
             not_identifiable=[*self.unseen.items()],
-            rest=Rest(left / max(first, left, 1e-9), False, [], looked_at=False),
+            rest=Rest(part * rest, False, [], looked_at=False),
             late=None,
             search=done,
             opened=self.opened,

@@ -4,7 +4,8 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.apart import Apart, of_runs
+from twinmill.diagnosis.finding import Finding, of_all, part_of_all
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import FEW, MOMENTS, NOISE, Rest
 from twinmill.diagnosis.settings import SETTINGS
@@ -28,6 +29,7 @@ class VerdictInputs:
         disturbed: what was said of stretches that are judged nowhere.
         random: the motion is so much less regular than the model says that something is there.
         unsteady: what the input tells of commands that act later from some time on, in sentences.
+        apart: numbers in which robots or runs differ; None where one set does as well.
     """
 
     score: float
@@ -43,6 +45,7 @@ class VerdictInputs:
     disturbed: Sequence[str] = ()
     random: bool = False
     unsteady: Sequence[str] = ()
+    apart: Apart | None = None
 
     @property
     def effects(self) -> list[Finding]:
@@ -51,7 +54,13 @@ class VerdictInputs:
 
     @property
     def verdict(self) -> str:
-        """One of the verdicts that `Diagnosis.verdict` lists."""
+        """One of the verdicts that `Diagnosis.verdict` lists; runs that differ no effect makes."""
+        only_runs = of_runs(self.apart) and not self.effects
+        return "outside_catalogue" if only_runs else self._within
+
+    @property
+    def _within(self) -> str:
+        """The verdict on what is left beside numbers of each robot's or run's own."""
         if self._all_doubtful:
             return "model_adequate"
         if self._within_told:
@@ -102,7 +111,8 @@ class VerdictInputs:
     @property
     def _stale(self) -> bool:
         """The base's numbers are: a finding, or gains that were let drift took the error."""
-        return bool(self.findings) or drifted(self.score, self.last, self.known)
+        drift = not of_runs(self.apart) and drifted(self.score, self.last, self.known)
+        return bool(self.findings) or drift
 
     @property
     def _refit_leaves(self) -> bool:
@@ -184,17 +194,18 @@ class VerdictInputs:
 
     @property
     def sentence(self) -> str:
-        """The verdict for people, after what the input tells of when commands act."""
-        return " ".join([*self.unsteady, self._own])
+        """The verdict for people, after what the input and what robots or runs differ in."""
+        apart = [self.apart.sentence] if self.apart else []
+        return " ".join([*self.unsteady, *apart, self._own])
 
     @property
     def _nothing(self) -> str:
-        return "Nothing else" if self.unsteady else "Nothing"
+        return "Nothing else" if self.unsteady or self.apart else "Nothing"
 
     @property
     def _own(self) -> str:
-        """The verdict for people."""
-        verdict = self.verdict
+        """The same without what stands before it."""
+        verdict = self._within
         if verdict == "model_adequate":
             maybe = " or ".join(f.effect for f in self._all_doubtful)
             there = f" {maybe} may be there, and is too small to be sure." if maybe else ""
@@ -246,6 +257,8 @@ class VerdictInputs:
                     f"{self._as_before}"
                 )
             return f"{seen}, but these logs cannot show {', '.join(self.silent)}."
+        if verdict == "refit_enough" and self.apart:
+            return f"No effect is missing beside that.{self._as_before}"
         if verdict == "refit_enough":
             effect = "No other effect" if self.unsteady else "No effect"
             return (
@@ -253,7 +266,7 @@ class VerdictInputs:
                 f"{self._as_before}"
             )
         if verdict in ("effect_missing", "ambiguous"):
-            return f"{lacking(self.findings)}{self._left}"
+            return f"{lacking(of_all(self.findings, self.rest.share))}{self._left}"
         return self._outside_sentence
 
     @property
@@ -284,7 +297,7 @@ class VerdictInputs:
             return events
         on = self.rest.on
         depends = f", and depends {on}" if on else ""
-        share = f"{100 * self.rest.share:.0f} %"
+        share = f"{100 * part_of_all(self.findings, self.rest.share) * self.rest.share:.0f} %"
         if not on and self.rest.certainty == NOISE:
             return f" {share} is left, which may be noise.{events}"
         if not on and self.rest.certainty == FEW:
@@ -313,7 +326,9 @@ class VerdictInputs:
         named += ["a refit of the base"] if len(self.effects) < len(self.findings) else []
         also = f" Part of it is explained by {' and '.join(named)}." if named else ""
         if proven:
-            also += f" It was found in place of {_in_turn([_named(f) for f in self.effects])}."
+            own = of_all(self.findings, self.rest.share)
+            effects = [_named(f) for f in own if f.effect != REFIT]
+            also += f" It was found in place of {_in_turn(effects)}."
         depends = self.rest.depends_on and not self.rest.likely
         if self.noises and not (depends or self.rest.firm):
             what = "Something random disturbs the motion that no effect of the catalogue describes."

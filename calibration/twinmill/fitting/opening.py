@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes measurements ready to be scored by a model: data set, floor, and the model of its robot."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,7 @@ RATE_REACH_PPM = 500.0
 FEW_COMMANDS = 4  # different ones, below which a log tells nothing of others
 SPREAD = 0.03  # standard deviation of gains among robots of a kind where the model states none
 WIDE_STD = 0.15  # of a robot's gains where they are in question
+OWN = (LAG, *GAINS)  # what each robot, or each run, may have of its own
 ROUGH = 4  # of so many starts of predictions one is looked at first
 
 
@@ -289,6 +290,28 @@ def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:
     if len({o.measurement.track.robot_id for o in logs}) < 2:
         return list(opened)
     return [_with_gains(o) if o.floor else o for o in opened]
+
+
+def with_own_of_runs(
+    opened: Sequence[Opened], stds: Mapping[str, float] | None = None
+) -> list[Opened]:
+    """Each run of one robot with a motor lag and gains of its own.
+
+    Args:
+        opened: logs of one robot.
+        stds: of those that differ among the runs, by name; None: of all, and they are in question.
+    """
+    return [_with_own_of_run(o, stds) for o in opened]
+
+
+def _with_own_of_run(own: Opened, stds: Mapping[str, float] | None) -> Opened:
+    names = OWN if own.measurement.track.has_heading else OWN[:2]  # else it is never turned
+    free = []
+    for p in base_parameters(own.model, names):
+        usual = p.value if p.name == LAG else 1.0
+        std = stds.get(p.name, 0.0) if stds else p.std
+        free += [replace(p, usual=usual, std=std)] if std else []
+    return replace(own, data=replace(own.data, own=(*own.data.own, *free), by_run=True))
 
 
 def with_own_lags(opened: Sequence[Opened], spread_s: float) -> list[Opened]:

@@ -125,7 +125,7 @@ class ScoreFit:
             members = frozenset(i for i, s in enumerate(stated) if p.name not in s)
             if members:
                 unknowns.append(Unknown(p, members))
-        by_robot: dict[tuple[int, str], list[int]] = {}
+        by_owner: dict[tuple[int, int | None, str], list[int]] = {}
         held = self._held_angles()
         for i, d in enumerate(self.datasets):
             there = {p.name for p in phases(self.models[i])}
@@ -135,11 +135,12 @@ class ScoreFit:
                     if acts:
                         now = p.at(self.models[i].get(p.name))
                         unknowns.append(Unknown(now, frozenset([i])))
-                elif p.name not in ALIGNMENT:  # of the robot, in all its logs
-                    by_robot.setdefault((d.robot_id, p.name), []).append(i)
+                elif p.name not in ALIGNMENT:  # of the robot, in all its logs, or of this run
+                    owner = d.robot_id, i if d.by_run else None, p.name
+                    by_owner.setdefault(owner, []).append(i)
                 else:
                     unknowns.append(Unknown(p, frozenset([i])))
-        for (_, name), members in by_robot.items():
+        for (*_, name), members in by_owner.items():
             first = self.datasets[members[0]]
             p = next(p for p in first.own if p.name == name)
             unknowns.append(Unknown(p, frozenset(members)))

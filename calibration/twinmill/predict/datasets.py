@@ -50,9 +50,12 @@ class ErrorDataset(Dataset, Protocol):
         channel: (R,) number of the channel that each row belongs to.
         judged: (R,) share of the squared score that each row would make up if all were 1.
         n_eff: (C,) number of independent errors of each channel.
+        by_run: what its robot has of its own holds for this data set alone, not for the robot's
+            others.
     """
 
     own: Sequence[Parameter]
+    by_run: bool
     part: np.ndarray
     channel: np.ndarray
     judged: np.ndarray
@@ -78,6 +81,7 @@ class Trajectory:
         floor: (H, 3) errors that count as one; infinite where a channel is not judged.
         keep: (W,) bool: windows that are judged.
         own: see ErrorDataset.
+        by_run: what its robot has of its own is of this log alone: its runs differ.
         first_part: part that the log begins with. Logs often begin alike, so that of several each
             begins with another one: else a drive of all of them is left out at once.
         every_s: between two starts.
@@ -96,6 +100,7 @@ class Trajectory:
     every_s: float = EVERY_S
     radius_ratio: float = 1.0
     independent: np.ndarray = field(default_factory=lambda: np.ones(3))
+    by_run: bool = False
     weight: np.ndarray = field(init=False, repr=False)
     block: np.ndarray = field(init=False, repr=False)
     part: np.ndarray = field(init=False, repr=False)

@@ -32,6 +32,7 @@ class SteadyStates:
     noise: None = None
     clock_free: bool = False
     stages = MOTION_STAGES
+    by_run = False
 
     @classmethod
     def of(cls, sheet: SteadyTable, model: native.Model) -> "SteadyStates":

@@ -82,9 +82,9 @@ def findings(diagnosis: Diagnosis) -> Table:
         "What was found",
         ["effect", "takes away", "certainty", "estimates"],
         rows,
-        "Takes away: share of the squared error at 0.5 s above the log's noise, on parts of the "
-        "data that were not fitted to. Estimates: ± is one standard error; a 95 % interval is "
-        "about twice that to each side.",
+        "Takes away: share of the squared error above the log's noise, on parts of the "
+        "data that were not fitted to; with what is left over they make all of it. Estimates: ± is "
+        "one standard error; a 95 % interval is about twice that to each side.",
         words=(0, 2, 3),
         lists=(3,),
     )
@@ -132,6 +132,8 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     of_few = _alone(diagnosis) if count == 1 else "not compared" if too_few else "as the model"
     adequate = diagnosis.verdict == "model_adequate"
     usual = of_few if count < SETTINGS.fewest_robots else "as the model" if adequate else "as all"
+    if diagnosis.apart and diagnosis.apart.whose == "robots":
+        usual = "of its own numbers"
     rows = [
         [
             Cell(f"R{r.robot_id:02d}", "bad" if r.robot_id in off else ""),
@@ -244,7 +246,8 @@ def _late(diagnosis: Diagnosis) -> str:
     late = diagnosis.late
     if late is None or late.sum_std_s is None:
         return ""
-    total = f"{rounded(late.sum_s, late.sum_std_s)} ± {late.sum_std_s:.1g} s in all"
+    whose = " on the average, each with its own" if late.spread_s else " in all"
+    total = f"{rounded(late.sum_s, late.sum_std_s)} ± {late.sum_std_s:.1g} s{whose}"
     if late.parted:
         return f"Late by {total}: {late.lag_s:.2f} s lag, {late.delay_s:.2f} s delay."
     if late.lag_s is not None:
@@ -263,7 +266,7 @@ def _said(diagnosis: Diagnosis) -> list[RenderableType]:
         Text(diagnosis.sentence, show.STYLES[_tone_of(diagnosis)]),
         Text(
             f"score {number(diagnosis.before.score)} as given, "
-            f"{number(diagnosis.score_refit)} after a refit of the base "
+            f"{number(diagnosis.score_refit)} after a refit of the base{_each(diagnosis)} "
             f"(on held-out data{_without(diagnosis)})"
         ),
         Text(),
@@ -275,6 +278,12 @@ def _said(diagnosis: Diagnosis) -> list[RenderableType]:
 
 def _tone_of(diagnosis: Diagnosis) -> Tone:
     return "bad" if diagnosis.robots_off else TONES[diagnosis.verdict]
+
+
+def _each(diagnosis: Diagnosis) -> str:
+    """That each has numbers of its own, where they differ."""
+    own = diagnosis.apart
+    return f" with numbers of its own for each {own.whose[:-1]}" if own else ""
 
 
 def _without(diagnosis: Diagnosis) -> str:
@@ -303,9 +312,10 @@ def terminal_explanation(
         *([Text(result.now, show.STYLES["good"]), Text("Without it:")] if result.now else []),
         *_said(result.diagnosis),
         Text(),
-        show.table(tables.steps(_labelled(result.steps))),
+        show.table(tables.steps(_labelled(result.steps, bool(result.diagnosis.apart)))),
         *([show.table(tables.parameters(result.parameters))] if result.parameters else []),
         *(Text(line) for line in formula.taken(result.formula)),
+        *([Text(result.left_out)] if result.left_out else []),
         *([Text(NOTHING_GAINED)] if not result.gained else []),
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
@@ -321,7 +331,8 @@ def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None =
         steps: scores after each step; None: those of the diagnosis.
     """
     before, steps = diagnosis.before, steps or diagnosis.steps
-    scores = [("as given", before.score), ("base refitted, held out", diagnosis.score_refit)]
+    refitted = f"base refitted{_each(diagnosis)}, held out"
+    scores = [("as given", before.score), (refitted, diagnosis.score_refit)]
     if len(steps) > 1:
         scores.append(("with all that was found, held out", steps[-1][1]))
     if len(diagnosis.detection_steps) > 1:
@@ -336,7 +347,7 @@ def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None =
         comparisons.facts(before),
         [
             *_detection_figures(diagnosis),
-            *_gains(steps),
+            *_gains(steps, bool(diagnosis.apart)),
             *formula.figures(diagnosis.rest),
             *robot_pictures(before),
         ],
@@ -362,6 +373,7 @@ def explanation_section(
         notes=[
             *page.notes,
             *formula.taken(result.formula),
+            *([result.left_out] if result.left_out else []),
             *([NOTHING_GAINED] if not result.gained else []),
             not_written or f"Written: `{result.path}`",
         ],
@@ -440,15 +452,15 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
     return [detections.field_of_view(diagnosis.detections), *found]
 
 
-def _gains(steps: Steps) -> list[Figure]:
+def _gains(steps: Steps, own: bool) -> list[Figure]:
     """What each step took away; nothing where none did."""
-    labelled = _labelled(steps)
+    labelled = _labelled(steps, own)
     return [waterfall(labelled)] if len(labelled) > 1 else []
 
 
-def _labelled(steps: Steps) -> list[tuple[str, float]]:
-    """Steps of the waterfall."""
-    names = {None: "as given, held out", REFIT: REFIT_IN_WORDS}
+def _labelled(steps: Steps, own: bool) -> list[tuple[str, float]]:
+    """Steps of the waterfall; `own`: from the first on each robot or run has its own numbers."""
+    names = {None: "own numbers, held out" if own else "as given, held out", REFIT: REFIT_IN_WORDS}
     return [(names.get(effect, f"+ {effect}"), score) for effect, score in steps]
 
 

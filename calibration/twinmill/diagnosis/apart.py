@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers of the base in which robots of a kind, or runs of one robot, differ: each has its own.
+
+A number that is constant within a run and differs between runs looks like a place or a time where
+one set of numbers stands for all. It is told first, by what each run tells of it alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.chance import chi2_above
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.trials import State, Trial, fitted
+from twinmill.fitting.compare import GOOD
+from twinmill.fitting.fit import base_names
+from twinmill.fitting.opening import OWN, Opened, with_own_of_runs
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.parameters import (
+    BASE_GAINS,
+    GAINS,
+    LAG,
+    ParameterEstimate,
+    base_parameters,
+)
+from twinmill.predict.datasets import Trajectory
+
+Whose = Literal["robots", "runs"]
+LATE_LEAST_S = 0.002  # by which lags differ at least, where that is told
+GAIN_WORDS = {GAINS[0]: "speed", GAINS[1]: "turning"}
+SCALED = {GAINS[0]: BASE_GAINS[:2], GAINS[1]: BASE_GAINS[2:]}  # what of the base a gain scales
+
+
+@dataclass(frozen=True)
+class Differing:
+    """One number of which each has its own.
+
+    Attributes:
+        name: in the model.
+        values: by robot or run, as `R03` or `run3.lcmlog`.
+    """
+
+    name: str
+    values: Mapping[str, float]
+
+    @property
+    def middle(self) -> float:
+        """Of all."""
+        return float(np.mean([*self.values.values()]))
+
+    @property
+    def std(self) -> float:
+        """Standard deviation among them."""
+        return float(np.std([*self.values.values()], ddof=1))
+
+    @property
+    def words(self) -> str:
+        """What differs, from where to where."""
+        low, high = min(self.values.values()), max(self.values.values())
+        if self.name == LAG:
+            return f"motor lag ({low:.3f} to {high:.3f} s)"
+        middle = self.middle
+        ends = (f"{100 * (v / middle - 1):+.1f}" for v in (low, high))
+        return f"{GAIN_WORDS[self.name]} ({' to '.join(ends)} %)"
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {"name": self.name, "std": self.std, "values": dict(self.values)}
+
+
+@dataclass(frozen=True)
+class Apart:
+    """Robots or runs that differ by more than one set of numbers can stand for.
+
+    Attributes:
+        whose: what differs.
+        numbers: of which each has its own, those that tell most first.
+        score_alike: held out, of what was found with one set of numbers for all.
+        score_own: the same with numbers of its own for each.
+    """
+
+    whose: Whose
+    numbers: tuple[Differing, ...]
+    score_alike: float
+    score_own: float
+
+    @property
+    def sentence(self) -> str:
+        """For people, before all else."""
+        differ = _listed([n.words for n in self.numbers])
+        return (
+            f"{self.whose.capitalize()} differ in {differ}: one set of numbers for all leaves a "
+            f"score of {self.score_alike:.2f}, numbers of its own for each {self.whose[:-1]} "
+            f"{self.score_own:.2f}."
+        )
+
+    def spread(self, name: str) -> float:
+        """Standard deviation of a number among them; 0 of what does not differ."""
+        return next((n.std for n in self.numbers if n.name == name), 0.0)
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {**vars(self), "numbers": [n.to_json() for n in self.numbers]}
+
+
+def apart(opened: Sequence[Opened], last: Trial) -> Apart | None:
+    """In what those differ that have numbers of their own; None where one set does as well.
+
+    Args:
+        opened: of the search, in its order.
+        last: the final trial.
+    """
+    numbers = _differing(last.state)
+    if not numbers:
+        return None
+    alike = fitted(_alike(opened, last.state)).held_score
+    if alike <= SETTINGS.news * last.held_score:
+        return None
+    by_run = any(isinstance(d, Trajectory) and d.by_run for d in last.fit.datasets)
+    return Apart("runs" if by_run else "robots", numbers, alike, last.held_score)
+
+
+def of_runs(found: Apart | None) -> bool:
+    """Whether runs were found to differ, and not robots."""
+    return found is not None and found.whose == "runs"
+
+
+def runs_with_own(
+    opened: Sequence[Opened], first: State, last: Trial, usual: float
+) -> list[Opened]:
+    """Runs of one robot with numbers of their own, where these tell that they differ; else none.
+
+    Args:
+        opened: of the search.
+        first: where it started.
+        last: the final trial, of one set of numbers for all.
+        usual: score that is no news.
+    """
+    one_robot = len({d.robot_id for d in first.datasets}) == 1
+    enough = len(opened) >= SETTINGS.fewest_robots and all(o.floor for o in opened)
+    if not (one_robot and enough) or last.held_score <= GOOD * usual:
+        return []
+    own = with_own_of_runs(opened)
+    numbers = _differing(replace(first, datasets=[o.data for o in own]))
+    return with_own_of_runs(opened, {n.name: n.std for n in numbers}) if numbers else []
+
+
+def tells_more(own: Trial, alike: Trial) -> bool:
+    """Whether runs with numbers of their own leave little of what one set for all leaves.
+
+    What acts at some commands, at a place or from a moment on makes runs differ, too, if each has
+    its own share of it; but then much is left within them.
+    """
+    evidence, without_best, _ = own.fit.against(alike.fit)
+    left, before = (max(t.fit.held_square - 1, 0.0) for t in (own, alike))
+    beyond = evidence > SETTINGS.passing and without_best > SETTINGS.without_best
+    return beyond and left < SETTINGS.within_runs * before
+
+
+def middles(fit: ScoreFit, found: Apart) -> list[ParameterEstimate]:
+    """Numbers of the base that stand for those that differ: their middle, as wide as they differ.
+
+    Of runs also the gains, since no other run has one's own; each robot keeps its gains.
+    """
+    model = fit.models[0]
+    told = []
+    for number in found.numbers:
+        if number.name != LAG and found.whose == "robots":
+            continue
+        for name in SCALED.get(number.name, (LAG,)):
+            (p,) = base_parameters(model, [name])
+            value = number.middle * (p.value if number.name != LAG else 1.0)
+            std = number.std * (p.value if number.name != LAG else 1.0)
+            told.append(ParameterEstimate(name, value, std, p.unit, False, True, words=p.words))
+    return told
+
+
+def _differing(state: State) -> tuple[Differing, ...]:
+    """Numbers of robots' or runs' own that are not one, by the chi2 test of one common value.
+
+    The base is held: what all have in common would make each as unsure as they differ.
+    """
+    if not any(p.name in OWN for d in state.datasets for p in d.own):
+        return ()
+    free = tuple(p for p in state.begun() if not p.name.startswith("base."))
+    fit, found = fitted(replace(state, free=free)).fit, []
+    for name in OWN:
+        values, variances = {}, {}
+        for i, data in enumerate(fit.datasets):
+            own = fit.own_estimates(i).get(name)
+            if own:
+                label = _label(data, values)
+                values[label], variances[label] = own.value, own.std**2
+        if len(values) < 2:
+            continue
+        number = Differing(name, values)
+        size, weight = np.array([*values.values()]), 1 / np.array([*variances.values()])
+        away = float(np.sum(weight * (size - np.average(size, weights=weight)) ** 2))
+        least = LATE_LEAST_S if name == LAG else SETTINGS.spread
+        if chi2_above(away, len(values) - 1) < SETTINGS.odd_chance and number.std > least:
+            found.append((away, number))
+    return tuple(number for _, number in sorted(found, key=lambda f: -f[0]))
+
+
+def _label(data: Trajectory, known: Mapping[str, float]) -> str:
+    """Of the robot or run whose numbers these are; logs of one name are numbered."""
+    if not data.by_run:
+        return f"R{data.robot_id:02d}"
+    name = data.measurement.log_name
+    return f"{name} ({1 + len(known)})" if name in known else name
+
+
+def _alike(opened: Sequence[Opened], state: State) -> State:
+    """The same with one set of numbers for all, free."""
+    middle_s = float(np.mean([m.get(LAG) for m in state.models]))
+    models = [_of_all(m, middle_s) for m in state.models]
+    data = [_without_own(d) for d in state.datasets]
+    known = {p.name for p in state.free}
+    names = [n for n in base_names(models[0], opened) if n not in known]
+    free = (*state.begun(), *base_parameters(models[0], names))
+    return replace(state, datasets=data, models=models, free=free)
+
+
+def _of_all(model: native.Model, lag_s: float) -> native.Model:
+    model = model.copy()
+    for name, value in [(LAG, lag_s), *((gain, 1.0) for gain in GAINS)]:
+        model.set(name, value)
+    return model
+
+
+def _without_own(data: Trajectory) -> Trajectory:
+    if not isinstance(data, Trajectory):
+        return data
+    return replace(data, own=tuple(p for p in data.own if p.name not in OWN), by_run=False)
+
+
+def _listed(words: Sequence[str]) -> str:
+    """`a`, `a and b`, or `a, b and c`."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last

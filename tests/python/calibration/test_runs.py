@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs of one robot that differ are told to, and what is of one run is predicted into no other."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.explain import explain
+from twinmill.diagnosis.finding import Finding, of_all, part_of_all
+from twinmill.diagnosis.forms import Form, Motion
+from twinmill.diagnosis.formula import Formula, Number
+from twinmill.diagnosis.formula_telling import drives_back
+from twinmill.fitting.compare import compare
+from twinmill.model.model_file import ModelFile
+
+LAGS_S = (0.09, 0.12, 0.15, 0.18)  # the base has 0.09
+RUN_S = 20.0
+
+
+@pytest.fixture(scope="module")
+def slowed(tanh_robot):
+    """One that drags a load from some moment of its run to another."""
+
+    class Slowed(tanh_robot):
+        def wheels_mps(self, duty):
+            speeds = super().wheels_mps(duty)
+            middle = slice(len(duty) // 3, 2 * len(duty) // 3)
+            speeds[middle] *= 0.7
+            return speeds
+
+    return Slowed()
+
+
+def test_runs_whose_lags_differ_are_told_as_such_before_place_or_time(
+    tanh_robot, measure, one_clock_base, tmp_path
+):
+    runs = [measure(tanh_robot(lag_s=s), 300 + k, RUN_S) for k, s in enumerate(LAGS_S)]
+    told = explain(runs, one_clock_base, out=tmp_path / "runs.toml", command="")
+    found = told.diagnosis
+    assert found.verdict == "outside_catalogue" and found.found == []
+    assert found.sentence.startswith("Runs differ in motor lag (0.")
+    assert "place" not in found.sentence and "time" not in found.sentence
+    (lag,) = found.apart.numbers
+    assert [*lag.values.values()] == pytest.approx(LAGS_S, abs=0.006)
+    assert [*lag.values] == ["run.lcmlog", *(f"run.lcmlog ({k})" for k in (2, 3, 4))]
+    # The model has their middle, as unsure as they differ, and no run's own.
+    model = ModelFile.load(str(tmp_path / "runs.toml"))
+    assert model.model.get("base.motor_lag_s") == pytest.approx(np.mean(LAGS_S), abs=0.004)
+    assert "[robots" not in model.text and "motor_lag_s = 0.03" in model.text.split("[base.std]")[1]
+    assert compare(runs, model).score < compare(runs, one_clock_base).score
+
+
+def test_equal_runs_are_not_told_to_differ(tanh_robot, measure, one_clock_base):
+    found = diagnose([measure(tanh_robot(), 310 + k, RUN_S) for k in range(4)], one_clock_base)
+    assert found.apart is None and found.verdict == "model_adequate"
+
+
+def test_equal_runs_at_other_speeds_do_not_differ_by_what_no_model_knows(
+    tanh_robot, measure, one_clock_base
+):
+    """Left turns are faster than right ones by what no effect knows; runs turn more or less."""
+
+    class Lopsided(tanh_robot):
+        def wheels_mps(self, duty):
+            speeds = super().wheels_mps(duty)
+            spin = (speeds * (-1, 1, -1, 1)).mean(axis=1)
+            return speeds + 0.1 * np.abs(spin)[:, None] * (-1, 1, -1, 1)
+
+    found = diagnose([measure(Lopsided(), 320 + k, RUN_S) for k in range(4)], one_clock_base)
+    assert found.apart is None
+
+
+def test_a_load_of_one_run_is_predicted_into_no_other(
+    slowed, tanh_robot, measure, one_clock_base, tmp_path
+):
+    path = tmp_path / "explained.toml"
+    told = explain([measure(slowed, 330, 60.0)], one_clock_base, out=path, command="")
+    assert told.diagnosis.found and told.diagnosis.lasting == []
+    assert told.diagnosis.passing == told.to_json()["passing"] == told.diagnosis.found
+    assert "may be of this run alone" in told.left_out
+    other = [measure(tanh_robot(), 331, 40.0)]
+    assert compare(other, ModelFile.load(str(path))).score <= compare(other, one_clock_base).score
+    shares = [f.share for f in told.diagnosis.findings]
+    assert sum(shares) + told.diagnosis.rest.share == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("size", "back"), [(-2.87, True), (-0.8, False)])
+def test_a_formula_that_turns_a_speed_round_is_none(size, back):
+    """At 0.055 m/s the first one leaves (1 - 2.87) times the speed: 0.10 m/s backwards."""
+    speed_mps = np.linspace(-0.2, 0.2, 201)
+    names = {"vx": speed_mps, "t": np.arange(201.0)}
+    motion = Motion(None, np.column_stack([speed_mps] * 3), names, ())
+    around = Form("vx_mps", ("vx*max(0, 1 - abs(abs(vx)/0.055 - 1)/0.4)",), "speed", sizes=(1.0,))
+    number = Number("p0", size, size, size, "1")
+    found = Formula((around,), (number,), 0.5, 0.001, 100, 1.0, {"vx": (-0.2, 0.2)}, None)
+    assert drives_back(SimpleNamespace(motions=[motion]), found) == back
+
+
+def test_shares_that_are_told_make_all_of_what_was_there():
+    """30 and 0 % by two effects, 79 % left over: 109 % of one thing."""
+    findings = [Finding(n, None, [], s, "sure") for n, s in (("motor_lag", 0.3), ("drag", 0.0))]
+    told = [*(f.share for f in of_all(findings, 0.79)), 0.79 * part_of_all(findings, 0.79)]
+    assert told == pytest.approx([30 / 109, 0.0, 79 / 109])
+    assert part_of_all([], 0.4) == 1.0  # drifting gains took the rest
