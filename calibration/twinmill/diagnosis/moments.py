@@ -33,6 +33,9 @@ TOLD = 0.5  # of the usual way: where as much is predicted and it stands, a robo
 HELD_S = 2.0  # ... if that lasts
 HARDLY = 0.05  # share of the way: events that all change it by less must be twice as many
 
+EVEN = 4  # moments, of which the times between are a few tenths of a second from one period
+EVEN_S = 0.4
+
 What = Literal["less", "back", "more", "elsewhere", "unasked"]
 DID: dict[What, str] = {
     "less": "it went {way} the predicted way in half a second",
@@ -270,7 +273,24 @@ def sentence(moments: Sequence[Moment]) -> str:
         way = float(np.median([m.way for m in moments if m.what == most]))
         told = f"{did(most, way)}, as where {AS_WHERE[most]}"
     at = f"At {len(moments)} moments ({_listed(moments)})"
+    period_s = every_s(moments)
+    at += f", one every {period_s:.1f} s as by a clock," if period_s else ""
     return f"{at} the robot did not follow its commands: {told}."
+
+
+def every_s(moments: Sequence[Moment]) -> float:
+    """The period at which moments of one log come back; 0 where they do not.
+
+    Four or more, each a whole number of periods after the one before, most of them one.
+    """
+    apart_s = np.diff([m.t_s for m in moments])
+    if len({m.log for m in moments}) != 1 or len(moments) < EVEN or not np.isfinite(apart_s).all():
+        return 0.0
+    period_s = float(np.median(apart_s))
+    count = np.round(apart_s / max(period_s, 1e-9))
+    even = np.abs(apart_s - count * period_s) < EVEN_S
+    shortest = period_s > EVEN * EVEN_S
+    return period_s if shortest and even.all() and np.all(count >= 1) else 0.0
 
 
 def to_look_at(moments: Sequence[Moment]) -> str:

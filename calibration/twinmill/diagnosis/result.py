@@ -9,6 +9,7 @@ import twinmill_native as native
 from twinmill.data.checks.settings import CHECKS
 from twinmill.diagnosis.apart import Apart
 from twinmill.diagnosis.finding import Finding, Late, Ranked
+from twinmill.diagnosis.moments import every_s
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
 from twinmill.diagnosis.rest import FIRM, NOISE, Rest
@@ -155,6 +156,7 @@ class Diagnosis:
                 "likely": rest.likely,
                 "formula": rest.proven.equals if rest.proven else None,
                 "moments": [m.to_json() for m in rest.moments],
+                "every_s": every_s(rest.moments) or None,
                 "later": [change.to_json() for change in rest.events.later],
                 "proven": rest.proven.to_json() if rest.proven else None,
             },

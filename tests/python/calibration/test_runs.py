@@ -12,6 +12,7 @@ from twinmill.diagnosis.finding import Finding, of_all, part_of_all
 from twinmill.diagnosis.forms import Form, Motion
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.formula_telling import drives_back
+from twinmill.diagnosis.moments import Moment, every_s, sentence
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 
@@ -96,6 +97,21 @@ def test_a_formula_that_turns_a_speed_round_is_none(size, back):
     number = Number("p0", size, size, size, "1")
     found = Formula((around,), (number,), 0.5, 0.001, 100, 1.0, {"vx": (-0.2, 0.2)}, None)
     assert drives_back(SimpleNamespace(motions=[motion]), found) == back
+
+
+@pytest.mark.parametrize(
+    ("times_s", "period_s"),
+    [
+        ([3.4, 18.4, 33.5, 48.4, 63.4], 15.0),
+        ([3.4, 18.4, 48.4, 63.4, 78.3], 15.0),  # one of them was missed
+        ([6.5, 20.3, 37.8, 42.9, 58.1], 0.0),  # of chance
+        ([3.4, 18.4, 33.5], 0.0),
+    ],
+)
+def test_moments_that_come_back_by_a_clock_are_told_with_their_period(times_s, period_s):
+    moments = [Moment("run.lcmlog", 3, t_s, 0.6, "less") for t_s in times_s]
+    assert every_s(moments) == pytest.approx(period_s, abs=0.1)
+    assert ("one every 15.0 s as by a clock" in sentence(moments)) == (period_s > 0)
 
 
 def test_shares_that_are_told_make_all_of_what_was_there():
