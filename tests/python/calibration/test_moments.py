@@ -147,8 +147,9 @@ def test_numbers_that_gain_nothing_are_not_written(squares, verdict, later, gain
     rest = SimpleNamespace(events=SimpleNamespace(later=later))
     start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))
     search = SimpleNamespace(rounds=[start])
+    nothing = {"findings": [], "found": [], "lasting": [], "camera": (), "apart": None}
     diagnosis = SimpleNamespace(
-        search=search, verdict=verdict, findings=[], camera=(), robots=(None,), rest=rest
+        search=search, verdict=verdict, robots=(None,), rest=rest, **nothing
     )
     assert _gained(diagnosis, fit(squares), None) == gained
 
