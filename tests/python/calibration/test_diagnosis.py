@@ -270,7 +270,8 @@ def late_trial(model_file, effect, **numbers):
     for name, value in numbers.items():
         model.set(f"{effect}.{name}", value)
     known = SimpleNamespace(parameter=SimpleNamespace(name=f"{effect}.{next(iter(numbers))}"))
-    fit = SimpleNamespace(unknowns=[known], covariance=np.array([[0.01**2]]))
+    covariance = np.array([[0.01**2]])
+    fit = SimpleNamespace(unknowns=[known], covariance=covariance, x=np.zeros(1))
     state = SimpleNamespace(model=model, models=[model])
     return SimpleNamespace(names=(effect,), state=state, fit=fit, held_score=1.0)
 
