@@ -283,12 +283,15 @@ def test_clocks_that_run_apart_fast_are_no_step(robot, ppm):
     assert float(f.evidence.split(" ")[1]) == pytest.approx(ppm, rel=0.1)
 
 
-def test_steps_one_after_the_other_are_no_clock_surely(robot):
+def test_steps_one_after_the_other_are_told_with_time_and_size(robot):
     """At 20 s and at 40 s it comes to be 60 ms later: the commands wait in a buffer that fills."""
     t_s = robot.pose_t_s
     done_s = t_s - 0.06 * (t_s > 20) - 0.06 * (t_s > 40)
     (f,) = _findings([_with_pose(robot, *(np.interp(done_s, t_s, c) for c in robot.pose.T))])
-    assert "or the robot follows its commands later" in f.what and not f.fatal
+    assert not f.fatal and f.lateness.shape == "steps"
+    assert f.lateness.at(np.array([10, 30, 50])) == pytest.approx([0, 0.06, 0.12], abs=0.01)
+    at_s = [float(words.split(" s on")[0]) for words in f.what.split("from about ")[1:]]
+    assert at_s == pytest.approx([20, 40], abs=3)
     assert "look at what sent the commands" in f.remedy
 
 

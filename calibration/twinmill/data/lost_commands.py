@@ -43,10 +43,19 @@ def lost_commands(robot: RobotLog) -> np.ndarray:
 def keeps_beat(t_s: np.ndarray) -> bool:
     """Whether stamps come at a beat, and not when something changes."""
     steps_s = np.diff(t_s)
-    if not len(steps_s):
-        return False
-    beat_s = float(np.median(steps_s))
-    return bool(np.mean(np.abs(steps_s - beat_s) < EVEN * beat_s) >= BEAT)
+    return bool(len(steps_s) and _on_the_beat(steps_s).mean() >= BEAT)
+
+
+def beat_s(t_s: np.ndarray) -> float:
+    """Time from stamp to stamp: the mean of usual steps, since stamps may be rounded."""
+    steps_s = np.diff(t_s)
+    return float(steps_s[_on_the_beat(steps_s)].mean())
+
+
+def _on_the_beat(steps_s: np.ndarray) -> np.ndarray:
+    """(K,) bool: steps about as long as usual."""
+    usual_s = np.median(steps_s)
+    return np.abs(steps_s - usual_s) <= EVEN * usual_s
 
 
 def words(robot: RobotLog, lost_s: np.ndarray) -> str:

@@ -17,6 +17,7 @@ from twinmill.data.checks import (
     check_poses,
     check_recorded,
 )
+from twinmill.data.checks.lateness import Lateness
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
@@ -73,6 +74,26 @@ class Measurement:
         """One offset of the clocks may hold for the whole log, and so for another one."""
         return self.time_base is None and all(f.steady for f in self.findings)
 
+    @property
+    def lateness(self) -> Lateness | None:
+        """How much later it follows its commands at some times than at others; None: it does not.
+
+        Or nothing more is known of it.
+        """
+        return next((f.lateness for f in self.findings if f.lateness), None)
+
+    @property
+    def lateness_changes(self) -> bool:
+        """No one number of lag, delay or clock holds for the whole log, nor for another one."""
+        return not all(f.steady for f in self.findings)
+
+    def punctual(self) -> "Measurement":
+        """The same run with its commands when they acted, had all come as late as the first."""
+        if self.lateness is None:
+            return self
+        acting_s = self.lateness.acting_s(self.track.command_t_s)
+        return replace(self, track=replace(self.track, command_t_s=acting_s))
+
     @cached_property
     def played(self) -> native.Track:
         """Commands and poses for the native module.
@@ -119,10 +140,15 @@ class Measurement:
 def unsteady(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
     """Sentences on robots that follow later, or sooner, from some time on, by their input."""
     runs = [m for m in measurements if isinstance(m, Measurement)]
-    told = [(m.label, f.what) for m in runs for f in m.findings if not f.steady]
+    told = [(m.label, _taken_into_account(f)) for m in runs for f in m.findings if not f.steady]
     if len(runs) == 1:
         return [f"{what[0].upper()}{what[1:]}." for _, what in told]
     return [f"{label}: {what}." for label, what in told]
+
+
+def _taken_into_account(finding: InputFinding) -> str:
+    known = ", which is taken into account" if finding.lateness else ""
+    return f"{finding.what}{known}"
 
 
 class Measurements(list[Measurement | SteadyTable]):

@@ -66,10 +66,11 @@ from twinmill.diagnosis.ties import instead_of_drift
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, without_effect
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
-from twinmill.fitting.fit import base_names
+from twinmill.fitting.fit import base_names, effects_free
 from twinmill.fitting.opening import (
     Opened,
     judged,
+    lateness_changes,
     open_measurements,
     thinned,
     with_own_gains,
@@ -79,7 +80,6 @@ from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     BASE_GAINS,
     LAG,
-    all_effect_parameters,
     base_parameters,
     beginning_at_a_moment,
     catalogue,
@@ -104,6 +104,10 @@ TWO_CLOCKS = (
     "commands and poses use different clocks, so a delay cannot be told from the offset; if both "
     "use one clock, say so (twinmill import "
     "--same-clock), or fit a calibration log on the same clocks first"
+)
+CHANGING = (
+    "how late the robot follows its commands changes within the log, so that no lag and no delay "
+    "holds for all of it; look at what sent the commands, and log again"
 )
 ANSWERED = "the commands answer how the robot strayed, and noise may look like it then"
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
@@ -256,7 +260,7 @@ def first_state(
         speeds = base_parameters(opened[0].model, unsure)
         free += [replace(p, std=min(p.std, unsure[p.name])) for p in speeds]
     elif model_file.fitted_on(hashes):
-        free = base_parameters(opened[0].model, names) + all_effect_parameters(opened[0].model)
+        free = base_parameters(opened[0].model, names) + effects_free(opened[0].model, opened)
     base = tuple(n for n in names if n != LAG and n not in {p.name for p in free})
     excluded = {*excluded, *_by_clocks(opened)}
     return State(
@@ -270,11 +274,20 @@ def first_state(
 
 
 def _by_clocks(opened: Sequence[Opened]) -> set[str]:
-    """Effects that the clocks make meaningless: offsets are fitted, or known to be none."""
+    """Effects that the clocks make meaningless: offsets are fitted, or known to be none.
+
+    Where lateness changes in all logs, all that make late.
+    """
     logs = [o for o in opened if o.floor]
+    if lateness_changes(opened):
+        return {*needing("clocks"), *_making_late()}
     if any(not o.same_clock for o in logs):
         return {*needing("clocks"), *making_late("delay")}
     return set(making_late("clock")) if any(o.one_clock for o in logs) else set()
+
+
+def _making_late() -> list[str]:
+    return [name for part in ("lag", "delay", "clock") for name in making_late(part)]
 
 
 def _robot_of(own: Opened) -> int:
@@ -294,6 +307,8 @@ def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
         shared = any(not o.same_clock for o in opened if o.floor)
         if shared:
             found |= dict.fromkeys(making_late("delay"), TWO_CLOCKS)
+        if lateness_changes(opened):
+            found |= dict.fromkeys(_making_late(), CHANGING)
         if all(o.heading_held for o in opened if o.floor):
             found |= dict.fromkeys(needing("heading"), NO_HEADING)
         if sum(o.floor is not None for o in opened) > 1:

@@ -18,7 +18,8 @@ from twinmill.diagnosis.stopped import stopped
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
 from twinmill.diagnosis.trials import REFIT, State, fitted, without_effect
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.fit import common_clock, unsteady_clocks, without_clock
+from twinmill.fitting.fit import common_clock, time_notes, unsteady_clocks
+from twinmill.fitting.opening import judged
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import Fitted, ModelFile, child_of
@@ -141,8 +142,9 @@ def explain(
         ModelError: the new file cannot be written.
     """
     diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
-    no_clock = without_clock(_unsteady(diagnosis, diagnosis.search.last.fit))
-    diagnosis = replace(diagnosis, notes=[*diagnosis.notes, *no_clock])
+    unsteady = _unsteady(diagnosis, diagnosis.search.last.fit)
+    told = time_notes(judged(diagnosis.opened), unsteady)
+    diagnosis = replace(diagnosis, notes=[*diagnosis.notes, *told])
     if not diagnosis.search.stopped:
         try:
             diagnosis = _with_stale_lag(diagnosis)

@@ -19,16 +19,23 @@ from twinmill.fitting.equations import check_states
 from twinmill.fitting.fit import (
     base_names,
     common_clock,
+    effects_free,
     fitted,
     noise_of,
+    time_notes,
     unsteady_clocks,
     with_estimates,
-    without_clock,
     without_held,
 )
 from twinmill.fitting.formula_start import sized, with_time_constants
 from twinmill.fitting.heldout import HeldOut
-from twinmill.fitting.opening import Opened, judged, open_measurements, wide_gains
+from twinmill.fitting.opening import (
+    Opened,
+    judged,
+    lateness_changes,
+    open_measurements,
+    wide_gains,
+)
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.starts import Left, projected, starts_of
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
@@ -71,7 +78,7 @@ class AddResult:
         path: of the new model.
         blocks_t: how well left-out blocks agree that it predicts them better, as a t.
         robot_id: of the robot that alone has it; None if all have.
-        unsteady: labels of logs within which the offset of the clocks changes.
+        time_notes: a sentence where numbers of time are not fitted.
     """
 
     effect: str
@@ -85,7 +92,7 @@ class AddResult:
     path: Path
     blocks_t: float
     robot_id: int | None = None
-    unsteady: Sequence[str] = ()
+    time_notes: Sequence[str] = ()
 
     @property
     def of_camera(self) -> bool:
@@ -99,8 +106,8 @@ class AddResult:
 
     @property
     def notes(self) -> list[str]:
-        """Sentences where left-out data gain nothing by it, or no clock is written."""
-        told = without_clock(self.unsteady)
+        """Sentences where left-out data gain nothing by it, or numbers of time are not fitted."""
+        told = list(self.time_notes)
         without, after = self.heldout_refit.score, self.heldout_after.score
         if without > WORSE * after or (self.blocks_t > AGREE_T and after < without):
             return told
@@ -178,11 +185,12 @@ def add(
         )
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
+    _check_told(effect, judged(opened))
     logs = {m.log_name: m.log_sha256 for m in measurements}
     told = model_file.known_from_other_logs(logs.values())
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     _check_not_new(held, fresh)
-    old = without_held([*base, *all_effect_parameters(model_file.model)], held)
+    old = without_held([*base, *effects_free(model_file.model, judged(opened))], held)
     without = fitted(opened, old)[1]
     fresh = begun_at_best(effect, fresh, without, robot_id)
     enlarged = [o.with_model(richer) for o in opened]
@@ -225,8 +233,19 @@ def add(
         *(name, before.model_name, before, after, estimates, *held, Path(out)),
         blocks_t=found.against(without)[2],
         robot_id=robot_id,
-        unsteady=unsteady_clocks(found),
+        time_notes=time_notes(judged(opened), unsteady_clocks(found)),
     )
+
+
+def _check_told(effect: str, opened: Sequence[Opened]) -> None:
+    """Raises ValueError for an effect that makes late, where no log tells by how much."""
+    changing = lateness_changes(opened)
+    if changing and with_role(effect, "lateness"):
+        raise ValueError(
+            f"effect '{effect}': makes the robot late, and how late it follows its commands "
+            f"changes within {', '.join(changing)}, so that no size of it holds for another log; "
+            "give a log in which that does not change."
+        )
 
 
 def _add_to_camera(

@@ -11,7 +11,13 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.heldout import HeldOut
-from twinmill.fitting.opening import Opened, judged, of_few_commands, open_measurements
+from twinmill.fitting.opening import (
+    Opened,
+    judged,
+    lateness_changes,
+    of_few_commands,
+    open_measurements,
+)
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
 from twinmill.model.parameters import (
@@ -95,8 +101,14 @@ def base_names(
     table = [] if told else duty_table(model)
     if len(table) > 1:
         gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
-    changes = any(o.floor for o in opened) and LAG not in told
+    changes = any(o.floor for o in opened) and LAG not in told and not lateness_changes(opened)
     return [*gains, LAG] if changes and base_lag_is_identifiable(model) else gains
+
+
+def effects_free(model: native.Model, opened: Sequence[Opened]) -> list[Parameter]:
+    """Free quantities of a model's effects; no lateness where none of the logs tells one."""
+    free = all_effect_parameters(model)
+    return [p for p in free if p.role != "lateness"] if lateness_changes(opened) else free
 
 
 def _moves(own: Opened, gain: str) -> bool:
@@ -156,7 +168,7 @@ def fit(
     opened = open_measurements(measurements, model_file)
     model = model_file.model
     base = base_parameters(model, base_names(model, judged(opened)))
-    free = without_held([*base, *all_effect_parameters(model)], held)
+    free = without_held([*base, *effects_free(model, judged(opened))], held)
     moved, found = fitted(opened, free)
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
@@ -164,7 +176,7 @@ def fit(
     clock = common_clock(found)
     heldout = HeldOut.of(found)
     few = of_few_commands(judged(opened))
-    notes = (*([few] if few else []), *without_clock(unsteady_clocks(found)))
+    notes = (*([few] if few else []), *time_notes(judged(opened), unsteady_clocks(found)))
     write_child(  # last, so that Ctrl-C leaves no file of which nothing is told
         model_file,
         Fitted(
@@ -222,11 +234,22 @@ def unsteady_clocks(fit: ScoreFit) -> list[str]:
     return [m.label for m in own if not m.steady]
 
 
-def without_clock(labels: Collection[str]) -> list[str]:
-    """A sentence where the offset of the clocks changes within logs, so that none is written."""
-    if not labels:
+def time_notes(opened: Sequence[Opened], unsteady: Collection[str]) -> list[str]:
+    """A sentence where numbers of time are not fitted, since they hold for no other log.
+
+    Args:
+        opened: what is fitted to.
+        unsteady: labels of logs within which the offset of the clocks changes.
+    """
+    if changing := lateness_changes(opened):
+        return [
+            "Lag, delay and clock offset keep the values of the model as given: how late the robot "
+            f"follows its commands changes within {', '.join(changing)}, and no one number of it "
+            "holds for another log."
+        ]
+    if not unsteady:
         return []
     return [
-        f"No clock offset is written into the model: within {', '.join(labels)} it changes, and "
+        f"No clock offset is written into the model: within {', '.join(unsteady)} it changes, and "
         "holds for no other log."
     ]

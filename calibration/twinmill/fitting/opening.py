@@ -49,7 +49,7 @@ class Opened:
         data: over its floor; None where the log gives none.
         model: of its robot, on its clock.
         floor: of a log; None of a table.
-        same_clock: commands and poses are stamped by one clock.
+        same_clock: commands and poses are stamped by one clock, and as late all the time.
         phases: of the model's formulas, as they were found for this log.
     """
 
@@ -150,6 +150,7 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
     if isinstance(measurement, SteadyTable):
         table = SteadyStates.of(measurement, model_file.model)
         return Opened(measurement, table, table.model, None, True)
+    measurement = measurement.punctual()
     model, same_clock = _on_its_clock(measurement, model_file)
     data = Trajectory.of(measurement)
     check_states(data, model)
@@ -167,13 +168,16 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
 
 
 def _on_its_clock(measurement: Measurement, model_file: ModelFile) -> tuple[native.Model, bool]:
-    """The model of a log's robot, and whether one clock stamped commands and poses."""
+    """The model of a log's robot, and whether its commands are known to be on the poses' clock.
+
+    Where their lateness changes, a mean of it is found with the clock's offset, and is no delay.
+    """
     model = model_file.model.for_robot(measurement.track.robot_id)
     told = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
     declared = measurement.same_clock
     if declared and not told:
         model.set(CLOCK, 0.0)
-    return model, told or declared
+    return model, (told or declared) and measurement.lateness is None
 
 
 def open_roughly(measurement: Measurement, model_file: ModelFile) -> Opened | None:
@@ -222,6 +226,12 @@ def on_clock_of_others(own: Opened, opened: Sequence[Opened]) -> Opened:
     )
     measurement = replace(own.measurement, warnings=[*own.measurement.warnings, told])
     return replace(own, measurement=measurement, model=model)
+
+
+def lateness_changes(opened: Sequence[Opened]) -> list[str]:
+    """Labels of logs where each has a lateness that changes, so that none tells one; else empty."""
+    logs = [o.measurement for o in opened if o.floor and o.data is not None]
+    return [m.label for m in logs] if all(m.lateness_changes for m in logs) else []
 
 
 def judged(opened: Sequence[Opened]) -> list[Opened]:

@@ -8,7 +8,7 @@ or a heading that is a few degrees off are left to the diagnosis.
 
 import twinmill_native as native
 
-from twinmill.data.checks.clocks import check_drift
+from twinmill.data.checks.clocks import check_lateness
 from twinmill.data.checks.commands import (
     body_by_command,
     check_commands,
@@ -92,6 +92,6 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
             if any(f.fatal for f in wrong):
                 continue
             found += check_foreign(checked, search, explained)
-            if not checked.track.same_clock and not wrong:
-                found += check_drift(checked, search, explained)
+            if not wrong:
+                found += check_lateness(checked, search, explained)
     return found

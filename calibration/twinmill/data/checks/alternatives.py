@@ -218,7 +218,7 @@ class Search:
         """The columns as they are, at the lag and the shift where they explain most of all."""
         found: list[Explained] = []
         for lag_s in self.felt:
-            left, gain = self._judged(*self._by_shift(lag_s))
+            left, gain = self._judged(*self.by_shift(lag_s))
             k = int(left.sum(axis=1).argmin())
             late_s = float(self.lates_s[k])
             found.append(
@@ -236,8 +236,12 @@ class Search:
         self._own_key = [(own.lag_s, own.late_s)]
         return own
 
-    def _by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Sums for `_judged` of the columns as they are, at each shift."""
+    def by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of the columns as they are, at each of S shifts: sums over stretches, for each bend.
+
+        Returns:
+            (S, B, SHAPES, 3) told times itself and times measured, and (B,) measured squares.
+        """
         speeds = self._speeds(self.motion.body_mps(), 1)
         begin_s, shapes = self.felt[lag_s]
         told = begin_s, shapes @ self._weighted(self.wheels).T
@@ -262,7 +266,7 @@ class Search:
         counts = np.arange(fewest, len(self.starts) - fewest + 1)
         found: list[Jump] = []
         for lag_s in self.felt:
-            sums = self._by_shift(lag_s)
+            sums = self.by_shift(lag_s)
             before = _left_by_first(sums, self.fold, counts)
             power, along, total = sums
             turned = power[:, ::-1], along[:, ::-1], total[::-1]
@@ -288,7 +292,7 @@ class Search:
 
     def jump_std_s(self, jump: Jump) -> float:
         """Standard error of a jump's size, of its two shifts by leaving out a stretch at a time."""
-        power, along, total = self._by_shift(jump.explained.lag_s)
+        power, along, total = self.by_shift(jump.explained.lag_s)
         split, variance = int(np.searchsorted(self.motion.t_s[self.starts], jump.t_s)), 0.0
         for part in (slice(split), slice(split, None)):
             left, _ = self._judged(power[:, part], along[:, part], total[part], part)

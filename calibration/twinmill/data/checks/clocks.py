@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses that come later or sooner against the commands within a log: by a step, or more and more.
+"""Poses that come later or sooner against the commands within a log, as two clocks may make it too.
 
 A clock that is set, clocks that run apart and commands that act later from a moment on shift the
 same thing. A step and a straight line are told apart by how well each explains the motion, and
@@ -12,9 +12,10 @@ import numpy as np
 
 from twinmill.data.checks.alternatives import Explained, Jump, Search, far_better
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
+from twinmill.data.checks.lateness import Lateness, lateness_of
 from twinmill.data.checks.motion import BLOCK_S
 from twinmill.data.checks.settings import CHECKS
-from twinmill.data.lost_commands import keeps_beat
+from twinmill.data.lost_commands import beat_s, keeps_beat
 
 FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
 FINE_S = np.arange(-0.06, 0.06 + 1e-9, 0.01)  # about a shift of the coarse search
@@ -27,6 +28,9 @@ def stepped(
     checked: CheckedTrack, search: Search, own: Explained, best: Explained
 ) -> InputFinding | None:
     """A step of the poses against the commands, where it explains more than any other mistake."""
+    late = lateness_of(search)
+    if late and _is_no_clock(checked, late) and _left_moved(search, late) < best.left:
+        return _of_lateness(checked, search, own, late)
     far = Search(search.motion, search.wheels, search.felt, FAR_S)
     jump = far.jump(own, CHECKS.fewest_blocks // 2)
     better = far_better(jump.explained, own) and jump.explained.left < best.left
@@ -35,8 +39,8 @@ def stepped(
     step = _refined(search, own, jump)
     rate, std = _rate(search, own)
     if _gained(_drifted(search, own, rate), step.explained) < -CHECKS.step_sure:
-        return _of_drift(checked, _in_words(search, rate, std), rate)
-    return _of_step(checked, own, step)
+        return _with(late, _of_drift(checked, _in_words(search, rate, std), rate))
+    return _with(late, _of_step(checked, own, step))
 
 
 def _refined(search: Search, own: Explained, jump: Jump) -> Jump:
@@ -88,19 +92,63 @@ def _skips(t_s: np.ndarray, at_s: float, by_s: float) -> bool:
     within = t_s[first:last]
     if len(within) < 2:
         return True
-    missing_s = np.ptp(within) - (len(within) - 1) * float(np.median(np.diff(t_s)))
+    missing_s = np.ptp(within) - (len(within) - 1) * beat_s(t_s)
     return bool(missing_s * np.sign(by_s) > CHECKS.skips * abs(by_s))
 
 
-def check_drift(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+def check_lateness(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+    """Commands that act later or sooner at some times than at others, or clocks that run apart."""
+    if own.left > CHECKS.drift_left:
+        return []
+    late = lateness_of(search)
+    if late and _is_no_clock(checked, late):
+        return [_of_lateness(checked, search, own, late)]
+    if checked.track.same_clock or np.ptp(search.motion.t_s) < CHECKS.drift_span_s:
+        return []
+    found = _of_two_clocks(checked, search, own)
+    if not found and late and late.shape != "drift":
+        return [_of_lateness(checked, search, own, late)]
+    return [_with(late, f) for f in found]
+
+
+def _is_no_clock(checked: CheckedTrack, late: Lateness) -> bool:
+    """Whether no clock makes such a change: one stamped all, or it is no step and no drift."""
+    return checked.track.same_clock or late.shape in ("while", "steps")
+
+
+def _with(late: Lateness | None, finding: InputFinding) -> InputFinding:
+    """A finding on commands that act later, with how that changes."""
+    return finding if finding.steady or finding.fatal else replace(finding, lateness=late)
+
+
+def _of_lateness(
+    checked: CheckedTrack, search: Search, own: Explained, late: Lateness
+) -> InputFinding:
+    left = _left_moved(search, late)
+    told = checked.finding(
+        late.what,
+        f"the commands explain {1 - own.left:.1%} of the motion as it is stamped, and "
+        f"{1 - left:.1%} if they are moved by that",
+        LOOK,
+        fatal=False,
+        steady=False,
+    )
+    return replace(told, lateness=late)
+
+
+def _left_moved(search: Search, late: Lateness) -> float:
+    """Share of the motion that commands leave that are moved by their lateness."""
+    motion = search.motion
+    moved = replace(motion, t_s=motion.t_s - late.at(motion.t_s))
+    return Search(moved, search.wheels, search.felt, search.lates_s).own().left
+
+
+def _of_two_clocks(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
     """Clocks that run apart, by the rate at which the commands explain the motion best; or a step.
 
     A step is told as one where it explains more, and neither is where both explain as much. Of
     encoder logs, whose rows are often counted, `time_base.py` judges the rate.
     """
-    span_s = float(np.ptp(search.motion.t_s))
-    if own.left > CHECKS.drift_left or span_s < CHECKS.drift_span_s:
-        return []
     rate, std = _rate(search, own)
     jump = _refined(search, own, search.jump(own, CHECKS.fewest_blocks // 2))
     drifts = abs(rate) > max(1e-6 * CHECKS.least_ppm, CHECKS.drift_sure * std)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with an input, in three sentences."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from twinmill.data.checks.lateness import Lateness
 from twinmill.data.track import Track
 
 
@@ -21,6 +22,7 @@ class InputFinding:
         cut_s: stretches of capture's clock that are not to be judged.
         steady: one offset of the clocks may hold for the whole log; false where what the commands
             do comes later, or sooner, from some time on.
+        lateness: how it changes, where that is known.
     """
 
     what: str
@@ -31,10 +33,11 @@ class InputFinding:
     robot_id: int = -1
     cut_s: tuple[tuple[float, float], ...] = ()
     steady: bool = True
+    lateness: Lateness | None = None
 
     def to_json(self) -> dict:
         """Fields of the interface."""
-        return vars(self)
+        return asdict(self)
 
     def __str__(self) -> str:
         robot = f" R{self.robot_id:02d}" if self.robot_id >= 0 else ""

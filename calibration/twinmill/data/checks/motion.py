@@ -37,6 +37,7 @@ class Motion:
         has_heading: whether it was.
         grid_s, shapes: (G,) and (G, SHAPES, 4) commands on an even grid, robot's clock.
         half_s: of the window.
+        block_s: length of a stretch.
     """
 
     t_s: np.ndarray
@@ -47,6 +48,7 @@ class Motion:
     grid_s: np.ndarray
     shapes: np.ndarray
     half_s: float
+    block_s: float = BLOCK_S
 
     @classmethod
     def of(cls, track: Track) -> "Motion":
@@ -78,8 +80,8 @@ class Motion:
 
     @cached_property
     def block(self) -> np.ndarray:
-        """(K,) number of the stretch of BLOCK_S that a time lies in."""
-        return ((self.t_s - self.t_s[0]) // BLOCK_S).astype(int)
+        """(K,) number of the stretch that a time lies in."""
+        return ((self.t_s - self.t_s[0]) // self.block_s).astype(int)
 
     def body_mps(self, heading_sign: int = 1, mirrored: bool = False) -> np.ndarray:
         """(K,) complex, forward + i left, as the poses say or as they would say if mended.
