@@ -295,6 +295,64 @@ def test_steps_one_after_the_other_are_told_with_time_and_size(robot):
     assert "look at what sent the commands" in f.remedy
 
 
+@pytest.mark.parametrize(
+    ("shape", "later"),
+    [
+        ("step", lambda t: -0.12 * (t > 40)),
+        ("while", lambda t: 0.2 * ((t > 18) & (t < 38))),
+        ("steps", lambda t: 0.1 * (t > 20) + 0.12 * (t > 42)),
+        ("drift", lambda t: 0.25 * t / 60),
+    ],
+)
+def test_how_lateness_changes_in_a_log_of_one_clock_is_told(robot, shape, later):
+    """Each pose is stamped when it was taken; what it shows was due so much earlier."""
+    t_s = robot.pose_t_s
+    late = [np.interp(t_s - later(t_s), t_s, column) for column in robot.pose.T]
+    (f,) = _findings([replace(_with_pose(robot, *late), same_clock=True)])
+    assert not f.fatal and not f.steady and f.lateness.shape == shape
+    away_s = f.lateness.at(t_s) - later(t_s)
+    assert np.quantile(np.abs(away_s), 0.85) < 0.015  # a step is found to a stretch or two
+    if shape == "drift":
+        assert f.what.endswith("250 ms a minute") or abs(f.lateness.late_s[-1] - 0.25) < 0.015
+
+
+def _slower(robot, time_constant_s):
+    """Its pose through a lag more, of (N,) seconds, which may change."""
+    pose = robot.pose.copy()
+    share = 1 - np.exp(-np.diff(robot.pose_t_s) / np.maximum(time_constant_s[1:], 1e-3))
+    for k in range(1, len(pose)):
+        pose[k] = pose[k - 1] + share[k - 1] * (robot.pose[k] - pose[k - 1])
+    return _with_pose(robot, *pose.T)
+
+
+@pytest.mark.parametrize(
+    "time_constant",
+    [lambda t: 0.15 * (t > 30), lambda t: 0.15 * t / 60, lambda t: 0.1 * np.sin(t) ** 2],
+    ids=["a load from 30 s on", "gears that stiffen", "to and fro"],
+)
+def test_a_lag_that_changes_is_no_delay_that_changes(robot, time_constant):
+    slower = _slower(robot, time_constant(robot.pose_t_s))
+    assert _findings([replace(slower, same_clock=True)]) == []
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_commands_that_come_each_at_its_own_delay_have_no_lateness_that_changes(seed):
+    """By up to 0.15 s, at random, as over a busy link."""
+    robot, rng = _robot(seed=seed), np.random.default_rng(seed)
+    t_s = robot.pose_t_s
+    jitter_s = np.repeat(rng.uniform(0, 0.15, len(t_s) // 35 + 1), 35)[: len(t_s)]
+    done_s = np.maximum.accumulate(t_s - jitter_s)
+    late = [np.interp(done_s, t_s, column) for column in robot.pose.T]
+    assert _findings([replace(_with_pose(robot, *late), same_clock=True)]) == []
+
+
+def test_stamps_that_are_rounded_are_no_clock_that_was_set():
+    """60 poses a second by whole milliseconds: the usual step, 17 ms, is not the mean one."""
+    from twinmill.data.lost_commands import beat_s
+
+    assert beat_s(np.arange(0, 60, 1 / 60).round(3)) == pytest.approx(1 / 60, rel=1e-4)
+
+
 @pytest.mark.parametrize("noise_m", [0.0, 0.0004, 0.003])
 def test_poses_that_do_not_move_although_commands_do_are_named(robot, noise_m):
     still = np.full(robot.pose.shape, 0.3)

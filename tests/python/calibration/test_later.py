@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from twinmill.data.checks import InputFinding
+from twinmill.data.log import read_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.verdict import VerdictInputs
+from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
@@ -62,6 +64,69 @@ def test_a_fit_to_such_a_log_says_that_it_writes_no_clock(
     done = fit(runs, model_file(), tmp_path / "m.toml", "")
     assert done.clock is None and "[clock]" not in (tmp_path / "m.toml").read_text()
     assert any(note.startswith(AS_GIVEN) for note in done.notes)
+
+
+@pytest.fixture(scope="module")
+def on_one_clock():
+    """Reads logs that say that one clock stamped all."""
+
+    def read(path, model):
+        log = read_log(path)
+        robots = {i: replace(r, same_clock=True) for i, r in log.robots.items()}
+        return load_measurements([replace(log, robots=robots)], model)
+
+    return read
+
+
+LATER = {
+    "a while": lambda t: 0.2 * ((t > 18) & (t < 40)),
+    "two steps": lambda t: 0.1 * (t > 18) + 0.15 * (t > 40),
+    "a drift": lambda t: 0.25 * t / DURATION_S,
+}
+
+
+@pytest.fixture(scope="module")
+def changing(tanh_robot, run_log, on_one_clock, true_model):
+    """A log of one clock within which its commands come to act later."""
+
+    def make(how):
+        class Changing(tanh_robot):
+            def wheels_mps(self, duty):
+                row = np.arange(len(duty))
+                told = np.maximum(row - np.round(480 * LATER[how](row / 480)).astype(int), 0)
+                return super().wheels_mps(duty[np.maximum.accumulate(told)])
+
+        return on_one_clock(run_log(Changing(), 6, DURATION_S), true_model.model)
+
+    return make
+
+
+@pytest.mark.parametrize("how", LATER)
+def test_no_fit_to_a_log_whose_lateness_changes_is_worse_on_another(
+    how, changing, tanh_robot, run_log, on_one_clock, true_model, tmp_path
+):
+    """Its lag is the given one, and the same robot is predicted as well as before."""
+    runs = changing(how)
+    other = on_one_clock(run_log(tanh_robot(), 7, 40.0), true_model.model)
+    before = compare(other, true_model).score
+    done = fit(runs, true_model, tmp_path / "fitted.toml", "")
+    found = explain(runs, true_model, out=tmp_path / "explained.toml", command="test")
+    assert any(note.startswith(AS_GIVEN) for note in done.notes)
+    assert any(note.startswith(AS_GIVEN) for note in found.diagnosis.notes)
+    for name in ("fitted.toml", "explained.toml"):
+        model = ModelFile.load(str(tmp_path / name))
+        lag_s = model.model.get("base.motor_lag_s")
+        assert lag_s == pytest.approx(true_model.model.get("base.motor_lag_s"), rel=1e-5)
+        assert compare(other, model).score < 1.05 * before
+
+
+def test_no_effect_that_makes_late_is_added_by_a_log_whose_lateness_changes(
+    changing, true_model, tmp_path
+):
+    out = tmp_path / "m.toml"
+    with pytest.raises(ValueError, match="how late it follows its commands changes within run"):
+        add("motor_lag", changing("a drift"), true_model, out=out, command="")
+    assert not out.exists()
 
 
 @pytest.mark.parametrize(
