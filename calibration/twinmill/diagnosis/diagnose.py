@@ -437,7 +437,7 @@ def _concluded(
         ranking=ranking_of(done, findings),
         not_identifiable=hidden,
         rest=replace(rest, share=part_of_all(findings, rest.share) * rest.share),
-        late=late if any(o.floor for o in known) else None,
+        late=late if any(o.floor for o in known) and not lateness_changes(known) else None,
         search=done,
         opened=after,
         modelled=modelled,

@@ -19,7 +19,7 @@ from twinmill.diagnosis.taking import EFFECT, Taken, taken
 from twinmill.diagnosis.trials import REFIT, State, fitted, without_effect
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock, time_notes, unsteady_clocks
-from twinmill.fitting.opening import judged
+from twinmill.fitting.opening import judged, lag_is_kept
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import Fitted, ModelFile, child_of
@@ -143,8 +143,10 @@ def explain(
     """
     diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
     unsteady = _unsteady(diagnosis, diagnosis.search.last.fit)
-    told = time_notes(judged(diagnosis.opened), unsteady)
-    diagnosis = replace(diagnosis, notes=[*diagnosis.notes, *told])
+    own, hashes = judged(diagnosis.opened), [m.log_sha256 for m in measurements]
+    kept = lag_is_kept(own, model_file.known_from_other_logs(hashes))
+    notes = [*diagnosis.notes, *time_notes(own, unsteady, kept)]
+    diagnosis = replace(diagnosis, notes=notes)
     if not diagnosis.search.stopped:
         try:
             diagnosis = _with_stale_lag(diagnosis)

@@ -32,6 +32,7 @@ from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
     Opened,
     judged,
+    lag_is_kept,
     lateness_changes,
     open_measurements,
     wide_gains,
@@ -233,7 +234,9 @@ def add(
         *(name, before.model_name, before, after, estimates, *held, Path(out)),
         blocks_t=found.against(without)[2],
         robot_id=robot_id,
-        time_notes=time_notes(judged(opened), unsteady_clocks(found)),
+        time_notes=time_notes(
+            judged(opened), unsteady_clocks(found), lag_is_kept(judged(opened), told)
+        ),
     )
 
 

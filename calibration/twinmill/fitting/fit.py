@@ -14,6 +14,7 @@ from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
     Opened,
     judged,
+    lag_is_kept,
     lateness_changes,
     of_few_commands,
     open_measurements,
@@ -101,7 +102,8 @@ def base_names(
     table = [] if told else duty_table(model)
     if len(table) > 1:
         gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
-    changes = any(o.floor for o in opened) and LAG not in told and not lateness_changes(opened)
+    kept = LAG in told or lag_is_kept(opened, told)
+    changes = any(o.floor for o in opened) and not kept
     return [*gains, LAG] if changes and base_lag_is_identifiable(model) else gains
 
 
@@ -167,7 +169,9 @@ def fit(
     """
     opened = open_measurements(measurements, model_file)
     model = model_file.model
-    base = base_parameters(model, base_names(model, judged(opened)))
+    kept = lag_is_kept(judged(opened), _told(model_file, measurements))
+    names = [n for n in base_names(model, judged(opened)) if n != LAG or not kept]
+    base = base_parameters(model, names)
     free = without_held([*base, *effects_free(model, judged(opened))], held)
     moved, found = fitted(opened, free)
     before = comparison(model_file, opened)
@@ -176,7 +180,7 @@ def fit(
     clock = common_clock(found)
     heldout = HeldOut.of(found)
     few = of_few_commands(judged(opened))
-    notes = (*([few] if few else []), *time_notes(judged(opened), unsteady_clocks(found)))
+    notes = (*([few] if few else []), *time_notes(judged(opened), unsteady_clocks(found), kept))
     write_child(  # last, so that Ctrl-C leaves no file of which nothing is told
         model_file,
         Fitted(
@@ -194,6 +198,11 @@ def fit(
         force=force,
     )
     return FitResult(before, after, heldout, estimates, clock.get(CLOCK), Path(out), notes)
+
+
+def _told(model_file: ModelFile, measurements: Sequence[Measurement]) -> Collection[str]:
+    """Names of what other logs told of the base."""
+    return model_file.known_from_other_logs([m.log_sha256 for m in measurements])
 
 
 def noise_of(after: Comparison):
@@ -234,18 +243,21 @@ def unsteady_clocks(fit: ScoreFit) -> list[str]:
     return [m.label for m in own if not m.steady]
 
 
-def time_notes(opened: Sequence[Opened], unsteady: Collection[str]) -> list[str]:
+def time_notes(opened: Sequence[Opened], unsteady: Collection[str], lag_kept: bool) -> list[str]:
     """A sentence where numbers of time are not fitted, since they hold for no other log.
 
     Args:
         opened: what is fitted to.
         unsteady: labels of logs within which the offset of the clocks changes.
+        lag_kept: see `lag_is_kept`.
     """
     if changing := lateness_changes(opened):
+        which = "Lag, delay and clock offset" if lag_kept else "Delay and clock offset"
+        lag = "" if lag_kept else " The lag is fitted with that taken into account."
         return [
-            "Lag, delay and clock offset keep the values of the model as given: how late the robot "
-            f"follows its commands changes within {', '.join(changing)}, and no one number of it "
-            "holds for another log."
+            f"{which} keep the values of the model as given: how late the robot follows its "
+            f"commands changes within {', '.join(changing)}, and no one number of it holds for "
+            f"another log.{lag}"
         ]
     if not unsteady:
         return []

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes measurements ready to be scored by a model: data set, floor, and the model of its robot."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -232,6 +232,17 @@ def lateness_changes(opened: Sequence[Opened]) -> list[str]:
     """Labels of logs where each has a lateness that changes, so that none tells one; else empty."""
     logs = [o.measurement for o in opened if o.floor and o.data is not None]
     return [m.label for m in logs] if all(m.lateness_changes for m in logs) else []
+
+
+def lag_is_kept(opened: Sequence[Opened], told: Collection[str]) -> bool:
+    """Whether the lag keeps its value, as lateness changes in all logs.
+
+    It does where other logs told it (`told` has names), and where it is not known how lateness
+    changes; else how quickly the robot follows tells it, once the change is taken into account.
+    """
+    logs = [o.measurement for o in opened if o.floor and o.data is not None]
+    unknown = any(m.lateness is None for m in logs)
+    return bool(lateness_changes(opened)) and (bool(told) or unknown)
 
 
 def judged(opened: Sequence[Opened]) -> list[Opened]:
