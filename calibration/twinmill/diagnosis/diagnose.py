@@ -73,6 +73,7 @@ from twinmill.fitting.opening import (
     lateness_changes,
     open_measurements,
     thinned,
+    untold_parts,
     with_own_gains,
     with_own_lags,
 )
@@ -166,7 +167,7 @@ def _diagnosed(
     progress("finding the noise floor")
     opened = open_measurements(measurements, model_file)
     before = comparison(model_file, opened)
-    unseen = not_shown(opened)
+    unseen = not_shown(opened) | _changing(opened, model_file)
     course.opened, course.before, course.unseen = opened, before, unseen
     known = _thinned(with_own_gains(judged(opened)))
     first = first_state(known, model_file, {*excluded, *unseen})
@@ -274,20 +275,18 @@ def first_state(
 
 
 def _by_clocks(opened: Sequence[Opened]) -> set[str]:
-    """Effects that the clocks make meaningless: offsets are fitted, or known to be none.
-
-    Where lateness changes in all logs, all that make late.
-    """
+    """Effects that the clocks make meaningless: offsets are fitted, or known to be none."""
     logs = [o for o in opened if o.floor]
-    if lateness_changes(opened):
-        return {*needing("clocks"), *_making_late()}
     if any(not o.same_clock for o in logs):
         return {*needing("clocks"), *making_late("delay")}
     return set(making_late("clock")) if any(o.one_clock for o in logs) else set()
 
 
-def _making_late() -> list[str]:
-    return [name for part in ("lag", "delay", "clock") for name in making_late(part)]
+def _changing(opened: Sequence[Opened], model_file: ModelFile) -> dict[str, str]:
+    """Effects that make late, where logs tell no lateness since it changes within all of them."""
+    known = [o for o in opened if o.data is not None]
+    told = model_file.known_from_other_logs([o.measurement.log_sha256 for o in known])
+    return {name: CHANGING for part in untold_parts(known, told) for name in making_late(part)}
 
 
 def _robot_of(own: Opened) -> int:
@@ -307,8 +306,6 @@ def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
         shared = any(not o.same_clock for o in opened if o.floor)
         if shared:
             found |= dict.fromkeys(making_late("delay"), TWO_CLOCKS)
-        if lateness_changes(opened):
-            found |= dict.fromkeys(_making_late(), CHANGING)
         if all(o.heading_held for o in opened if o.floor):
             found |= dict.fromkeys(needing("heading"), NO_HEADING)
         if sum(o.floor is not None for o in opened) > 1:

@@ -27,6 +27,7 @@ from twinmill.model.parameters import (
     GAINS,
     LAG,
     LAG_EFFECT,
+    Parameter,
     ParameterEstimate,
     base_lag_is_identifiable,
     base_parameters,
@@ -200,12 +201,14 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
     """Whether a fit predicts left-out data better than the model as given.
 
     Numbers that were fitted though nothing was found must predict most blocks better: a few that
-    follow no command pull them wherever they like. Where lateness changes within a log, a lag goes
-    half of the way, and suits no other log.
+    follow no command pull them wherever they like. Where lateness changes within a log, and it is
+    not known from its input how, a lag goes half of the way, and suits no other log.
     """
     if diagnosis.camera or len(diagnosis.robots) > 1 or diagnosis.apart:
         return True  # common numbers are not all that is new
     if diagnosis.found and not (diagnosis.lasting or (beyond and beyond.kept)):
+        return False
+    if diagnosis.rest.events.later and any(_is_of_time(p) for p in fit.shared):
         return False
     start = diagnosis.search.rounds[0].before.fit
     if not (diagnosis.findings or (beyond and beyond.kept)):
@@ -219,6 +222,11 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
         if pulled or np.median(falls) < 0:
             return False
     return total_score(fit.held_scores) <= total_score(start.held_scores)
+
+
+def _is_of_time(parameter: Parameter) -> bool:
+    """Whether it says how late a robot is."""
+    return parameter.name == LAG or parameter.role == "lateness"
 
 
 def _as_given(

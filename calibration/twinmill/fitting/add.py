@@ -35,6 +35,7 @@ from twinmill.fitting.opening import (
     lag_is_kept,
     lateness_changes,
     open_measurements,
+    untold_parts,
     wide_gains,
 )
 from twinmill.fitting.score_fit import ScoreFit
@@ -51,6 +52,7 @@ from twinmill.model.parameters import (
     effect_names,
     effect_parameters,
     is_of_camera,
+    late_part,
     stated_names,
     with_role,
 )
@@ -186,9 +188,9 @@ def add(
         )
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
-    _check_told(effect, judged(opened))
     logs = {m.log_name: m.log_sha256 for m in measurements}
     told = model_file.known_from_other_logs(logs.values())
+    _check_told(effect, judged(opened), told)
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     _check_not_new(held, fresh)
     old = without_held([*base, *effects_free(model_file.model, judged(opened))], held)
@@ -240,14 +242,15 @@ def add(
     )
 
 
-def _check_told(effect: str, opened: Sequence[Opened]) -> None:
+def _check_told(effect: str, opened: Sequence[Opened], told: Collection[str]) -> None:
     """Raises ValueError for an effect that makes late, where no log tells by how much."""
-    changing = lateness_changes(opened)
-    if changing and with_role(effect, "lateness"):
+    late = effect != OWN_GAINS and late_part(effect)
+    if late and late[0] in untold_parts(opened, told):
+        within = ", ".join(lateness_changes(opened))
         raise ValueError(
             f"effect '{effect}': makes the robot late, and how late it follows its commands "
-            f"changes within {', '.join(changing)}, so that no size of it holds for another log; "
-            "give a log in which that does not change."
+            f"changes within {within}, so that no size of it holds for another log; give a log in "
+            "which that does not change."
         )
 
 

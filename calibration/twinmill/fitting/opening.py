@@ -245,6 +245,12 @@ def lag_is_kept(opened: Sequence[Opened], told: Collection[str]) -> bool:
     return bool(lateness_changes(opened)) and (bool(told) or unknown)
 
 
+def untold_parts(opened: Sequence[Opened], told: Collection[str]) -> list[str]:
+    """Parts of lateness that keep their values: "lag", "delay", "clock"; see `lag_is_kept`."""
+    lag = ["lag"] if lag_is_kept(opened, told) else []
+    return [*lag, "delay", "clock"] if lateness_changes(opened) else []
+
+
 def judged(opened: Sequence[Opened]) -> list[Opened]:
     """Those that have a floor.
 

@@ -139,11 +139,11 @@ def test_a_lag_that_no_log_told_is_fitted_with_the_change_taken_into_account(
 
 
 def test_no_effect_that_makes_late_is_added_by_a_log_whose_lateness_changes(
-    changing, true_model, tmp_path
+    changing, told_model, tmp_path
 ):
     out = tmp_path / "m.toml"
     with pytest.raises(ValueError, match="how late it follows its commands changes within run"):
-        add("motor_lag", changing("a drift"), true_model, out=out, command="")
+        add("motor_lag", changing("a drift"), told_model, out=out, command="")
     assert not out.exists()
 
 
