@@ -185,6 +185,7 @@ def open_roughly(measurement: Measurement, model_file: ModelFile) -> Opened | No
 
     A tenth of a second, where the floor takes more than one.
     """
+    measurement = measurement.punctual()
     model, same_clock = _on_its_clock(measurement, model_file)
     data = Trajectory.of(measurement).thinned(ROUGH)
     if too_poor(data) or not measurement.track.has_heading:
