@@ -11,6 +11,7 @@ from twinmill.model.parameters import (
     NO_SIZE,
     catalogue_of,
     is_local,
+    making_late,
     newest_instance,
     with_role,
 )
@@ -22,7 +23,7 @@ def best_of(
 ) -> Trial | None:
     """Of those with enough evidence, and that matter, the one with the least held-out cost.
 
-    Of two that do as well, the one with fewer numbers; of two that are the same, by their names.
+    Of two that do as well, the one with fewer numbers; of two that are the same, see `rank`.
     """
     good = []
     for trial in trials:
@@ -34,7 +35,7 @@ def best_of(
         at_nothing = all(_is_neutral(trial, n) or began_before(trial, n) for n in trial.names)
         if not at_nothing and proven(trial, before.held_score, settings):
             good.append(trial)
-    best = min(good, key=lambda t: (round(cost(t, settings), 6), t.names), default=None)
+    best = min(good, key=lambda t: rank(t, settings), default=None)
     # Stale numbers of the base are more likely than an effect that does the same.
     stale = [
         t
@@ -106,6 +107,16 @@ def _least_fall(before: Trial, trial: Trial, first_excess: float, settings: Sett
 def cost(trial: Trial, settings: Settings) -> float:
     """Held-out cost, and what its numbers cost."""
     return trial.fit.held_cost + settings.each * len(trial.fit.x)
+
+
+def rank(trial: Trial, settings: Settings) -> tuple:
+    """What trials are compared by: cost, and of those that are the same a clock comes last.
+
+    A clock that is off and a robot that acts later shift the same poses, so that their costs differ
+    by how a prediction is stepped.
+    """
+    of_clock = any(n in making_late("clock") for n in trial.names)
+    return round(cost(trial, settings), 1), of_clock, trial.names
 
 
 def proven(trial: Trial, score: float, settings: Settings) -> bool:

@@ -9,7 +9,7 @@ matters. Afterwards those that later ones made needless are dropped.
 from collections.abc import Callable
 from dataclasses import replace
 
-from twinmill.diagnosis.acceptance import began_before, best_of, cost, proven, when_s
+from twinmill.diagnosis.acceptance import began_before, best_of, cost, proven, rank, when_s
 from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.screening import Screened, candidates, likely_pairs, promising, screen
 from twinmill.diagnosis.settings import SETTINGS, Settings
@@ -118,7 +118,7 @@ def _exchanged(done: Search, starts: dict[str, Starts]) -> Search:
         if not close:
             continue
         stale = [t for t in close if t.names == (REFIT,)]
-        best = min(stale or close, key=lambda t: cost(t, settings))
+        best = min(stale or close, key=lambda t: rank(t, settings))
         if not stale and cost(best, settings) >= cost(last, settings):
             this = next(r for r in reversed(rounds) if r.accepted and name in r.accepted.names)
             known = {n for t in this.tied for n in t.names}
