@@ -151,6 +151,25 @@ TEST(Windows, AreWhatThePlantDoesWhereTheRoomMatters)
                1e-3);
 }
 
+// A sender that says the same forty times a second moves no robot another way.
+TEST(Windows, AreTheSameHoweverOftenACommandIsRepeated)
+{
+    const RandomDrive run;
+    RandomDrive often = run;
+    often.command_t_s.clear(), often.command.clear(), often.battery_V.clear();
+    for (size_t i = 0; i < run.battery_V.size(); ++i)
+        for (int again = 0; again < 18; ++again)
+        {
+            often.command_t_s.push_back(run.command_t_s[i] + 0.0263 * again);
+            for (size_t k = 0; k < kMaxWheels; ++k)
+                often.command.push_back(run.command[kMaxWheels * i + k]);
+            often.battery_V.push_back(run.battery_V[i]);
+        }
+    const Model model = With("carpet_grain", {0.1, 0.05}, Base());
+    ExpectNear(PredictWindows(model, often.track(), run.starts, run.ends),
+               PredictWindows(model, run.track(), run.starts, run.ends), 1e-12);
+}
+
 // Of poses that are rarer than the shortest horizon one ends where it begins, and two ends are one.
 TEST(Windows, EndWhereverTheyAreTold)
 {

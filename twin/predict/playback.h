@@ -4,7 +4,7 @@
 #define PREDICT_PLAYBACK_H
 
 #include <algorithm>
-#include <limits>
+#include <cstddef>
 
 #include "predict/predict.h"
 
@@ -28,20 +28,38 @@ public:
         const auto &times = track_->command_t_s;
         while (t_s_ < to_s)
         {
-            while (next_ < times.size() && times[next_] <= t_s_)
-                ++next_;
-            const double change_s =
-                next_ < times.size() ? times[next_] : std::numeric_limits<double>::infinity();
-            const double end_s = std::min({to_s, change_s, t_s_ + kMaxStepS});
+            for (; next_ < times.size() && times[next_] <= t_s_; ++next_)
+                if (!Repeats(next_))
+                    changed_s_ = times[next_];
+            const double most_s = t_s_ - changed_s_ < kSoonS ? kMaxStepS : kMaxSteadyStepS;
+            const double end_s = ChangeBefore(std::min(to_s, t_s_ + most_s));
             move(Held(), t_s_, end_s - t_s_);
             t_s_ = end_s;
         }
     }
 
 private:
-    // Steps end at each command and are no longer than this, as a swarm's are: the ground stage
-    // sees the pose at their start. Commands that come 45 times a second are one step each.
+    // Steps end where a command differs from the one before, and are no longer than a swarm's are:
+    // the ground stage sees the pose at their start. What is told again changes nothing.
     static constexpr double kMaxStepS = 0.025;
+    // Once the wheels have followed a command there is little that a step could miss.
+    static constexpr double kMaxSteadyStepS = 0.05, kSoonS = 0.3;
+
+    bool Repeats(size_t i) const
+    {
+        const auto told = track_->command.begin() + static_cast<std::ptrdiff_t>(kMaxWheels * i);
+        return i > 0 && std::equal(told, told + kMaxWheels, told - kMaxWheels);
+    }
+
+    // When the command changes next, but no later than `end_s`.
+    double ChangeBefore(double end_s) const
+    {
+        const auto &times = track_->command_t_s;
+        for (size_t i = next_; i < times.size() && times[i] < end_s; ++i)
+            if (!Repeats(i))
+                return times[i];
+        return end_s;
+    }
 
     Command Held() const
     {
@@ -57,6 +75,7 @@ private:
 
     const Track *track_;
     double t_s_;
+    double changed_s_ = t_s_;
     size_t next_ = 0;  // first command later than t_s_
 };
 
