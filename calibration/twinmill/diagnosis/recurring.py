@@ -70,12 +70,14 @@ class Recurring:
     def _in_bins(self, tried: np.ndarray) -> np.ndarray:
         """(K, BINS) share of each bin in which candidates are there."""
         inside = (np.arange(POINTS) + 0.5) / POINTS
-        t_s = (self.edges_s[:-1, None] + inside * np.diff(self.edges_s)[:, None]).ravel()
         waves, which = np.unique(tried[:, :2], axis=0, return_inverse=True)
-        wave = np.sin(waves[:, [0]] * t_s + waves[:, [1]]).astype(np.float32)
         level = np.cos(np.pi * tried[:, [2]]).astype(np.float32)
-        there = wave[which.ravel()] > level
-        return there.reshape(len(tried), BINS, POINTS).mean(axis=2, dtype=np.float32)
+        share = np.zeros((len(tried), BINS), np.float32)
+        for part in inside:
+            t_s = self.edges_s[:-1] + part * np.diff(self.edges_s)
+            wave = np.sin((waves[:, [0]] * t_s + waves[:, [1]]).astype(np.float32))
+            share += wave[which.ravel()] > level
+        return share / np.float32(POINTS)
 
     def best(self, half: np.ndarray) -> Pool:
         """The one form that takes most on (S,) stretches of a half, as the rows are weighed."""

@@ -171,6 +171,7 @@ class Search:
         self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
         self._own_key: list[tuple[float, float]] = []
+        self._sums_by_shift: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(B, SHAPES, 4, n) sums over stretches of products of (K, SHAPES, 4) with (K, ..., n)."""
@@ -242,6 +243,11 @@ class Search:
         Returns:
             (S, B, SHAPES, 3) told times itself and times measured, and (B,) measured squares.
         """
+        if lag_s not in self._sums_by_shift:
+            self._sums_by_shift[lag_s] = self._summed_by_shift(lag_s)
+        return self._sums_by_shift[lag_s]
+
+    def _summed_by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         speeds = self._speeds(self.motion.body_mps(), 1)
         begin_s, shapes = self.felt[lag_s]
         told = begin_s, shapes @ self._weighted(self.wheels).T
