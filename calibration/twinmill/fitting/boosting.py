@@ -98,12 +98,10 @@ class _Alike:
     def __init__(
         self, numbers: np.ndarray, columns: np.ndarray, inside: np.ndarray, touching: np.ndarray
     ) -> None:
-        self.numbers, self.columns = numbers, columns
+        self.numbers, self.columns, self.inside = numbers, columns, inside
         total = inside.sum(axis=1)
         self.mean = np.maximum(np.trace(total, axis1=1, axis2=2) / columns.shape[1], 1e-30)
-        values, self.vectors = np.linalg.eigh(total[:, None] - touching)
-        self.values = np.maximum(values, 0.0)
-        self.inside = self.vectors.swapaxes(-1, -2) @ inside @ self.vectors
+        self.others = total[:, None] - touching
 
     def gains(self, push: np.ndarray, pull: np.ndarray) -> np.ndarray:
         """(L, ridges) by how much each lowers the squared error on left-out parts.
@@ -112,20 +110,24 @@ class _Alike:
             push: (K, all features) moments of the rows inside each part.
             pull: of those that do not touch it.
         """
-        push, pull = (self._turned(m)[:, :, None] for m in (push, pull))
-        rise = (self.mean[:, None] * LADDER)[:, None, :, None]
-        beta = pull / (self.values[:, :, None] + rise)  # (L, K, ridges, F)
+        push, pull = (self._own(m)[:, :, None] for m in (push, pull))
+        rise = self.mean[:, None] * LADDER
+        beta = _solved(self.others[:, :, None], rise[:, None], pull)  # (L, K, ridges, F)
         return np.einsum("lkrf,lkrf->lr", beta, 2 * push - beta @ self.inside)
 
     def fitted(self, k: int, pull: np.ndarray, ridge: float) -> np.ndarray:
         """(K, F) coefficients of the k-th without each part."""
-        values = self.values[k] + self.mean[k] * ridge
-        return np.einsum("kfg,kg->kf", self.vectors[k], self._turned(pull)[k] / values)
+        return _solved(self.others[k], self.mean[k] * ridge, self._own(pull)[k])
 
-    def _turned(self, moments: np.ndarray) -> np.ndarray:
-        """(L, K, F) by eigenvectors."""
-        own = moments[:, self.columns].swapaxes(0, 1)
-        return (own[:, :, None] @ self.vectors)[:, :, 0]
+    def _own(self, moments: np.ndarray) -> np.ndarray:
+        """(L, K, F) of (K, all features)."""
+        return moments[:, self.columns].swapaxes(0, 1)
+
+
+def _solved(gram: np.ndarray, ridge: np.ndarray | float, moment: np.ndarray) -> np.ndarray:
+    """(..., F) coefficients at some ridges (...)."""
+    rise = np.asarray(ridge)[..., None, None] * np.eye(gram.shape[-1])
+    return np.linalg.solve(gram + rise, moment[..., None])[..., 0]
 
 
 class Learners:

@@ -612,8 +612,13 @@ def _beside(
 ) -> tuple[list[Features], list[np.ndarray]]:
     """Features of some groups, each once, and the columns of each group where all are in a row."""
     every = {id(f): f for group in groups for f in group}
-    owner = np.concatenate([np.full(f[a].shape[1], k) for a in axes for k, f in every.items()])
-    columns = [np.flatnonzero(np.isin(owner, [id(f) for f in group])) for group in groups]
+    places: dict[int, list[np.ndarray]] = {k: [] for k in every}
+    first = 0
+    for axis in axes:
+        for k, f in every.items():
+            places[k].append(first + np.arange(f[axis].shape[1]))
+            first += f[axis].shape[1]
+    columns = [np.sort(np.concatenate([p for f in own for p in places[id(f)]])) for own in groups]
     return list(every.values()), columns
 
 
