@@ -89,6 +89,7 @@ from twinmill.model.parameters import (
     making_late,
     needing,
 )
+from twinmill.predict.datasets import thinning
 
 # What a measurement must have for an effect to show, and what to say where it has not.
 LACKS = {
@@ -462,7 +463,8 @@ def _concluded(
 
 
 def _thinned(opened: Sequence[Opened]) -> list[Opened]:
-    return thinned(opened, SETTINGS.starts, SETTINGS.starts_apart_s)
+    data = [o.data for o in opened]
+    return thinned(opened, thinning(data, SETTINGS.starts, SETTINGS.starts_apart_s))
 
 
 def _with_all_starts(own: Opened, opened: Sequence[Opened]) -> Opened:

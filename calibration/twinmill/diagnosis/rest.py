@@ -26,8 +26,9 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import COUPLING, PLACE, TIME, Term
 from twinmill.fitting.boosting import squares
 from twinmill.fitting.compare import GOOD
-from twinmill.fitting.opening import Opened
+from twinmill.fitting.opening import Opened, thinned
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.predict.datasets import thinning
 
 MOST_BLOCKS = 200
 FOLDS = 5
@@ -192,12 +193,32 @@ class Formulas:
         terms: T formulas.
         changes: T of the rows of all logs by each.
         velocities: (N, 3) of the body in each, m/s and rad/s, at the points of its response.
+        seen: the logs with all starts that the fit has.
+        every: Nth of them that `logs` have: neighbours tell of hundreds of terms alike.
     """
 
     logs: list[tuple[int, Opened]]
     terms: list[Term]
     changes: Columns
     velocities: list[np.ndarray]
+    seen: list[tuple[int, Opened]]
+    every: int
+
+    def proven(self, fit: ScoreFit, rival: Rival | None = None) -> Formula | None:
+        """The formula for what a fit leaves; None if none is proven, or a rival does as well."""
+        return formula_of(
+            fit.thinned(self.every),
+            logs=self.logs,
+            velocities=self.velocities,
+            terms=self.terms,
+            changes=self.changes,
+            rival=rival,
+        )
+
+    def changed(self, less: ScoreFit, more: ScoreFit) -> list[np.ndarray]:
+        """(R,) by which the rows of each log differ from one fit to another."""
+        before, after = (fit.thinned(self.every).state[0] for fit in (less, more))
+        return [before[i] - after[i] for i, _ in self.logs]
 
     def products(self, fit: ScoreFit, beside: Sequence[np.ndarray] = ()) -> "Products":
         """Products with what a fit leaves, what is free in it projected out.
@@ -206,6 +227,7 @@ class Formulas:
             fit: of the same data sets.
             beside: (R,) other changes of each log's rows, one column more before those of formulas.
         """
+        fit = fit.thinned(self.every)
         rows, _ = fit.state
         left, free, blocks = fit.whitened([i for i, _ in self.logs])
         weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in self.logs])
@@ -230,20 +252,22 @@ class Doubted:
 
     def formula(self, whole: ScoreFit) -> Formula | None:
         """The formula that does better than they do in the fit that has them, if one is proven."""
-        before, after = self.fit.state[0], whole.state[0]
-        changes = [before[i] - after[i] for i, _ in self.formulas.logs]
+        changes = self.formulas.changed(self.fit, whole)
         rival = Rival(changes, max(len(whole.unknowns) - len(self.fit.unknowns), 0))
-        found = formula_of(self.fit, **vars(self.formulas), rival=rival)
+        found = self.formulas.proven(self.fit, rival)
         return replace(found, instead_of=self.names) if found else None
 
 
 def formulas_of(opened: Sequence[Opened], fit: ScoreFit) -> Formulas | None:
     """Formulas over the logs of a fit; None if it has none whose floor told a smooth response."""
-    logs = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
-    if not logs:
+    seen = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
+    if not seen:
         return None
-    found = library([own for _, own in logs], [fit.models[i] for i, _ in logs])
-    return Formulas(logs, *found)
+    places, logs = zip(*seen, strict=True)
+    every = thinning([o.data for o in logs], SETTINGS.few_starts, SETTINGS.starts_apart_s)
+    logs = thinned(logs, every)
+    found = library(logs, [fit.models[i] for i in places])
+    return Formulas(list(zip(places, logs, strict=True)), *found, seen, every)
 
 
 def rest_of(
@@ -272,7 +296,7 @@ def rest_of(
     if formulas is None:
         return Rest(share, False, [])
     logs = formulas.logs
-    firm = _firm(logs, fit)
+    firm = _firm(formulas.seen, fit)
     there = random or (firm and fit.held_square > GOOD**2)
     found = _dependences(formulas, fit, known, there=there)
     if fit.held_square <= SETTINGS.level**2 and not random:
@@ -285,7 +309,7 @@ def rest_of(
     if without:
         proven = without.formula(fit)
     if not proven and (something or firm or fit.held_square > GOOD**2):
-        proven = formula_of(fit, **vars(formulas))
+        proven = formulas.proven(fit)
     if found.likely and (again or proven):  # which are surer
         found = replace(found, depends_on=[], likely=False)
     others = [
@@ -587,6 +611,11 @@ class Products:
         less.own, less.seen = self.own[own], self.seen[own]
         less.moments, less.energy = self.moments[:, own], self.energy[:, own]
         return less
+
+    @property
+    def taken(self) -> np.ndarray:
+        """(T,) fall of the cost by each column, fitted to all blocks."""
+        return self.moments.sum(0) ** 2 / (self.energy.sum(0) + 1.0)
 
     def holds(self, many: np.ndarray, few: np.ndarray) -> bool:
         """Whether many columns make up a few of them (nearly) whole."""

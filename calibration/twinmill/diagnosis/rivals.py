@@ -19,7 +19,7 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT, Trial, without_effect
 from twinmill.fitting.opening import Opened
-from twinmill.model.parameters import with_role
+from twinmill.model.parameters import is_local, with_role
 
 
 @dataclass(frozen=True)
@@ -93,11 +93,10 @@ def rival_of(formulas: Formulas, name: str, less: Trial, whole: Trial) -> Rival 
         less: without the effect.
         whole: with it; the way from one to the other is the effect as it was found.
     """
-    before, _ = less.fit.state
-    after, _ = whole.fit.state
-    effect = [before[i] - after[i] for i, _ in formulas.logs]
-    products = formulas.products(less.fit, effect)
+    products = formulas.products(less.fit, formulas.changed(less.fit, whole.fit))
     (own, *gains), _ = products.each_held_out()
+    if is_local(name):  # one block may hold all of it, so that the others tell nothing of its size
+        own = products.taken[0]
     own = max(own, 0.0)
     for k in np.argsort(gains)[::-1]:
         if gains[k] <= own + SETTINGS.outdoes_by:

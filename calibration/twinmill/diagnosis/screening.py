@@ -2,7 +2,7 @@
 """What each effect of the catalogue would take away if all were linear."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -11,6 +11,7 @@ import twinmill_native as native
 from twinmill.diagnosis.settings import SETTINGS, Settings
 from twinmill.diagnosis.trials import REFIT, State, Trial, with_effects
 from twinmill.fitting.detection_fit import DetectionFit
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.starts import Left, Starts, projected, starts_of
 from twinmill.model.parameters import (
     LAG,
@@ -25,6 +26,7 @@ from twinmill.model.parameters import (
     needing,
     with_role,
 )
+from twinmill.predict.datasets import thinning
 
 SMALL = 0.05
 STRONGER = (3.0, 6.0)  # usual strengths, where a stronger effect is not the same made larger ...
@@ -76,6 +78,9 @@ def screen(
 ) -> list[Screened]:
     """Every candidate's expected worth, by its signature over what is free.
 
+    Signatures are seen from few starts of predictions; when and where something may have begun is
+    looked for from all: a few may be all that show it.
+
     Args:
         before: what is free in it is projected out.
         starts: of effects whose start is searched, found in earlier rounds; new ones are added.
@@ -88,20 +93,28 @@ def screen(
         return [_screened_bits(name, before) for name in candidates(state)]
     starts = {} if starts is None else starts
     rows, _ = fit.state
-    basis, rest = projected(fit)
-    left = Left.of(fit, basis, rest)
+    left = Left.of(fit, *projected(fit))
+    few = _on_few(fit)
+    basis, rest = projected(few)
+    of_few = dict(
+        rows=few.state[0],
+        weights=[np.sqrt(few.weight(i, r)) for i, r in enumerate(few.state[0])],
+        basis=basis,
+        rest=rest,
+    )
+    on_few = replace(state, datasets=few.datasets)
     found = []
     for name in candidates(state) if names is None else names:
         if name not in starts or with_role(name, "limit"):
             of = starts_of(name, state.models, state.datasets, rows)
             starts |= {name: of} if of else {}
         start = starts[name].best(left) if name in starts else {}
-        found.append(
-            _screened(
-                *(name, state), rows=rows, weights=left.weights, basis=basis, rest=rest, start=start
-            )
-        )
+        found.append(_screened(name, on_few, **of_few, start=start))
     return found
+
+
+def _on_few(fit: ScoreFit) -> ScoreFit:
+    return fit.thinned(thinning(fit.datasets, SETTINGS.few_starts, SETTINGS.starts_apart_s))
 
 
 def _screened_bits(name: str, before: Trial) -> Screened:
@@ -276,6 +289,7 @@ def likely_pairs(
     top = sorted(screened, key=lambda s: -s.gain)[:10]
     if before.held_score < 1.0 or before.state.of_cameras:
         return []
+    fit = _on_few(fit)
     left, *_ = fit.whitened(range(len(fit.datasets)))
     worth = {}
     for a, b in combinations(top, 2):

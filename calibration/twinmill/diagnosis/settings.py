@@ -17,6 +17,7 @@ class Settings(Numbers):
 
     # The search: which effect is accepted.
     starts: int = number(3000, "predictions; of more, every Nth start is looked at ...")
+    few_starts: int = number(300, "the same where hundreds of things are tried ...")
     starts_apart_s: float = number(1.0, "... but starts are no further apart, s")
     evidence: float = number(16.0, "least fall of the held-out cost (-2 log likelihood)")
     passing: float = number(30.0, "the same of an effect of a while, which is fitted to all of it")

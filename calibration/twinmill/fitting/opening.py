@@ -29,7 +29,7 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.steady_states import SteadyStates
-from twinmill.predict.windows import EVERY_S, rms
+from twinmill.predict.windows import rms
 
 CLOCK_REACH_S = 1.0  # how far from its start an offset of the clocks is looked for
 RATE_REACH_PPM = 500.0
@@ -292,13 +292,8 @@ def of_few_commands(opened: Sequence[Opened]) -> str:
     )
 
 
-def thinned(opened: Sequence[Opened], most: int, apart_s: float) -> list[Opened]:
-    """The same with so few starts that there are no more predictions than `most`, about.
-
-    But starts are no further apart than `apart_s`.
-    """
-    total = sum(len(o.data.keep) for o in opened if o.floor)
-    every = min(-(-total // most), int(apart_s / EVERY_S))
+def thinned(opened: Sequence[Opened], every: int) -> list[Opened]:
+    """The same with every Nth start of predictions."""
     if every < 2:
         return list(opened)
     return [

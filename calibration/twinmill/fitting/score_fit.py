@@ -113,6 +113,7 @@ class ScoreFit:
         ]
         self.names = [[parts[c].name for c in own] for own in self.columns]
         self.passes = 0
+        self._thinned: dict[int, ScoreFit] = {}
         # (P,) values at which the rows of each data set are known.
         self._known: tuple[np.ndarray, list[np.ndarray]] | None = None
 
@@ -372,6 +373,7 @@ class ScoreFit:
         """Minimises the cost and leaves the values in the models."""
         x, damping = self.x, 1e-3
         self.__dict__.pop("state", None)
+        self._thinned.clear()
         if len(x):
             rows, slopes = self._slopes(x)
             cost = self.cost(rows, x)
@@ -436,6 +438,17 @@ class ScoreFit:
     def scores(self) -> np.ndarray:
         """(D,) score of each data set."""
         return np.sqrt([r @ r for r in self.state[0]])
+
+    def thinned(self, every: int) -> "ScoreFit":
+        """The same values, seen from every Nth start of the logs alone."""
+        if every < 2:
+            return self
+        if every not in self._thinned:
+            few = [d.thinned(every) if isinstance(d, Trajectory) else d for d in self.datasets]
+            other = ScoreFit(few, self.models, self.shared, self.by_channel)
+            other.x = self.x
+            self._thinned[every] = other
+        return self._thinned[every]
 
     # -- held out -------------------------------------------------------------------------------
 

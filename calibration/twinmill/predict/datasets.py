@@ -229,6 +229,16 @@ class Trajectory:
         return float(np.sqrt(np.sum((np.nan_to_num(self.errors(model)) * self.weight) ** 2)))
 
 
+def thinning(datasets: Sequence[Dataset | None], most: int, apart_s: float) -> int:
+    """N of which every Nth start of the logs leaves no more predictions than `most`, about.
+
+    But starts are no further apart than `apart_s`.
+    """
+    logs = [d for d in datasets if isinstance(d, Trajectory)]
+    total = sum(len(d.keep) for d in logs)
+    return max(1, min([-(-total // most), *(int(apart_s / d.every_s) for d in logs)]))
+
+
 def errors_of(dataset: ErrorDataset, model: native.Model) -> np.ndarray:
     """(R,) errors over floor of a model as it is."""
     (rows,) = dataset.rows(model, [CLOCK], np.array([[model.get(CLOCK)]]))  # any name would do

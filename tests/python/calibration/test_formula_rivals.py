@@ -15,18 +15,19 @@ BLOCKS, LONG = 20, 50
 NAME = "the formula"
 
 
-def outdoing(effect: np.ndarray, formula: np.ndarray, errors: np.ndarray) -> Rival | None:
+def outdoing(
+    effect: np.ndarray, formula: np.ndarray, errors: np.ndarray, name: str = "speed_curve"
+) -> Rival | None:
     """What outdoes an effect that moves the rows by `effect`, all (R,)."""
     blocks = np.repeat(np.arange(BLOCKS), LONG)
     columns = np.column_stack([effect, formula])
     alike = {"weight": np.ones(len(errors)), "free": np.zeros((len(errors), 0))}
     products = Products(Columns([columns]), errors, blocks, **alike)
-    formulas = SimpleNamespace(logs=[(0, None)], terms=[NAME], products=lambda *_: products)
-    less, whole = (
-        SimpleNamespace(fit=SimpleNamespace(state=([rows], None)))
-        for rows in (effect, np.zeros_like(effect))
+    formulas = SimpleNamespace(
+        terms=[NAME], products=lambda *_: products, changed=lambda *_: [effect]
     )
-    return rival_of(formulas, "speed_curve", less, whole)
+    less, whole = SimpleNamespace(fit=None), SimpleNamespace(fit=None)
+    return rival_of(formulas, name, less, whole)
 
 
 @pytest.fixture(params=range(5))
@@ -49,6 +50,14 @@ def test_a_form_that_takes_little_more_and_leaves_nothing_makes_doubtful(noise):
 def test_the_effect_that_the_errors_have_is_outdone_by_nothing(noise):
     effect, other, rest = noise.T
     assert outdoing(effect, effect + other, effect + rest) is None
+
+
+def test_a_loss_that_lies_within_one_block_is_outdone_by_nothing_that_takes_less(noise):
+    """Other blocks tell nothing of its size, so that no fit to them predicts it."""
+    while_it_lasts, formula, rest = noise.T
+    effect = while_it_lasts * (np.arange(len(rest)) // LONG == 3)
+    errors = 4 * effect + 0.3 * formula + rest
+    assert outdoing(4 * effect, formula, errors, "transient_loss") is None
 
 
 def test_a_formula_that_explains_nothing_outdoes_no_effect(noise):

@@ -157,10 +157,10 @@ def test_what_is_no_more_than_the_noise_depends_on_nothing(score, random, told, 
     found = Rest(0.0, False, ["heading"])
     monkeypatch.setattr(rest, "_dependences", lambda *_, there: found)
     monkeypatch.setattr(rest, "_firm", lambda *_: False)
-    for name, nothing in (("events_of", Events()), ("comes_again", 0.0), ("formula_of", None)):
+    for name, nothing in (("events_of", Events()), ("comes_again", 0.0)):
         monkeypatch.setattr(rest, name, lambda *_, nothing=nothing, **__: nothing)
     fit, first = SimpleNamespace(held_square=score**2, models=[]), SimpleNamespace(held_square=1.1)
-    formulas = SimpleNamespace(logs=[])
+    formulas = SimpleNamespace(logs=[], seen=[], proven=lambda _: None)
     of = rest.rest_of(formulas, fit, first, known={}, whole=[], random=random)
     assert of.depends_on == told
 
