@@ -15,8 +15,8 @@ from twinmill.predict.windows import HORIZONS_S
 
 EARLY, LATE = HORIZONS_S.index(1.0), HORIZONS_S.index(2.0)
 FEWEST = 4  # blocks
-LEAST = 0.1  # early error for each metre or radian that late commands add
-CHANCE = 0.002  # of so large a slope where commands tell of no error
+LEAST = 0.2  # early error for each metre or radian that late commands add
+CHANCE = 0.005  # of so large a slope where commands tell of no error
 
 
 def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bool:

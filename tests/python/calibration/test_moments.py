@@ -14,7 +14,7 @@ from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.later import Later, later_from
 from twinmill.diagnosis.moments import Moment, _begin_s, _done, held, sentence, to_look_at
 from twinmill.diagnosis.notes import held_notes
-from twinmill.model.parameters import ParameterEstimate
+from twinmill.model.parameters import LAG, ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
 
 SPEED_MPS, NOISE_M = 0.2, 3e-4
@@ -142,7 +142,12 @@ def test_an_effect_of_which_no_number_is_determined_is_not_sure(seen, certainty)
 def test_numbers_that_gain_nothing_are_not_written(squares, verdict, later, gained):
     def fit(own):
         held = [np.sqrt(np.sum(own))]
-        return SimpleNamespace(block_squares=[np.array(own)], held_scores=held, datasets=[])
+        return SimpleNamespace(
+            block_squares=[np.array(own)],
+            held_scores=held,
+            datasets=[],
+            shared=[SimpleNamespace(name=LAG)],
+        )
 
     rest = SimpleNamespace(events=SimpleNamespace(later=later))
     start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))

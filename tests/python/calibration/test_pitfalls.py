@@ -33,6 +33,7 @@ from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, cross_validate
 from twinmill.diagnosis.trials import fitted as fitted_state
+from twinmill.fitting.add import add
 from twinmill.fitting.compare import MISSING, compare
 from twinmill.fitting.fit import base_names, fit
 from twinmill.fitting.opening import open_measurements
@@ -613,7 +614,8 @@ def test_what_a_loss_for_a_while_scatters_is_no_noise_once_it_is_known(
             return super().wheels_mps(duty) * np.where(tired, 0.65, 1.0)[:, None]
 
     log, path = measure(Tired(), 23, 60.0), tmp_path / "tired.toml"
-    first = explain([log], fitted, out=path, command="").diagnosis
+    first = diagnose([log], fitted)
+    add("transient_loss", [log], fitted, out=path, command="")
     again = diagnose([log], ModelFile.load(str(path)))
     for found in (first, again):
         assert not any("scatter" in note for note in found.notes)

@@ -521,7 +521,7 @@ def test_what_is_sure_and_takes_much_is_missing_beside_what_has_another_form(sha
 @pytest.mark.parametrize(("score", "words"), [(4.4, "too few stretches"), (1.4, "may be noise")])
 def test_errors_of_many_times_the_noise_are_not_called_noise(score, words):
     """A robot that drove for three of thirty seconds: too little to be firm, and too much."""
-    found = [Finding("coulomb_friction", None, [], 0.06, "doubtful", "much is left")]
+    found = [Finding("coulomb_friction", None, [], 0.1, "doubtful", "much is left")]
     rest = Rest(0.9, False, [], far=score > SETTINGS.no_noise)
     sentence = VerdictInputs(6, 7, 5, score, found, rest, [], [], [], 1.0).sentence
     assert "90 % is left" in sentence and words in sentence

@@ -490,9 +490,9 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
 
 
 def _in_toml(given: OfRobots) -> float | dict[str, float]:
-    """A number, or by robot."""
-    if not isinstance(given, Mapping):
-        return given
+    """A number, or by robot where one has its own."""
+    if not isinstance(given, Mapping) or {*given} <= {None}:
+        return _of(0, given)
     return {"all" if k is None else f"R{k:02d}": value for k, value in given.items()}
 
 
