@@ -100,15 +100,13 @@ class Alone:
     Attributes:
         as_all: without gains of its own.
         before: with gains of its own, as far as robots of a kind differ.
-        trials: by name; effects beside such gains.
-        lag: with a motor lag of its own beside such gains.
+        trials: by name; effects beside such gains, a motor lag always among them.
     """
 
     robot_id: int
     as_all: Trial
     before: Trial
     trials: dict[str, Trial]
-    lag: Trial
 
 
 def one_by_one(
@@ -139,7 +137,7 @@ def spread_of_lags_s(alone: Sequence[Alone]) -> float:
     By the chi2 test of one common value, and if lags of their own explain more than chance in two
     robots at least.
     """
-    trials = [a.lag for a in alone]
+    trials = [a.trials[LAG_EFFECT] for a in alone]
     if sum(t.evidence > SETTINGS.odd_evidence for t in trials) < 2:
         return 0.0
     lags_s, variances = np.array([(v[0], s[0, 0]) for v, s in map(_values, trials)]).T
@@ -192,9 +190,8 @@ def _each_alone(
     for i, own in before.items():
         progress(f"robot {i} alone")
         as_all = fitted(_alone_state(opened, state, i))
-        trials = {n: cross_validate(own, (n,)) for n in names}
-        lag = trials.get(LAG_EFFECT) or cross_validate(own, (LAG_EFFECT,))
-        alone.append(Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}, lag))
+        trials = {n: cross_validate(own, (n,)) for n in dict.fromkeys([*names, LAG_EFFECT])}
+        alone.append(Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}))
     return alone
 
 
@@ -267,7 +264,10 @@ def _apart(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
-    """The robot as an outlier, or None: of what sets it apart the most probable."""
+    """The robot as an outlier, or None: of what sets it apart the most probable.
+
+    A lag in which all robots differ sets none apart; what imitates that is no fault of one.
+    """
     best, best_name, best_p = None, "", 1.0
     for name, trial in own.trials.items():
         if trial.evidence < SETTINGS.odd_evidence:
@@ -276,6 +276,10 @@ def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
         better = best is None or trial.fit.held_cost < best.fit.held_cost
         if p_value < SETTINGS.odd_chance and better:
             best, best_name, best_p = trial, name, p_value
+    lag = own.trials[LAG_EFFECT]
+    of_all = spread_of_lags_s(alone) > 0 and best_name != LAG_EFFECT
+    if of_all and lag.fit.held_cost < (best or own.before).fit.held_cost - SETTINGS.tie:
+        return None
     if best is None:
         return _unexplained(own, alone)
     parameters = _estimates(best)

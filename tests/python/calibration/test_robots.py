@@ -231,6 +231,18 @@ def test_what_diagnose_prints_gives_each_robot_the_lag_that_its_score_needs(
     assert found.late.sum_std_s == pytest.approx(np.std(lags_s, ddof=1), rel=0.2)
 
 
+def test_no_fault_of_one_robot_is_told_where_all_differ_in_lag(tanh_robot, measure, one_clock_base):
+    """Of the most sluggish play had been told: the others' lags made its own no difference."""
+    lags_s = [0.06, 0.1, 0.15, 0.2]
+    runs = [measure(tanh_robot(lag_s=s), 360 + k, 40.0) for k, s in enumerate(lags_s)]
+    robots = [replace(m, track=replace(m.track, robot_id=k)) for k, m in enumerate(runs)]
+    found = diagnose(robots, one_clock_base)
+    assert not [r for r in found.robots_off if r.effect != "motor_lag"]
+    (lags,) = [n.values for n in found.apart.numbers if n.name == "base.motor_lag_s"]
+    own_s = [lags[f"R{k:02d}"] for k in range(4) if f"R{k:02d}" in lags]
+    assert own_s == pytest.approx(lags_s[: len(own_s)], abs=0.005)
+
+
 def test_a_robot_of_one_command_takes_the_clock_of_the_others(tanh_robot, measure, model_file):
     robot = tanh_robot(offset_s=0.06)
     lively = measure(robot, 1, 30.0)
