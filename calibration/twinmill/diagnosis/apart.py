@@ -19,6 +19,7 @@ from twinmill.fitting.compare import GOOD
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import OWN, Opened, with_own_of_runs
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.listing import listed
 from twinmill.model.parameters import (
     BASE_GAINS,
     GAINS,
@@ -90,7 +91,7 @@ class Apart:
     @property
     def sentence(self) -> str:
         """For people, before all else."""
-        differ = _listed([n.words for n in self.numbers])
+        differ = listed([n.words for n in self.numbers])
         return (
             f"{self.whose.capitalize()} differ in {differ}: one set of numbers for all leaves a "
             f"score of {self.score_alike:.2f}, numbers of its own for each {self.whose[:-1]} "
@@ -172,8 +173,8 @@ def middles(fit: ScoreFit, found: Apart) -> list[ParameterEstimate]:
             continue
         for name in SCALED.get(number.name, (LAG,)):
             (p,) = base_parameters(model, [name])
-            value = number.middle * (p.value if number.name != LAG else 1.0)
-            std = number.std * (p.value if number.name != LAG else 1.0)
+            times = 1.0 if number.name == LAG else p.value
+            value, std = number.middle * times, number.std * times
             told.append(ParameterEstimate(name, value, std, p.unit, False, True, words=p.words))
     return told
 
@@ -235,9 +236,3 @@ def _without_own(data: Trajectory) -> Trajectory:
     if not isinstance(data, Trajectory):
         return data
     return replace(data, own=tuple(p for p in data.own if p.name not in OWN), by_run=False)
-
-
-def _listed(words: Sequence[str]) -> str:
-    """`a`, `a and b`, or `a, b and c`."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last

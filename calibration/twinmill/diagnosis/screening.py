@@ -285,11 +285,10 @@ def likely_pairs(
     before: Trial, screened: list[Screened], settings: Settings
 ) -> list[tuple[str, str]]:
     """Pairs by what they explain together beyond the better one alone."""
-    fit = before.fit
     top = sorted(screened, key=lambda s: -s.gain)[:10]
     if before.held_score < 1.0 or before.state.of_cameras:
         return []
-    fit = _on_few(fit)
+    fit = _on_few(before.fit)
     left, *_ = fit.whitened(range(len(fit.datasets)))
     worth = {}
     for a, b in combinations(top, 2):

@@ -140,10 +140,10 @@ def lateness_of(whole: Search) -> Lateness | None:
     by_lag = left[:, left.min(axis=0).sum(axis=1).argmin()]
     path, shape = found
     logs = np.log(LAGS_S)
-    constant, *of_lags = _stepwise(by_lag, logs)
-    rival = _drift(by_lag, logs, 1.0) if path.straight else [constant, *of_lags][path.pieces - 1]
+    of_lags = _stepwise(by_lag, logs)
+    rival = _drift(by_lag, logs, 1.0) if path.straight else of_lags[path.pieces - 1]
     least = float(left.min(axis=(0, 1)).sum())  # by any shift and lag of each stretch
-    if path.left - least > CHECKS.step_leaves * (min(constant.left, rival.left) - least):
+    if path.left - least > CHECKS.step_leaves * (min(of_lags[0].left, rival.left) - least):
         return None
     return _in_time(path, shape, motion.t_s)
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 
+from twinmill.listing import listed
 from twinmill.swarm.matters.differences import Difference
 from twinmill.swarm.matters.sensitivity import (
     MATTERS,
@@ -138,8 +139,7 @@ def _list(result: Sequence[FactorResult]) -> str:
     shown = names[:NAMED]
     rest = len(names) - len(shown)
     more = [f"{rest} more"] if rest else []
-    parts = [*shown, *more]
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return listed([*shown, *more])
 
 
 def _capital(text: str) -> str:
