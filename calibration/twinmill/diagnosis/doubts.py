@@ -117,18 +117,19 @@ def instead_over_time(done: Search, name: str) -> list[str]:
     """Effects that do the same as one that changes with the time, or with the speed.
 
     A drive that goes through its speeds one after the other takes one for the other. Where
-    something is left beside the one that was found, its form may be wrong. So it is beside another
-    of the time that ended at its bound, and would do more with a larger size.
+    something is left beside the one that was found, its form may be wrong. Beside one of the time,
+    another of the time that ended at its bound would do more with a larger size: heat, while the
+    battery empties.
     """
-    bends = bends_speed(name)
-    if done.last.held_score < SETTINGS.level or not (bends or _is_slow(name)):
-        return []
-    same = _same(done, name)
-    slow, curves = [n for n in same if _is_slow(n)], [n for n in same if bends_speed(n)]
-    if bends:
-        return slow
+    if not _is_slow(name):
+        left = bends_speed(name) and done.last.held_score >= SETTINGS.level
+        return [n for n in _same(done, name) if _is_slow(n)] if left else []
     bounded = {t.names[0] for t in done.round_of(name).trials if _is_bounded(t)}
-    return [*curves, *(n for n in slow if n in bounded)]
+    larger = _same(done, name, SETTINGS.same_in_time, SETTINGS.same_at_bound)
+    timed = [n for n in larger if _is_slow(n) and n in bounded]
+    if done.last.held_score < SETTINGS.level:
+        return timed
+    return [*timed, *(n for n in _same(done, name) if bends_speed(n))]
 
 
 def instead_of_moment(done: Search, name: str) -> list[str]:
