@@ -9,6 +9,9 @@ import pysindy as ps
 from rivals.protocol import DOCUMENTED, TUNED, Answer, Problem, Rival, predicted_by
 from rivals.residual import CHANGE, HEADING, PLACE, SPEED, TIME, Steps, corrected, scale
 
+# Its own arrays of inputs, at each prediction.
+warnings.filterwarnings("ignore", message=".* axes labeled for array", module="pysindy")
+
 STEP_S = 0.1
 FOLDS = 5
 LIMITS = (0.02, 0.05, 0.1, 0.2, 0.3)  # of STLSQ, tried in turn
