@@ -220,6 +220,18 @@ def test_outside_counts_only_with_the_right_dependence():
     assert [r["outcome"]["depends"] for r in told] == [True, False]
 
 
+@pytest.mark.parametrize(
+    ("verdict", "right_word", "hits"),
+    [("outside_catalogue", True, 1), ("outside_catalogue", False, 0), ("model_adequate", True, 0)],
+)
+def test_a_cousin_may_be_outside_with_what_it_depends_on(verdict, right_word, hits):
+    """Its formula is none of the catalogue's, so that both are true of it."""
+    case = case_of("cousin")
+    word = case.hidden[0].depends_on[0] if right_word else "battery"
+    rows = summary([scored(case, found(rest=[word], verdict=verdict))])
+    assert rows["cousins"]["hits"] == hits
+
+
 def test_estimates_are_held_against_the_truth():
     case = next(c for c in DRAWN if c.kind == "one")
     name, value = next(iter(case.hidden[0].values.items()))

@@ -41,6 +41,33 @@ class Signals:
 
 Act = Callable[[np.ndarray, dict[str, float], Signals], np.ndarray]
 
+# Words of answers for what a motion depends on.
+HEADING = ("heading", "theta")
+PAST = ("past", "history", "change", "start", "stop", "transient", "accel")
+SPEED = ("speed", "command")
+TIME = ("time", "moment", "event")
+TURNS = ("coupling", "turn")
+WHERE = ("place", "position", "x", "y", "room", "floor")
+
+# What another form of an effect depends on, for one who does not know it by name.
+SHOWN_BY = {
+    "dead_zone": SPEED,
+    "speed_curve": SPEED,
+    "speed_slip": SPEED,
+    "battery_sag": TIME,
+    "heat_gain": TIME,
+    "abrupt_loss": TIME,
+    "transient_loss": TIME,
+    "motor_lag": PAST,
+    "input_delay": PAST,
+    "wheel_gain": TURNS,
+    "lateral_slip": TURNS,
+    "yaw_lever": TURNS,
+    "floor_patch": WHERE,
+    "carpet_grain": HEADING,
+    "compass_deviation": HEADING,
+}
+
 
 @dataclass(frozen=True)
 class Hidden:
@@ -53,7 +80,7 @@ class Hidden:
         values: its numbers; those of a plain form have the catalogue's names and meaning.
         grows: names of the values that are scaled for a wanted size.
         most: how many times.
-        depends_on: words for what an outsider depends on.
+        depends_on: words for what an outsider or a cousin depends on.
         kin: names of effects that are no mistake for it.
     """
 
@@ -467,7 +494,7 @@ def catalogue_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
     off = {"cos_rad": 0.03 * sign(), "sin_rad": 0.03 * sign()}
     form("compass_deviation", "plain", "observe", _hard_iron, **off)
     form("compass_deviation", "cousin", "observe", _iron_of_both_kinds, size_rad=0.04)
-    return found
+    return [replace(h, depends_on=SHOWN_BY[h.name]) if h.kind == "cousin" else h for h in found]
 
 
 def _by_wheel(robot: Robot, drawn: np.ndarray) -> np.ndarray:
@@ -538,12 +565,10 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
             values=compass,
             grows=("size_rad",),
             most=5,
-            depends_on=("heading", "theta"),
+            depends_on=HEADING,
         )
     ]
     if robot.drive != "wheel_speed":
-        time = ("time", "moment", "event")
-        past = ("past", "history", "change", "start", "stop", "transient", "accel")
         several = {"moment": moment, "loss": 0.05, "every_s": float(random.uniform(20.0, 36.0))}
         drops = {"per_s": 0.12}
         swing = {"share": 0.4, "hz": hz}
@@ -556,7 +581,7 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
                 values=several,
                 grows=("loss",),
                 most=5,
-                depends_on=time,
+                depends_on=TIME,
             ),
             Hidden(
                 name="drop-outs",
@@ -566,7 +591,7 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
                 values=drops,
                 grows=(),
                 most=1,
-                depends_on=time,
+                depends_on=TIME,
             ),
         ]
         if robot.plant == "planar":
@@ -579,13 +604,11 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
                     values=swing,
                     grows=("share",),
                     most=2,
-                    depends_on=past,
+                    depends_on=PAST,
                 )
             )
     if robot.plant == "planar":
         turn, tiles = {"share": 0.08}, {"share": 0.1, "length_m": float(random.uniform(0.5, 0.9))}
-        where = ("place", "position", "x", "y", "room", "floor")
-        heading = ("heading", "theta")
         found += [
             Hidden(
                 name="turn by heading",
@@ -595,7 +618,7 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
                 values=turn,
                 grows=("share",),
                 most=5,
-                depends_on=heading,
+                depends_on=HEADING,
             ),
             Hidden(
                 name="tiles",
@@ -605,7 +628,7 @@ def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
                 values=tiles,
                 grows=("share",),
                 most=5,
-                depends_on=where,
+                depends_on=WHERE,
             ),
         ]
     return found

@@ -39,6 +39,7 @@ BARS = (
     Bar("named", "and the verdict right as well", 0.95, True),
     Bar("verdict_right", "and beyond doubt", 0.95, True),
     Bar("clean", "and no other name", 0.95, True),
+    Bar("cousins", "its physics in another form: named, or outside by what it does", 0.90, True),
     Bar("rollers_first", "rollers: right first", 0.90, True),
     Bar("false_alarm", "nothing hidden: false alarms", 0.03, False),
     Bar("both_of_two", "both of two", 0.85, True),
@@ -157,6 +158,7 @@ def summary(results: list[dict]) -> dict:
         "named": share("named", single),
         "verdict_right": share("verdict_right", single),
         "clean": share("clean", single),
+        "cousins": rate([_is_known(r) for r in of("cousin")]),
         "rollers_first": share("first", rollers),
         "false_alarm": share("alarm", of("none")),
         "both_of_two": share("all", of("two")),
@@ -171,6 +173,13 @@ def summary(results: list[dict]) -> dict:
         ],
         "lost": [r for r in results if lost(r)],
     }
+
+
+def _is_known(result: dict) -> bool:
+    """Whether another form was named, or said to be outside with what it depends on."""
+    outcome = result["outcome"]
+    outside = result["verdict"] == "outside_catalogue" and outcome["depends"]
+    return outcome["named"] or (outside and not outcome["wrong_and_sure"])
 
 
 def lost(result: dict) -> bool:
