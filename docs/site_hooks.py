@@ -84,6 +84,8 @@ def page_of_effects() -> str:
 
 
 def _card(card: dict) -> str:
+    from twinmill.report.show import robots
+
     rows = [
         f"| `{p['name']}` | {'' if p['unit'] == '1' else p['unit']} | {p['default']:g} | "
         f"{p['min']:g} to {p['max']:g} | {p['neutral']:g} | {p['doc']} |"
@@ -97,6 +99,7 @@ def _card(card: dict) -> str:
             f"```equation\n{card['equation']}\n```\n",
             *([*table, ""] if rows else []),
             f"- Stage: `{card['stage']}`",
+            f"- For robots {robots(card)}",
             f"- Leaves out: {card['leaves_out']}",
             f"- What to measure: {card['measure']}",
             f"- Source: {card['reference']}\n",

@@ -110,9 +110,7 @@ def effect(entry: dict) -> RenderableType:
     labels = ("equation", "stage", "leaves out", "measure by", "reference")
     keys = ("equation", "stage", "leaves_out", "measure", "reference")
     facts = [(label, entry[key]) for label, key in zip(labels, keys, strict=True)]
-    *others, last = entry["drives"]
-    told = f"that are told {' or '.join([', '.join(others), last] if others else [last])}"
-    lines = _facts([*facts[:2], ("robots", told), *facts[2:]])
+    lines = _facts([*facts[:2], ("robots", robots(entry)), *facts[2:]])
     return Group(
         Text.assemble((entry["name"], "bold"), f": {entry['summary']}"),
         Text(),
@@ -120,6 +118,12 @@ def effect(entry: dict) -> RenderableType:
         Text(),
         table(tables.effect_parameters(entry)),
     )
+
+
+def robots(entry: dict) -> str:
+    """Of which robots an effect is."""
+    *others, last = entry["drives"]
+    return f"that are told {' or '.join([', '.join(others), last] if others else [last])}"
 
 
 def table(data: Table) -> RenderableType:

@@ -13,7 +13,9 @@ constexpr Card kCard = {
     .name = "backlash",
     .drives = kAnyDrive,
     .summary = "Gears have play: a motor that turns round takes it up before its wheel moves.",
-    .equation = "g' = w within 0 <= g <= gap; the wheel rests while g changes, else follows w",
+    .equation =
+        "g' = w within 0 <= g <= gap, g where in the play the motor is, w the motor's speed at the "
+        "wheel's axle; the wheel rests while g changes, else follows w; g = 0 at the start",
     .leaves_out =
         "a wheel that rolls on by itself in the play, and a push of the body that closes it",
     .measure = "changes from forward to back and the same with a pause between, at several speeds",

@@ -27,8 +27,8 @@ constexpr Card kCard = {
 
 constexpr ParameterSpec kParameters[] = {
     {"deceleration_mps2", "m/s^2", 20, 0.7, 0.05, 20,
-     "deceleration of a wheel's rim while its duty is zero", "stops at once",
-     "rolls on after a stop", 0, Role::kLimit},
+     "deceleration of a wheel's rim while its duty is zero; 20: as without coasting",
+     "stops at once", "rolls on after a stop", 0, Role::kLimit},
     {"viscous_per_s", "1/s", 0, 0.5, 0, 20, "what speed adds to the deceleration",
      "rolls on less from high speeds", "rolls on more from high speeds"},
 };

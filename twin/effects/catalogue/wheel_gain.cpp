@@ -11,7 +11,7 @@ constexpr Card kCard = {
     .drives = kAnyDrive,
     .summary = "Wheels differ in speed at the same duty.",
     .equation = "v_k' = v_k (1 + gain_k)",
-    .leaves_out = "dependence on speed and direction; the mean of the four is the base gain",
+    .leaves_out = "dependence on speed and direction; the mean of all wheels is the base gain",
     .measure = "straight drives forward and sideways, turns on the spot",
     .reference =
         "Borenstein and Feng 1996, Measurement and correction of systematic odometry errors in mobile robots",
