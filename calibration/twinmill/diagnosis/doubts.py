@@ -132,6 +132,20 @@ def instead_over_time(done: Search, name: str) -> list[str]:
     return [*timed, *(n for n in _same(done, name) if bends_speed(n))]
 
 
+def instead_in_family(done: Search, name: str) -> list[str]:
+    """Effects of its family that do the same as one.
+
+    They matter where something is left: a form that is not quite right leaves it, and theirs is as
+    near.
+    """
+    if name == REFIT or done.last.held_score < SETTINGS.level:
+        return []
+    family = catalogue()[name]["family"]
+    return [
+        n for n in _same(done, name) if n not in done.found and catalogue()[n]["family"] == family
+    ]
+
+
 def instead_of_moment(done: Search, name: str) -> list[str]:
     """Effects that do the same as one of a moment.
 

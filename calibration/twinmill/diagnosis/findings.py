@@ -11,6 +11,7 @@ import twinmill_native as native
 from twinmill.diagnosis.constancy import Change, OneHeading, changes_of
 from twinmill.diagnosis.doubts import (
     beside_larger,
+    instead_in_family,
     instead_of_moment,
     instead_over_time,
     of_one,
@@ -75,10 +76,12 @@ def findings_of(
             chain = chains.of(names)
     names, chain = _falling(names, chain, chains.of)
     shares = _takes(names, chain)
-    changes = changes_of(done.last)
+    changes, left = changes_of(done.last), 1 - sum(shares.values())
     found = []
     for k, name in enumerate(names):
-        finding = _finding(done, name, less=less.get(name), share=shares[name], changes=changes)
+        finding = _finding(
+            done, name, less=less.get(name), share=shares[name], left=left, changes=changes
+        )
         if again := comes_again(done, name):
             why = f"it comes more than once: from {again[0]:.0f} to {again[1]:.0f} s, too"
             finding = doubted(finding, why, wrong_form=True, depends_on=TIME)
@@ -341,6 +344,7 @@ def _finding(
     *,
     less: Trial | None,
     share: float,
+    left: float,
     changes: Mapping[str, Change | OneHeading],
 ) -> Finding:
     own = estimates_of(done.last, name)
@@ -354,6 +358,7 @@ def _finding(
     instead = seen_once(done, name, less)
     tied = [n for t in _rivals(done, name) for n in t.names]
     tied += [*(instead or ()), *instead_of_moment(done, name), *instead_over_time(done, name)]
+    tied += instead_in_family(done, name) if left > SETTINGS.nothing_left else []
     tied = list(dict.fromkeys(tied))[: done.settings.group - 1]
     group = (name, *tied) if tied else None
     doubt = of_one(done, name, own, changes.get(instance))

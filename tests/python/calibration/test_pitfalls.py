@@ -19,6 +19,7 @@ from twinmill.diagnosis.doubts import (
     acted_on,
     beside_more,
     beside_stale,
+    instead_in_family,
     instead_over_time,
     of_another_form,
     of_many,
@@ -1327,6 +1328,31 @@ def test_what_goes_with_the_time_stands_beside_what_does_the_same(
     this = SimpleNamespace(before=trial("", 1.94), accepted=taken, trials=[taken, beside])
     done = SimpleNamespace(last=taken, round_of=lambda _: this)
     assert instead_over_time(done, one) == ([other] if found else [])
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "score", "found"),
+    [
+        ("acceleration_limit", "yaw_lag", 1.06, True),  # a turn that comes with the way
+        ("acceleration_limit", "yaw_lag", 1.0, False),
+        ("acceleration_limit", "compass_deviation", 1.06, False),
+    ],
+)
+def test_a_form_that_leaves_something_is_not_surely_the_one_of_its_family(
+    one, other, score, found, monkeypatch
+):
+    """Turns that build up over the way driven had been turn rates that are ramped, surely."""
+    monkeypatch.setattr(doubts, "estimates_of", lambda one, _: one.own)
+    monkeypatch.setattr(doubts, "in_common", lambda *_: 0.9)
+    trials = [
+        SimpleNamespace(names=(n,), held_score=s, own=[])
+        for n, s in ((one, score), (other, 1.02 * score))
+    ]
+    this = SimpleNamespace(
+        before=SimpleNamespace(held_score=1.49), accepted=trials[0], trials=trials
+    )
+    done = SimpleNamespace(last=trials[0], found=[one], round_of=lambda _: this)
+    assert instead_in_family(done, one) == ([other] if found else [])
 
 
 def test_a_stretch_in_which_the_model_is_right_is_not_told():
