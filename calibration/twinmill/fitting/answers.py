@@ -7,6 +7,8 @@ that is fitted to where predictions end is better than any physics can be (Ljung
 13.4). The noise floor is too low then.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from twinmill.chance import t_quantile
@@ -15,15 +17,24 @@ from twinmill.predict.windows import HORIZONS_S
 
 EARLY, LATE = HORIZONS_S.index(1.0), HORIZONS_S.index(2.0)
 FEWEST = 4  # blocks
-LEAST = 0.2  # early error for each metre or radian that late commands add
-CHANCE = 0.005  # of so large a slope where commands tell of no error
+LEAST, LEAST_OF_TWO = 0.2, 0.1  # early error for each metre or radian that late commands add
+CHANCE = 0.005  # of so large a slope in any channel where commands tell of no error
+CHANCE_OF_TWO = 0.01  # the same of the mean t of two channels, as if they were one
+
+
+class Slope(NamedTuple):
+    """Of early errors over what late commands add; in standard errors; by how many blocks."""
+
+    value: float
+    t: float
+    blocks: int
 
 
 def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bool:
     """Whether what late commands make a response add goes with errors from before them.
 
-    By least squares beside what early commands add, in any channel; standard errors by leaving out
-    a stretch at a time.
+    By least squares beside what early commands add; much in one channel, or some in two: a heading
+    that strays moves the place as well.
 
     Args:
         errors: (W, H, 3) of a physical model's predictions.
@@ -33,24 +44,25 @@ def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bo
     added = errors - left
     late = added[:, LATE] - added[:, EARLY]
     block = np.floor((start_s - start_s[0]) / BLOCK_S).astype(int)
-    return any(
-        _goes_with(left[:, EARLY, c], added[:, EARLY, c], late[:, c], block) for c in range(3)
-    )
+    slopes = [_slope(left[:, EARLY, c], added[:, EARLY, c], late[:, c], block) for c in range(3)]
+    one = (s.value > LEAST and s.t > t_quantile(1 - CHANCE / 3, s.blocks - 1) for s in slopes)
+    some = sorted((s for s in slopes if s.value > LEAST_OF_TWO), key=lambda s: s.t)[-2:]
+    limit = t_quantile(1 - CHANCE_OF_TWO, min((s.blocks for s in some), default=FEWEST) - 1)
+    return any(one) or (len(some) == 2 and np.mean([s.t for s in some]) > limit)
 
 
-def _goes_with(y: np.ndarray, beside: np.ndarray, late: np.ndarray, block: np.ndarray) -> bool:
+def _slope(y: np.ndarray, beside: np.ndarray, late: np.ndarray, block: np.ndarray) -> Slope:
+    """Its standard error is by leaving out a block at a time; 0 where it cannot be told."""
     rows = np.column_stack([beside, late, y])
     seen = np.isfinite(rows).all(axis=1)
-    if not seen.any():
-        return False
     rows, (_, own) = rows[seen], np.unique(block[seen], return_inverse=True)
-    grams = np.zeros((own.max() + 1, 3, 3))
+    grams = np.zeros((own.max(initial=0) + 1, 3, 3))
     np.add.at(grams, own, rows[:, :, None] * rows[:, None, :])
     whole = grams.sum(axis=0)
     if len(grams) < FEWEST or np.linalg.matrix_rank(whole[:2, :2], hermitian=True) < 2:
-        return False
+        return Slope(0.0, 0.0, FEWEST)
     without = whole - grams
     slopes = np.linalg.solve(without[:, :2, :2], without[:, :2, 2:])[:, 1, 0]
     slope = np.linalg.solve(whole[:2, :2], whole[:2, 2])[1]
     std = np.sqrt((len(slopes) - 1) * np.var(slopes))
-    return bool(slope > max(LEAST, t_quantile(1 - CHANCE, len(slopes) - 1) * std))
+    return Slope(float(slope), float(slope / std), len(slopes))
