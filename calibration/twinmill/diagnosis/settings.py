@@ -123,7 +123,7 @@ class Settings(Numbers):
     formula_back: float = number(
         0.25, "share of the usual speed at which a formula of that speed may drive back"
     )
-    answered: float = number(1.5, "score up to which answers of a controller may be all")
+    answered: float = number(1.7, "score up to which answers of a controller may be all")
     no_noise: float = number(
         1.5, "errors of so many times the noise are none, however few there are"
     )
