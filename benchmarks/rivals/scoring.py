@@ -61,28 +61,13 @@ def judged(case: Case, answer: Answer, logs: Mapping[str, Unseen]) -> dict:
         "told": outcome["alarm"],
         "first": outcome["first"],
         "depends": outcome["told"] and outcome["depends"],
-        "wrong": wrong(case, result["said"]),
+        "wrong": outcome["wrong_and_sure"],
         **errors,
     }
 
 
-def wrong(case: Case, said: list[list[str]]) -> bool:
-    """Whether a name that stands alone is neither hidden nor of the same kin.
-
-    Args:
-        case: with its answer.
-        said: findings, each the names that it cannot be parted from.
-    """
-    findings = [
-        {"effect": names[0], "group": names, "certainty": "sure" if len(names) == 1 else "group"}
-        for names in said
-    ]
-    found = {"verdict": "effect_missing", "findings": findings}
-    return scored(case, found)["outcome"]["wrong_and_sure"]
-
-
 def _said(answer: Answer) -> dict:
-    """An answer as `twinmill diagnose --json` would print it."""
+    """An answer as `twinmill diagnose --json` would print it; who has no doubts is sure."""
     verdict = "effect_missing" if answer.names else "outside_catalogue"
     return {
         "verdict": verdict if answer.told else "model_adequate",
