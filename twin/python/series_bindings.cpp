@@ -245,6 +245,62 @@ Array DisplacedBy(Matrix values, Matrix velocity, int axis, Vector step_s, Vecto
     return ToNumpy(std::move(displaced), {starts.size(), ends.shape(1), 3, values.shape(1)});
 }
 
+// A signal (G, C) at a place between two of its rows; beyond its ends it goes on as it is there.
+class Read
+{
+public:
+    explicit Read(Matrix signal) : signal_(signal), width_(signal.shape(1)) {}
+
+    // Calls visit(c, value) for each column.
+    template <class Visit>
+    void At(double place, Visit visit) const
+    {
+        const double within = std::clamp(place, 0.0, static_cast<double>(signal_.shape(0)) - 1.001);
+        const auto row = static_cast<size_t>(within);
+        const double part = within - static_cast<double>(row);
+        const double *from = signal_.data() + row * width_;
+        for (size_t c = 0; c < width_; ++c)
+            visit(c, from[c] * (1 - part) + from[width_ + c] * part);
+    }
+
+private:
+    Matrix signal_;
+    size_t width_;
+};
+
+// (2, S, B, C) sums over stretches, which begin at rows `begins` of places (K,), of a signal's
+// columns that are read `shifts` (S,) before these: of their squares, and of their products with
+// the columns of `beside` (K, W), over and over.
+Array SumsByShift(Matrix signal, Vector places, Vector shifts, Matrix beside, Indices begins)
+{
+    const size_t count = places.size(), width = signal.shape(1), across = beside.shape(1);
+    const size_t stretches = begins.size();
+    if (signal.shape(0) < 2 || beside.shape(0) != count || across == 0)
+        throw std::invalid_argument(
+            "the signal must have two rows or more, and as many rows stand beside it as places");
+    const auto begin = [&](size_t b) {
+        return b < stretches ? static_cast<size_t>(begins.data()[b]) : count;
+    };
+    for (size_t b = 0; b < stretches; ++b)
+        if (begin(b) > begin(b + 1) || begin(b) > count)
+            throw std::invalid_argument("stretches must begin one after the other, at places");
+    const Read read(signal);
+    const size_t size = shifts.size() * stretches * width;
+    std::vector<double> sums(2 * size);
+    double *square = sums.data(), *product = square + size;
+    for (size_t s = 0; s < shifts.size(); ++s)
+        for (size_t b = 0; b < stretches; ++b, square += width, product += width)
+            for (size_t k = begin(b); k < begin(b + 1); ++k)
+            {
+                const double *other = beside.data() + k * across;
+                read.At(places.data()[k] - shifts.data()[s], [&](size_t c, double value) {
+                    square[c] += value * value;
+                    product[c] += value * other[c % across];
+                });
+            }
+    return ToNumpy(std::move(sums), {2, shifts.size(), stretches, width});
+}
+
 Array Filtered(Vector numerator, Vector denominator, Matrix signal)
 {
     const size_t count = signal.shape(0), width = signal.shape(1);
@@ -342,6 +398,11 @@ void BindSeries(nb::module_ &m)
           "(N,) values of which changes below a least one are not taken, from 0.");
     m.def("wound", &Wound, "way"_a, "most"_a,
           "(N,) how far something is wound up by steps of way, -1 to 1: by `most` it is wholly.");
+    m.def(
+        "sums_by_shift", &SumsByShift, "signal"_a, "places"_a, "shifts"_a, "beside"_a, "begins"_a,
+        "(2, S, B, C) sums over stretches of places (K,), which begin at `begins` (B,), of what a "
+        "signal (G, C) is at places less `shifts` (S,): of its squares, and of its products with "
+        "the columns `beside` (K, W), over and over.");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
           "push.");

@@ -129,6 +129,22 @@ def test_velocities_lead_along_a_direction_as_far_as_the_steps_add_up_to(drive):
     )
 
 
+def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
+    random = np.random.default_rng(4)
+    values, beside = random.normal(size=(40, 6)), random.normal(size=(25, 3))
+    places = np.sort(random.uniform(2, 37, 25))
+    shifts, begins = np.array([0.0, 1.3, -2.0]), np.array([0, 10, 10, 17])
+    power, along = native.sums_by_shift(values, places, shifts, beside, begins)
+    for s, shift in enumerate(shifts):
+        read = np.column_stack([np.interp(places - shift, np.arange(40), v) for v in values.T])
+        products = read * np.tile(beside, 2)
+        for b, (first, end) in enumerate(((0, 10), (10, 10), (10, 17), (17, 25))):
+            assert power[s, b] == pytest.approx((read[first:end] ** 2).sum(axis=0), abs=1e-12)
+            assert along[s, b] == pytest.approx(products[first:end].sum(axis=0), abs=1e-12)
+    with pytest.raises(ValueError, match="one after the other"):
+        native.sums_by_shift(values, places, shifts, beside, np.array([0, 30]))
+
+
 def test_sums_refuse_rows_that_are_not_there():
     with pytest.raises(ValueError, match="rows of values"):
         native.led_between(

@@ -11,9 +11,11 @@ from functools import cached_property
 from itertools import permutations, product
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.data.checks.motion import (
     EARLY_S,
+    GRID_S,
     LAGS_S,
     LATE_S,
     STEP_S,
@@ -208,13 +210,6 @@ class Search:
             for signs, of_signs in zip(POSE_SIGNS, explained, strict=True)
         }
 
-    def _explained(self, gram: np.ndarray, moment: np.ndarray) -> float:
-        """Of the motion's square by the columns as they are, from (4, 4) and (4, 3) sums."""
-        weighted = self._weighted(self.wheels)
-        along = np.maximum(np.einsum("ci,ic->c", weighted, moment), 0)
-        power = np.einsum("ci,ij,cj->c", weighted, gram, weighted)
-        return float(np.sum(along**2 / np.maximum(power, 1e-12)))
-
     def own(self) -> Explained:
         """The columns as they are, at the lag and the shift where they explain most of all."""
         found: list[Explained] = []
@@ -248,13 +243,25 @@ class Search:
         return self._sums_by_shift[lag_s]
 
     def _summed_by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        speeds = self._speeds(self.motion.body_mps(), 1)
-        begin_s, shapes = self.felt[lag_s]
-        told = begin_s, shapes @ self._weighted(self.wheels).T
-        rows = [self.motion.at(told, late_s) for late_s in self.lates_s]
-        power = np.stack([self._sums(r**2) for r in rows])
-        along = np.stack([self._sums(r * speeds[:, None]) for r in rows])
-        return power, along, self._sums(np.sum(speeds**2, axis=1))
+        return *self._summed(lag_s, self.lates_s), self._total
+
+    def _summed(self, lag_s: float, lates_s: np.ndarray, rate: float = 0.0) -> np.ndarray:
+        """(2, S, B, SHAPES, 3) the same at other shifts, and at a rate of the clocks."""
+        motion, (begin_s, shapes) = self.motion, self.felt[lag_s]
+        told = shapes @ self._weighted(self.wheels).T
+        sums = native.sums_by_shift(
+            told.reshape(len(told), -1),
+            motion.places(begin_s, rate=rate),
+            lates_s / GRID_S,
+            self._speeds(motion.body_mps(), 1),
+            self.starts,
+        )
+        return sums.reshape(*sums.shape[:3], *told.shape[1:])
+
+    @cached_property
+    def _total(self) -> np.ndarray:
+        """(B,) measured squares, summed over stretches."""
+        return self._sums(np.sum(self._speeds(self.motion.body_mps(), 1) ** 2, axis=1))
 
     def beside(self, own: Explained) -> tuple[np.ndarray, np.ndarray]:
         """(K, 3) measured and (K, SHAPES, 3) told velocities, of the columns as they are."""
@@ -328,21 +335,13 @@ class Search:
             rate: of the clocks.
             near_s: shifts about that one, which are tried.
         """
-        body = self.motion.body_mps()
-        speeds = self._speeds(body, 1)
-        total = self._sums(np.sum(speeds**2, axis=1))
         middle_s = rate * float(np.ptp(self.motion.t_s)) / 2
-        begin_s, shapes = self.felt[own.lag_s]
-
-        def explained(late_s: float) -> float:
-            rows = self.motion.at((begin_s, shapes[:, 1]), late_s, rate)
-            return self._explained(rows.T @ rows, rows.T @ speeds)
-
-        late_s = max(own.late_s - middle_s + near_s, key=explained)
-        rows = self.motion.at(self.felt[own.lag_s], late_s, rate)
-        left, gain = self._left(
-            self.wheels[None], self._by_block(rows, rows), self._by_block(rows, speeds), total
-        )
+        lates_s = own.late_s - middle_s + near_s
+        power, along = self._summed(own.lag_s, lates_s, rate)
+        linear_p, linear_m = power[:, :, 1].sum(axis=1), along[:, :, 1].sum(axis=1)
+        explained = np.maximum(linear_m, 0) ** 2 / np.maximum(linear_p, 1e-12)
+        k = [int(explained.sum(axis=1).argmax())]
+        left, gain = self._judged(power[k], along[k], self._total)
         return Explained(
             alternative=OWN,
             left=float(left.sum()),
@@ -350,7 +349,7 @@ class Search:
             turned_rad=0.0,
             gain=gain[0],
             lag_s=own.lag_s,
-            late_s=float(late_s),
+            late_s=float(lates_s[k[0]]),
         )
 
     def _best_of(

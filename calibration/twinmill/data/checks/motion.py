@@ -110,14 +110,17 @@ class Motion:
         weight /= weight.sum()
         return float(self.grid_s[0]), _averaged(lagged, weight)
 
-    def at(self, felt: Felt, late_s: float, rate: float = 0.0) -> np.ndarray:
-        """(K, ...) of what was felt `late_s` before each pose; `rate` of the clocks."""
+    def at(self, felt: Felt, late_s: float) -> np.ndarray:
+        """(K, ...) of what was felt `late_s` before each pose."""
         begin_s, felt = felt
-        place = (self.t_s - late_s - rate * (self.t_s - self.t_s[0]) - begin_s) / GRID_S
-        place = np.clip(place, 0, len(felt) - 1.001)
+        place = np.clip(self.places(begin_s) - late_s / GRID_S, 0, len(felt) - 1.001)
         k = place.astype(int)
         part = (place - k).reshape(-1, *[1] * (felt.ndim - 1))
         return felt[k] * (1 - part) + felt[k + 1] * part
+
+    def places(self, begin_s: float, rate: float = 0.0) -> np.ndarray:
+        """(K,) steps from the begin of a grid to each pose; `rate` of the clocks, s/s."""
+        return (self.t_s - rate * (self.t_s - self.t_s[0]) - begin_s) / GRID_S
 
 
 def _averaged(signal: np.ndarray, weight: np.ndarray) -> np.ndarray:
