@@ -143,6 +143,7 @@ class Response:
         self.base_mps = base_mps[self.points]
         self.features, self.groups = self._features(self.base_mps)
         self._index_windows()
+        self.coefficients: list[Coefficients | None] = [None, None]
         self._fit(rms(data.measured), [None, None])
         self._fit(self.errors, self.ridges)
         self.unboosted = self.across
@@ -395,19 +396,22 @@ class Response:
 
     # -- regression -----------------------------------------------------------------------------
 
-    def _fit(self, scale: np.ndarray, ridges: list[np.ndarray | None]) -> None:
+    def _fit(
+        self, scale: np.ndarray, ridges: list[np.ndarray | None], parts: Sequence[int] = (0, 1)
+    ) -> None:
         """Coefficients with the errors (H, 3) of another fit as weights.
 
-        They are of the plane and of turning, None where nothing tells them.
+        They are of the plane and of turning, None where nothing tells them. Those of a part that is
+        not fitted stay.
         """
         first = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
         self.ridges = [first if ridge is None else ridge for ridge in ridges]
-        self.coefficients: list[Coefficients | None] = [None, None]
-        for part, axes in enumerate(AXES):
+        self.coefficients = [None if k in parts else c for k, c in enumerate(self.coefficients)]
+        for part in parts:
             rows = self._rows(part, scale, self.data.measured)
             if rows is not None:
                 equations = Equations.of(self._led(part, rows, [self.features]), rows)
-                groups = np.concatenate([self.groups[axis] for axis in axes])
+                groups = np.concatenate([self.groups[axis] for axis in AXES[part]])
                 self.ridges[part], *found = _ridge(equations, groups, self.ridges[part])
                 self.coefficients[part] = found
         self._judge()
@@ -498,14 +502,21 @@ class Response:
         return chosen
 
     def _fit_with(self, chosen: Sequence["Chosen"], scale: np.ndarray) -> None:
-        """Fits the features so far and chosen groups together, each group at its own ridge."""
-        axes, first = range(3), len(self.ridges[0])
-        added = [[c.features[axis] for c in chosen] for axis in axes]
-        numbers = [[np.full(f.shape[1], first + k) for k, f in enumerate(own)] for own in added]
-        self.features = [np.hstack([self.features[axis], *added[axis]]) for axis in axes]
-        self.groups = [np.concatenate([self.groups[axis], *numbers[axis]]) for axis in axes]
-        fresh = [c.ridge for c in chosen]
-        self._fit(scale, [np.concatenate([own, fresh]) for own in self.ridges])
+        """Fits the features so far and chosen groups together, each group at its own ridge.
+
+        A part of the motion that no group was chosen for is not fitted anew: it would gain other
+        weights alone.
+        """
+        first = len(self.ridges[0])
+        self.features, self.groups = list(self.features), list(self.groups)
+        for axis in {axis for c in chosen for axis in c.axes}:
+            added = [c.features[axis] for c in chosen]
+            numbers = [np.full(f.shape[1], first + k) for k, f in enumerate(added)]
+            self.features[axis] = np.hstack([self.features[axis], *added])
+            self.groups[axis] = np.concatenate([self.groups[axis], *numbers])
+        ridges = [np.concatenate([own, [c.ridge for c in chosen]]) for own in self.ridges]
+        parts = [k for k, axes in enumerate(AXES) if any(c.axes == axes for c in chosen)]
+        self._fit(scale, ridges, parts)
 
     def _left(self, scale: np.ndarray) -> np.ndarray:
         """(W, H, 3) what the features so far, fitted to other blocks, leave of the rows.
