@@ -26,7 +26,6 @@ from twinmill.predict.windows import HORIZONS_S
 HORIZON = HORIZONS_S.index(0.5)
 LENGTHS_M = (0.1, 0.2, 0.4)  # of the kernel
 ACROSS = ([0, 1], [0], [1])  # axes of the room: spots, and strips that run right through it
-WAY, TURNING = 0, 1
 LEAST_WAY_M = 0.01  # a robot that stands tells nothing of its place
 FLIPS = 999
 STRETCH_S = 2.0  # of one random sign, and least time between two moments
@@ -45,28 +44,27 @@ def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> flo
         0 where it could be chance, or is little.
     """
     of_model = [own.data.errors(model) for own, model in zip(opened, models, strict=True)]
-    of_response = [own.floor.response.unboosted for own in opened]
-    found = [0.0]
-    for of in (WAY, TURNING):
-        chance, share = _repeats(opened, of_model, of)
+    found, floor = [0.0], None
+    for of, (chance, share) in enumerate(_repeats(opened, of_model)):
         if chance < SETTINGS.place_chance and share > SETTINGS.place_share:
-            chance, _ = _repeats(opened, of_response, of)
+            floor = floor or _repeats(opened, [own.floor.response.unboosted for own in opened])
+            chance, _ = floor[of]
             found.append(share if chance < SETTINGS.place_chance_of_floor else 0.0)
     return max(found)
 
 
-def _repeats(
-    opened: Sequence[Opened], errors: Sequence[np.ndarray], of: int
-) -> tuple[float, float]:
+def _repeats(opened: Sequence[Opened], errors: Sequence[np.ndarray]) -> list[tuple[float, float]]:
     """Chance of so large a form under random signs of stretches, and the share that repeats.
 
     Args:
         opened: logs over their floors.
         errors: (W, H, 3) of each.
-        of: WAY or TURNING.
+
+    Returns:
+        Of errors along the way, and of turning.
     """
-    kernels = list(product(LENGTHS_M, ACROSS))
-    total = np.zeros((len(kernels), 1 + FLIPS))
+    kernels = list(product(range(len(LENGTHS_M)), ACROSS))
+    total = np.zeros((2, len(kernels), 1 + FLIPS))
     weight = np.zeros(len(kernels))
     random = np.random.default_rng(1)
     for own, each in zip(opened, errors, strict=True):
@@ -74,11 +72,21 @@ def _repeats(
         if len(ways.block):
             stretches = ways.stretch.max() + 1
             flips = random.choice([-1.0, 1.0], (FLIPS, stretches))
-            signs = np.vstack([np.ones(stretches), flips])
-            for k, (length_m, axes) in enumerate(kernels):
-                pairs, full = _products(ways, ways.errors[of], length_m, axes)
-                total[k] += np.sum(signs @ pairs * signs, axis=1)
+            signs = np.vstack([np.ones(stretches), flips]).astype(np.float32)
+            for k, (length, axes) in enumerate(kernels):
+                pairs, full = _products(ways, np.prod(ways.near[length, axes], axis=0))
+                total[:, k] += np.sum(signs @ pairs * signs, axis=-1)
                 weight[k] += full
+    return [_standing_out(of, weight) for of in total]
+
+
+def _standing_out(total: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
+    """Chance and share of the kernel that stands out most.
+
+    Args:
+        total: (K, 1 + FLIPS) sums of K kernels, and under random signs.
+        weight: (K,) the sum of each if all errors were of places.
+    """
     spread = total[:, 1:].std(axis=1, keepdims=True)
     if not spread.all():
         return 1.0, 0.0
@@ -110,6 +118,13 @@ class _Ways:
         """(n, n) bool: of pairs that count."""
         apart_s = np.abs(self.t_s[:, None] - self.t_s)
         return (apart_s > STRETCH_S) & (self.block[:, None] != self.block)
+
+    @cached_property
+    def near(self) -> np.ndarray:
+        """(L, 2, n, n) how near each other places are along each axis of the room, by LENGTHS_M."""
+        apart_m = (self.middle_m[:, None] - self.middle_m).transpose(2, 0, 1).astype(np.float32)
+        lengths_m = np.array(LENGTHS_M, np.float32)[:, None, None, None]
+        return np.exp(-((apart_m / lengths_m) ** 2) / 2)
 
     @staticmethod
     def of(own: Opened, errors: np.ndarray) -> "_Ways":
@@ -147,18 +162,18 @@ def _without_common(error: np.ndarray, length_m: np.ndarray, block: np.ndarray) 
     return error - (moment / np.maximum(energy, 1e-12))[block] * length_m
 
 
-def _products(
-    ways: _Ways, error: np.ndarray, length_m: float, axes: list[int]
-) -> tuple[np.ndarray, float]:
-    """(S, S) of sums over the pairs of two stretches, and the sum if all errors were of places.
+def _products(ways: _Ways, near: np.ndarray) -> tuple[np.ndarray, float]:
+    """(2, S, S) of sums over the pairs of two stretches, and the sum if all errors were of places.
 
-    Places are near each other by these axes of the room, whatever the others are. Pairs of one
-    block, or less than a stretch apart, count for nothing.
+    Pairs of one block, or less than a stretch apart, count for nothing.
+
+    Args:
+        ways: n of them.
+        near: (n, n) how near each other places are.
     """
-    at = ways.middle_m[:, axes] - ways.middle_m[:, axes].mean(axis=0)
-    at /= np.sqrt(2) * length_m
-    square = np.sum(at**2, axis=1)
-    near = np.exp(2 * at @ at.T - square[:, None] - square) * ways.far
-    member = (ways.stretch[:, None] == np.arange(ways.stretch.max() + 1)).astype(float)
-    own = member * (error * ways.length)[:, None]
-    return own.T @ near @ own, float(ways.length**2 @ near @ ways.length**2)
+    near = near * ways.far
+    begins = np.flatnonzero(np.diff(ways.stretch, prepend=-1))  # of stretches, which ascend
+    own, whole = (v.astype(np.float32) for v in (ways.errors * ways.length, ways.length**2))
+    rows = np.add.reduceat(own[:, :, None] * near, begins, axis=1)
+    pairs = np.add.reduceat(rows * own[:, None], begins, axis=2)
+    return pairs, float(whole @ near @ whole)
