@@ -37,24 +37,27 @@ def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.
     asked = (rate_hz > LEAST_PERIODS / (t_s[-1] - t_s[0])) & (rate_hz < 1 / SHORTEST_S)
     if bins[-1] < 4 * NEIGHBOURS or not asked.any():
         return 0.0
-    power = asked * _highest(bins, errors)
+    count = int(np.flatnonzero(asked)[-1]) + 1
+    power = asked[:count] * _highest(bins, errors, count)
     if power.max() > BEYOND_CHANCE:  # else what the robot did need not be looked at
-        power *= _highest(bins, done) < np.maximum(IN_THE_DRIVE, power / FAR_BEYOND_THE_DRIVE)
+        least = np.maximum(IN_THE_DRIVE, power / FAR_BEYOND_THE_DRIVE)
+        power *= _highest(bins, done, count) < least
     best = int(np.argmax(power))
     return float(2 * np.pi * rate_hz[best]) if power[best] > BEYOND_CHANCE else 0.0
 
 
-def _highest(bins: np.ndarray, signals: Sequence[np.ndarray]) -> np.ndarray:
-    """(K,) highest power over noise that one of some signals has in each line."""
-    return np.max([_over_noise(bins, signal) for signal in signals], axis=0)
+def _highest(bins: np.ndarray, signals: Sequence[np.ndarray], count: int) -> np.ndarray:
+    """(K,) highest power over noise that one of some signals has in each of the first K lines."""
+    return np.max([_over_noise(bins, signal, count) for signal in signals], axis=0)
 
 
-def _over_noise(bins: np.ndarray, signal: np.ndarray) -> np.ndarray:
-    """(K,) power of a signal's lines over the mean of noise around each."""
+def _over_noise(bins: np.ndarray, signal: np.ndarray, count: int) -> np.ndarray:
+    """(K,) power of a signal's first lines over the mean of noise around each."""
     even = np.bincount(bins, signal) / np.maximum(np.bincount(bins), 1)
     tapered = (even - even.mean()) * np.hanning(len(even))
     power = np.abs(np.fft.rfft(tapered, PADDED * len(even))) ** 2
     padded = np.pad(power[::PADDED], NEIGHBOURS, mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1)
-    noise = np.repeat(np.median(around, axis=1), PADDED)[: len(power)] / np.log(2)
-    return power / np.maximum(noise, 1e-30)
+    medians = np.median(around[: -(-count // PADDED)], axis=1)
+    noise = np.repeat(medians, PADDED)[:count] / np.log(2)
+    return power[:count] / np.maximum(noise, 1e-30)
