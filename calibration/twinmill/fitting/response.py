@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -420,7 +421,7 @@ class Response:
     def motion(self) -> Motion:
         """At each point, as fitted so far."""
         return Motion(
-            velocity=self.velocity(None),
+            velocity=self.velocities()[0],
             base=self.base_mps,
             pose=self.pose,
             heading_rad=self.heading_rad,
@@ -536,42 +537,47 @@ class Response:
 
     def _judge(self) -> None:
         """Errors of the stages so far: fitted to all, and to other blocks."""
-        self.within = difference(self.data.measured, self.predict(None))
-        self.across = difference(self.data.measured, self.predict(self.fold))
+        whole, *without = self.velocities()
+        everything = np.zeros(len(self.starts), int)
+        self.within = difference(self.data.measured, self.predict([whole], everything))
+        self.across = difference(self.data.measured, self.predict(without, self.fold))
 
     @property
     def errors(self) -> np.ndarray:
         """(H, 3) between those of the fit to all, too small, and those on left-out parts."""
         return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
-    def velocity(self, fold: int | None, points: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(N, 3) forward, left, turning at points; of the fit without a fold."""
-        features = [f[points] for f in self.features]
-        found = np.zeros((len(features[0]), 3))
-        plane, turn = self.coefficients
-        if plane is not None:
-            beta = plane[0] if fold is None else plane[1][fold]
-            width = features[0].shape[1]
-            found[:, 0] = features[0] @ beta[:width]
-            found[:, 1] = features[1] @ beta[width:]
-        if turn is not None:
-            found[:, 2] = features[2] @ (turn[0] if fold is None else turn[1][fold])
+    def velocities(self) -> np.ndarray:
+        """(1 + K, N, 3) forward, left, turning at points: of the fit to all, and without each fold.
+
+        Of all fits at once: one by one each goes through all features again.
+        """
+        found = np.zeros((1 + self.folds, len(self.step_s), 3))
+        for axes, fits in zip(AXES, self.coefficients, strict=True):
+            if fits is None:
+                continue
+            whole, without = fits
+            each = np.vstack([whole, without]).T
+            edges = np.cumsum([0, *(self.features[axis].shape[1] for axis in axes)])
+            for axis, (first, last) in zip(axes, pairwise(edges), strict=True):
+                found[:, :, axis] = (self.features[axis] @ each[first:last]).T
         return found
 
-    def predict(self, fold: np.ndarray | None) -> np.ndarray:
+    def predict(self, velocities: Sequence[np.ndarray], which: np.ndarray) -> np.ndarray:
         """(W, H, 3) displacements, the heading integrated by the response itself.
 
         Args:
-            fold: (W,) each window is predicted without its part; None: by the fit to all.
+            velocities: (N, 3) each.
+            which: (W,) of these predicts each window.
         """
         out = np.full(self.data.measured.shape, np.nan)
-        for k in range(self.folds) if fold is not None else [None]:
-            own = np.flatnonzero(fold == k) if fold is not None else np.arange(len(self.starts))
+        for k, velocity in enumerate(velocities):
+            own = np.flatnonzero(which == k)
             if not len(own):
                 continue
             starts, ends = self.starts[own], np.maximum(self.ends[own], self.starts[own, None])
             points = _within(starts, ends.max(axis=1), len(self.points))
-            run = _integrate(self.velocity(k, points), self.step_s[points])
+            run = _integrate(velocity[points], self.step_s[points])
             start, end = (run[np.searchsorted(points, at)] for at in (starts, ends))
             out[own] = np.where((self.ends[own] >= 0)[..., None], _seen_from(start, end), np.nan)
         out[~np.isfinite(self.data.measured)] = np.nan
