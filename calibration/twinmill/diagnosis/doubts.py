@@ -362,7 +362,8 @@ def _same(
         done: the search.
         name: of the effect.
         least: of the cosine of what they take.
-        at_bound: share of its fall of the error that is enough for one that is at its bound.
+        at_bound: share of its fall of the error that is enough for one that is at its bound; no
+            more than is enough for others.
     """
     this = done.round_of(name)
     if name == REFIT or this.accepted.names != (name,):
@@ -370,8 +371,9 @@ def _same(
     taken = this.before.held_score**2 - this.accepted.held_score**2
 
     def takes_enough(trial: Trial) -> bool:
-        share = at_bound if _is_bounded(trial) else SETTINGS.same_fall
-        return this.before.held_score**2 - trial.held_score**2 > share * taken
+        fell = this.before.held_score**2 - trial.held_score**2
+        enough = fell > SETTINGS.same_fall * taken
+        return enough or (fell > at_bound * taken and _is_bounded(trial))
 
     return [
         t.names[0]

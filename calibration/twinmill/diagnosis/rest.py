@@ -7,7 +7,7 @@ regression of the errors on groups of velocity terms without physics names, each
 that it was not fitted to.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -439,16 +439,27 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
 
 def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
     """Each family, and each formula that it has: the same of another group is something else."""
-    kinds = [(t.group, t.family) for t in terms]
-    groups, formulas = (np.array([getattr(t, k) for t in terms]) for k in ("group", "formula"))
-    for kind in dict.fromkeys(kinds):
-        together = np.array([k == kind for k in kinds])
-        grams = products.grams(together)
-        yield Tested(kind[0], together, grams)
-        for formula in dict.fromkeys(formulas[together]):
-            own = (groups == kind[0]) & (formulas == formula)
+    if not terms:
+        return
+    groups, kinds, formulas = (
+        _numbered(values)
+        for values in zip(*((t.group, (t.group, t.family), t.formula) for t in terms), strict=True)
+    )
+    for kind in range(kinds.max() + 1):
+        together = kinds == kind
+        of_group = groups == groups[together][0]
+        group, grams = terms[int(together.argmax())].group, products.grams(together)
+        yield Tested(group, together, grams)
+        for formula in dict.fromkeys(formulas[together].tolist()):
+            own = of_group & (formulas == formula)
             inside = not np.any(own & ~together)
-            yield Tested(kind[0], own, grams.only(own[together]) if inside else products.grams(own))
+            yield Tested(group, own, grams.only(own[together]) if inside else products.grams(own))
+
+
+def _numbered(values: Iterable[Hashable]) -> np.ndarray:
+    """(N,) which of all different values each is: numbers are compared far sooner than texts."""
+    known: dict[Hashable, int] = {}
+    return np.array([known.setdefault(value, len(known)) for value in values], int)
 
 
 def _gains(
