@@ -120,7 +120,10 @@ def _hint(measurements: Measurements, model_file: ModelFile) -> None:
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
     """What takes what was found into the model: why, and the command."""
     stem, told = Path(model).stem, []
-    why = {"robots": "To give each robot its own numbers", "runs": "To take the middle of the runs"}
+    why = {
+        "robots": "To give each robot its own numbers",
+        "runs": "To take the middle of the runs, if it predicts better",
+    }
     if result.lasting or result.robots_off or result.apart:
         to = Path(f"{stem}_explained.toml")
         added = result.lasting or result.robots_off

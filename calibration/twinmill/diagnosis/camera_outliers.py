@@ -110,11 +110,12 @@ def _judge_camera(
         parameters=parameters,
         score_before=before,
         score_after=after,
+        score_others=others,
         p_value=float(min(1.0, p_value)),
         sentence=_plain(robot_id, parameters),
         why=told,
         smallest_shown={},
-        gains=[],
+        beside=[],
     )
 
 

@@ -170,12 +170,12 @@ def _diagnosed(
     before = comparison(model_file, opened)
     unseen = not_shown(opened) | _changing(opened, model_file)
     course.opened, course.before, course.unseen = opened, before, unseen
-    known = _thinned(with_own_gains(judged(opened)))
+    known = thinned_to_search(with_own_gains(judged(opened)))
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
     off = odd_of_two(known, first, GOOD * usual, progress)
     if off:
-        known = _thinned(_without(judged(opened), off))
+        known = thinned_to_search(_without(judged(opened), off))
         first = first_state(known, model_file, {*excluded, *unseen})
     course.off = off
     done = search(first, progress, known=usual, begun=course.searches.append)
@@ -462,7 +462,8 @@ def _concluded(
     )
 
 
-def _thinned(opened: Sequence[Opened]) -> list[Opened]:
+def thinned_to_search(opened: Sequence[Opened]) -> list[Opened]:
+    """The same with as many starts of predictions as a search looks at."""
     data = [o.data for o in opened]
     return thinned(opened, thinning(data, SETTINGS.starts, SETTINGS.starts_apart_s))
 

@@ -11,15 +11,16 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.apart import middles, of_runs
-from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.diagnose import diagnose, thinned_to_search
 from twinmill.diagnosis.formula import Formula
+from twinmill.diagnosis.outliers import Outlier, anew
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.stopped import stopped
 from twinmill.diagnosis.taking import EFFECT, Taken, taken
 from twinmill.diagnosis.trials import REFIT, State, fitted, without_effect
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock, time_notes, unsteady_clocks
-from twinmill.fitting.opening import judged, lag_is_kept
+from twinmill.fitting.opening import Opened, judged, lag_is_kept, with_own_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import Fitted, ModelFile, child_of
@@ -31,6 +32,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     base_lag_is_identifiable,
     base_parameters,
+    catalogue_name,
     effect_parameters,
     is_local,
     late_part,
@@ -152,13 +154,11 @@ def explain(
         try:
             diagnosis = _with_stale_lag(diagnosis)
             fit, beyond = _whole(diagnosis, formula)
-            if not _gained(diagnosis, fit, beyond):
-                return _as_given(
-                    diagnosis, model_file, beyond, out=out, command=command, force=force
-                )
-            return _written(
-                diagnosis, model_file, fit, beyond, out=out, command=command, force=force
-            )
+            child, told = _made(diagnosis, model_file, fit, beyond, out=out, command=command)
+            if not _gained(told, fit, beyond):
+                child, told = _as_given(diagnosis, model_file, beyond, out=out, command=command)
+            child.write(force)
+            return told
         except KeyboardInterrupt:
             if not stoppable:
                 raise
@@ -166,7 +166,9 @@ def explain(
     if not (diagnosis.lasting or diagnosis.robots_off):
         return Explanation(diagnosis, diagnosis.before, [], None)
     fit = diagnosis.search.last.fit
-    return _written(diagnosis, model_file, fit, None, out=out, command=command, force=force)
+    child, told = _made(diagnosis, model_file, fit, None, out=out, command=command)
+    child.write(force)
+    return told
 
 
 def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
@@ -197,15 +199,24 @@ def _whole(diagnosis: Diagnosis, formula: bool) -> tuple[ScoreFit, Taken | None]
     return (beyond.fit if beyond and beyond.kept else fit), beyond
 
 
-def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
-    """Whether a fit predicts left-out data better than the model as given.
+def _gained(told: Explanation, fit: ScoreFit, beyond: Taken | None) -> bool:
+    """Whether a new model predicts better than the model as given, left-out data too.
 
-    Numbers that were fitted though nothing was found must predict most blocks better: a few that
-    follow no command pull them wherever they like. Where lateness changes within a log, and it is
-    not known from its input how, a lag goes half of the way, and suits no other log.
+    The middle of runs that differ may suit fewer of them than the model as given. Numbers that were
+    fitted though nothing was found must predict most blocks better: a few that follow no command
+    pull them wherever they like. Where lateness changes within a log, and it is not known from its
+    input how, a lag goes half of the way, and suits no other log.
     """
-    if diagnosis.camera or len(diagnosis.robots) > 1 or diagnosis.apart:
-        return True  # common numbers are not all that is new
+    diagnosis = told.diagnosis
+    before = diagnosis.before.score
+    if diagnosis.camera:
+        return True  # what is new is not of the motion alone
+    if told.after.score > before:
+        return False
+    if of_runs(diagnosis.apart):
+        return True
+    if len(diagnosis.robots) > 1:
+        return _held_out(diagnosis, fit) <= before
     if diagnosis.found and not (diagnosis.lasting or (beyond and beyond.kept)):
         return False
     if diagnosis.rest.events.later and any(_is_of_time(p) for p in fit.shared):
@@ -224,6 +235,17 @@ def _gained(diagnosis: Diagnosis, fit: ScoreFit, beyond: Taken | None) -> bool:
     return total_score(fit.held_scores) <= total_score(start.held_scores)
 
 
+def _held_out(diagnosis: Diagnosis, fit: ScoreFit) -> float:
+    """Score of all robots on parts that were not fitted to, those that differ from the others too.
+
+    Args:
+        diagnosis: with what was found.
+        fit: of the others.
+    """
+    off = [r.score_after for r in diagnosis.robots_off for _ in r.models]
+    return total_score([*fit.held_scores, *off])
+
+
 def _is_of_time(parameter: Parameter) -> bool:
     """Whether it says how late a robot is."""
     return parameter.name == LAG or parameter.role == "lateness"
@@ -236,9 +258,8 @@ def _as_given(
     *,
     out: Path,
     command: str,
-    force: bool,
-) -> Explanation:
-    """Writes the model with the numbers that it had, and what the logs tell of clock and rest."""
+) -> tuple[ModelFile, Explanation]:
+    """The model with the numbers that it had, and what the logs tell of clock and rest."""
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
     before = diagnosis.before
     told = Fitted(
@@ -252,11 +273,10 @@ def _as_given(
         left_over=_left_over(diagnosis, beyond),
     )
     child = child_of(model_file, told, Path(out), command)
-    child.write(force)
-    return Explanation(diagnosis, before, [], child.path, beyond, gained=False)
+    return child, Explanation(diagnosis, before, [], child.path, beyond, gained=False)
 
 
-def _written(
+def _made(
     diagnosis: Diagnosis,
     model_file: ModelFile,
     fit: ScoreFit,
@@ -264,9 +284,8 @@ def _written(
     *,
     out: Path,
     command: str,
-    force: bool,
-) -> Explanation:
-    """Writes the model last of all: Ctrl-C before leaves no file of which nothing is said."""
+) -> tuple[ModelFile, Explanation]:
+    """The new model, to be written last of all: Ctrl-C before leaves no file."""
     model = _with_found(diagnosis, model_file, beyond)
     kept = beyond if beyond and beyond.kept else None
     shared = kept.estimates if kept else fit.shared_estimates()
@@ -277,6 +296,7 @@ def _written(
     covariance = kept.covariance if kept else fit.shared_covariance()
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
+    diagnosis = diagnosis.with_robots_off(_anew(diagnosis, fit, model))
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
     noise = next((s.noise_at_speed for s in diagnosis.modelled if s.noise), None)
     told = Fitted(
@@ -294,12 +314,41 @@ def _written(
     )
     child = child_of(model_file, told, Path(out), command)
     own = phases(child.model)
-    opened = [(o.aligned if own else o.with_model)(child.model) for o in diagnosis.opened]
+    opened = [(o.aligned if own else o.with_model)(child.model) for o in _on_own_clocks(diagnosis)]
     after = comparison(child, opened)
     if of_runs(diagnosis.apart):  # none of these has in the file what it had in the fit
         child = child_of(model_file, replace(told, score_after=after.score), Path(out), command)
-    child.write(force)
-    return Explanation(diagnosis, after, estimates, child.path, beyond)
+    return child, Explanation(diagnosis, after, estimates, child.path, beyond)
+
+
+def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Outlier]:
+    """Robots that differ, with their numbers beside the new model of all; cameras as they are."""
+    lags = [p.std for d in fit.datasets for p in d.own if p.name == LAG and not d.by_run]
+    opened = thinned_to_search(with_own_gains(judged(diagnosis.opened)))
+    logs = [o for o in opened if o.floor]
+    return [
+        anew(
+            off,
+            [o for o in logs if o.measurement.track.robot_id == off.robot_id],
+            common,
+            max(lags, default=0.0),
+        )
+        if off.models
+        else off
+        for off in diagnosis.robots_off
+    ]
+
+
+def _on_own_clocks(diagnosis: Diagnosis) -> list[Opened]:
+    """All measurements, those of robots that differ on the clocks that suit their own numbers."""
+    off = {r.robot_id: iter(r.models) for r in diagnosis.robots_off}
+    opened = []
+    for own in diagnosis.opened:
+        logs = own.floor and own.data is not None
+        models = off.get(own.measurement.track.robot_id) if logs else None
+        model = next(models, own.model) if models else own.model
+        opened.append(own.with_fitted(model))
+    return opened
 
 
 def _passes(estimate: ParameterEstimate, diagnosis: Diagnosis) -> bool:
@@ -344,7 +393,7 @@ def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | Non
     """The model as given with all that was found, before its numbers."""
     model = model_file.model.copy()
     off = diagnosis.robots_off
-    own_effects = [e.name.split(".")[0] for r in off for e in r.parameters if e.name not in GAINS]
+    own_effects = [catalogue_name(e.name) for r in off for e in r.parameters if e.name not in GAINS]
     moved = diagnosis.model.effects[len(model.effects) :]
     kept = beyond.formula if beyond and beyond.kept else None
     gone = (*(kept.instead_of if kept else ()), *diagnosis.passing)
@@ -397,5 +446,6 @@ def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[Parameter
         if own:
             values.setdefault(data.robot_id, {}).update(own)
     for robot in diagnosis.robots_off:
-        values[robot.robot_id] = {e.name: e for e in [*robot.gains, *robot.parameters]}
+        own = {e.name: e for e in [*robot.beside, *robot.parameters]}
+        values.setdefault(robot.robot_id, {}).update(own)
     return {robot_id: list(own.values()) for robot_id, own in values.items()}

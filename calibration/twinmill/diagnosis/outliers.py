@@ -18,14 +18,18 @@ from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted
-from twinmill.fitting.opening import Opened, wide_gains
+from twinmill.fitting.opening import OWN, Opened, wide_gains, with_own_lags
 from twinmill.model.parameters import (
     GAINS,
     LAG_EFFECT,
+    Parameter,
     ParameterEstimate,
     catalogue,
+    effect_parameters,
+    key_of,
+    newest_instance,
 )
-from twinmill.predict.datasets import total_score
+from twinmill.predict.datasets import Trajectory, total_score
 
 TRIED = 3
 WHEELS = "wheel_gain"
@@ -57,11 +61,12 @@ class Outlier:
         effect: what sets it apart: effects, or gains; None if nothing that was tried does.
         parameters: of its own.
         score_before, score_after: held out, with the model of all and with its own.
+        score_others: of the others with the model of all.
         p_value: chance of such a difference among as many robots that are alike.
         sentence: in plain words.
         why: in numbers.
         smallest_shown: by effect the smallest difference that this log would have shown.
-        gains: its speed and turn, over the model's.
+        beside: what else is its own: speed and turn over the model's, its motor lag.
         models: with what all lack and its own, one for each log; none where its camera differs.
     """
 
@@ -70,17 +75,23 @@ class Outlier:
     parameters: list[ParameterEstimate]
     score_before: float
     score_after: float
+    score_others: float
     p_value: float
     sentence: str
     why: str
     smallest_shown: dict[str, float]
-    gains: list[ParameterEstimate]
+    beside: list[ParameterEstimate]
     models: Sequence[native.Model] = ()
 
     @property
     def label(self) -> str:
         """The robot as channels name it, such as R03."""
         return f"R{self.robot_id:02d}"
+
+    @property
+    def by_gains(self) -> bool:
+        """Whether its gains alone set it apart."""
+        return bool(self.parameters) and all(e.name in GAINS for e in self.parameters)
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -173,6 +184,50 @@ def odd_of_two(
     return [off] if off and off.effect else []
 
 
+def anew(
+    off: Outlier, opened: Sequence[Opened], common: native.Model, lag_std_s: float = 0.0
+) -> Outlier:
+    """The same robot, its own numbers fitted beside another model of all than it was judged with.
+
+    What the others have may have moved since; numbers beside what was before would not fit to it.
+
+    Args:
+        off: as it was judged, with what it differs in.
+        opened: its logs, with gains of its own.
+        common: model of all, which has the effect of this robot as well.
+        lag_std_s: among the others, where each of them has a motor lag of its own; else 0.
+    """
+    names = (off.effect,) if off.effect and not off.by_gains else ()
+    own = [o.with_model(common) for o in opened]
+    if lag_std_s and names != (LAG_EFFECT,):
+        own = with_own_lags(own, lag_std_s)
+    data = [_without_gains(o.data) if off.by_gains else o.data for o in own]
+    free = tuple(p for name in names for p in _begun_at(off, common, name))
+    trial = replace(fitted(State(data, [o.model for o in own], free)), names=names)
+    if off.by_gains:
+        trial = _with_gains(trial)
+    if not off.effect:
+        beside, after = _own_numbers(trial), trial.held_score
+        return replace(off, score_after=after, beside=beside, models=trial.fit.models)
+    parameters, after = _estimates(trial), trial.held_score
+    return replace(
+        off,
+        parameters=parameters,
+        score_after=after,
+        sentence=_plain(off.robot_id, parameters),
+        why=_why(off.score_before, off.score_others, off.effect, after),
+        beside=_own_numbers(trial),
+        models=_models(trial, parameters),
+    )
+
+
+def _begun_at(off: Outlier, common: native.Model, effect: str) -> list[Parameter]:
+    """What of an effect is free in another model, begun where it was found."""
+    found = {key_of(e.name): e.value for e in off.parameters}
+    free = effect_parameters(common, newest_instance(common, effect))
+    return [p.at(found.get(key_of(p.name), p.value)) for p in free]
+
+
 def _ids(opened: Sequence[Opened]) -> list[int]:
     return sorted({o.measurement.track.robot_id for o in opened if o.floor})
 
@@ -202,13 +257,16 @@ def _alone_state(
     own = [i for i, o in enumerate(opened) if o.floor and o.measurement.track.robot_id == robot_id]
     data, models = [], []
     for i in own:
-        free = tuple(p for p in opened[i].data.own if gains or p.name not in GAINS)
-        data.append(replace(opened[i].data, own=free))
+        data.append(opened[i].data if gains else _without_gains(opened[i].data))
         model = state.models[i].copy()
         for name in GAINS:
             model.set(name, 1.0)
         models.append(model)
     return State(data, models, (), (), state.excluded)
+
+
+def _without_gains(data: Trajectory) -> Trajectory:
+    return replace(data, own=tuple(p for p in data.own if p.name not in GAINS))
 
 
 def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list[str]:
@@ -293,20 +351,28 @@ def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
         parameters=parameters,
         score_before=before,
         score_after=after,
+        score_others=others,
         p_value=best_p,
         sentence=_plain(own.robot_id, parameters),
-        why=f"its errors are {before:.2f} times the floor with the model of all, those of the "
-        f"others {others:.2f}; with {effect} of its own {after:.2f}",
+        why=_why(before, others, effect, after),
         smallest_shown=_smallest(own),
-        gains=parameters if best_name == "gains" else _own_gains(best),
+        beside=[] if best_name == "gains" else _own_numbers(best),
         models=_models(best, parameters),
     )
 
 
-def _own_gains(trial: Trial) -> list[ParameterEstimate]:
-    """Gains beside which an effect was told; none beside wheels, which have them in theirs."""
-    own = trial.fit.own_estimates(0) if trial.names != (WHEELS,) else {}
-    return [own[name] for name in GAINS if name in own]
+def _why(before: float, others: float, effect: str, after: float) -> str:
+    return (
+        f"its errors are {before:.2f} times the floor with the model of all, those of the others "
+        f"{others:.2f}; with {effect} of its own {after:.2f}"
+    )
+
+
+def _own_numbers(trial: Trial) -> list[ParameterEstimate]:
+    """What an effect was told beside: gains and lag; beside wheels no gains, they are in these."""
+    own = trial.fit.own_estimates(0)
+    gone = GAINS if trial.names == (WHEELS,) else ()
+    return [own[name] for name in OWN if name in own and name not in gone]
 
 
 def _models(trial: Trial, parameters: Sequence[ParameterEstimate]) -> list[native.Model]:
@@ -364,12 +430,13 @@ def _unexplained(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
         parameters=[],
         score_before=before,
         score_after=before,
+        score_others=others,
         p_value=SETTINGS.odd_chance,
         sentence=f"R{own.robot_id:02d} differs, and no effect of the catalogue explains how.",
         why=f"its errors are {before:.2f} times the floor, those of the others {others:.2f}; "
         "pushes and bumps by others would look so",
         smallest_shown=_smallest(own),
-        gains=[],
+        beside=_own_numbers(own.before),
         models=own.before.fit.models,
     )
 

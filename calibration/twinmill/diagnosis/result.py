@@ -2,7 +2,7 @@
 """The result of a diagnosis, for reports and JSON."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import twinmill_native as native
 
@@ -91,6 +91,13 @@ class Diagnosis:
         for sentence in own:
             rest = rest.removeprefix(sentence).lstrip()
         return [line for line in (*own, rest) if line]
+
+    def with_robots_off(self, off: Sequence[Outlier]) -> "Diagnosis":
+        """The same with the robots that differ told anew, in their order."""
+        said = self.sentence
+        for before, now in zip(self.robots_off, off, strict=True):
+            said = said.replace(before.sentence, now.sentence, 1)
+        return replace(self, robots_off=tuple(off), sentence=said)
 
     @property
     def motion(self) -> list[str]:

@@ -118,7 +118,7 @@ class ParameterEstimate:
     @property
     def short(self) -> str:
         """For people: its words, or its name without the effect's before."""
-        return self.words or self.name.split(".", 1)[-1]
+        return self.words or key_of(self.name)
 
     @property
     def of_unit(self) -> str:
@@ -128,6 +128,21 @@ class ParameterEstimate:
     def to_json(self) -> dict:
         """Fields of the interface."""
         return vars(self)
+
+
+def instance_of(name: str) -> str:
+    """Whose a quantity is: `dead_zone#2` of `dead_zone#2.width`, `base` of `base.motor_lag_s`."""
+    return name.split(".", 1)[0]
+
+
+def key_of(name: str) -> str:
+    """A quantity without whose it is: `width` of `dead_zone#2.width`; else as it stands."""
+    return name.split(".", 1)[-1]
+
+
+def catalogue_name(name: str) -> str:
+    """The catalogue's name of an instance of an effect, or of the effect that a quantity is of."""
+    return instance_of(name).split("#")[0]
 
 
 @cache

@@ -413,7 +413,7 @@ def found_models(diagnosis: Diagnosis) -> list[tuple[str, native.Model] | None]:
 def _with_own(common: str, robot: Outlier) -> str:
     if robot.effect is None:
         return common
-    name = "gains" if robot.gains == robot.parameters else robot.effect
+    name = "gains" if robot.by_gains else robot.effect
     return f"{common} and its own {name}" if common else f"with its own {name}"
 
 

@@ -231,6 +231,31 @@ def test_what_diagnose_prints_gives_each_robot_the_lag_that_its_score_needs(
     assert found.late.sum_std_s == pytest.approx(np.std(lags_s, ddof=1), rel=0.2)
 
 
+def test_explain_gives_an_odd_robot_the_score_that_it_promises(
+    tanh_robot, measure, one_clock_base, tmp_path
+):
+    """The others' lags move the base after the odd robot was judged beside it."""
+
+    class Weak(tanh_robot):
+        def wheels_mps(self, duty):
+            return super().wheels_mps(duty) * (0.85, 1, 0.85, 1)
+
+    of_kind = [tanh_robot(lag_s=s) for s in (0.11, 0.15, 0.19)]
+    runs = [measure(r, 350 + k, 40.0) for k, r in enumerate([*of_kind, Weak()])]
+    robots = [replace(m, track=replace(m.track, robot_id=k)) for k, m in enumerate(runs)]
+    told = explain(robots, one_clock_base, out=tmp_path / "own.toml", command="test")
+    (off,) = told.diagnosis.robots_off
+    assert off.robot_id == 3 and told.diagnosis.sentence.startswith(off.sentence)
+    found = compare(robots, ModelFile.load(str(tmp_path / "own.toml")))
+    assert found.robots[3].score < 1.05 * off.score_after
+    assert off.score_after < MISSING
+    # What is told of it is what is in the file.
+    model = ModelFile.load(str(tmp_path / "own.toml")).model.for_robot(3)
+    assert {e.name: model.get(e.name) for e in off.parameters} == pytest.approx(
+        {e.name: e.value for e in off.parameters}, rel=1e-4
+    )
+
+
 def test_no_fault_of_one_robot_is_told_where_all_differ_in_lag(tanh_robot, measure, one_clock_base):
     """Of the most sluggish play had been told: the others' lags made its own no difference."""
     lags_s = [0.06, 0.1, 0.15, 0.2]

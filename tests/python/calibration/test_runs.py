@@ -53,6 +53,19 @@ def test_runs_whose_lags_differ_are_told_as_such_before_place_or_time(
     assert compare(runs, model).score < compare(runs, one_clock_base).score
 
 
+def test_the_middle_of_runs_is_not_written_where_the_model_as_given_predicts_them_better(
+    tanh_robot, measure, one_clock_base, tmp_path
+):
+    """Two runs of three have the base's lag: their middle suits none."""
+    runs = [measure(tanh_robot(lag_s=s), 305 + k, RUN_S) for k, s in enumerate((0.09, 0.09, 0.17))]
+    told = explain(runs, one_clock_base, out=tmp_path / "runs.toml", command="")
+    assert told.diagnosis.apart.whose == "runs" and not told.gained
+    written = ModelFile.load(str(tmp_path / "runs.toml"))
+    assert written.model.get("base.motor_lag_s") == one_clock_base.model.get("base.motor_lag_s")
+    before = compare(runs, one_clock_base).score
+    assert compare(runs, written).score == pytest.approx(before) == told.after.score
+
+
 def test_equal_runs_are_not_told_to_differ(tanh_robot, measure, one_clock_base):
     found = diagnose([measure(tanh_robot(), 310 + k, RUN_S) for k in range(4)], one_clock_base)
     assert found.apart is None and found.verdict == "model_adequate"
