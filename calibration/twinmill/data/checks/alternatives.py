@@ -232,6 +232,11 @@ class Search:
         self._own_key = [(own.lag_s, own.late_s)]
         return own
 
+    def best_shift(self, lag_s: float) -> tuple[float, float]:
+        """Shift, between those of the grid, at which the columns as they are leave least; that."""
+        left = self._judged(*self.by_shift(lag_s))[0].sum(axis=1)
+        return place_of_least(self.lates_s, left), float(left.min())
+
     def by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of the columns as they are, at each of S shifts: sums over stretches, for each bend.
 

@@ -15,9 +15,12 @@ from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.lateness import Lateness, lateness_of
 from twinmill.data.checks.motion import BLOCK_S
 from twinmill.data.checks.settings import CHECKS
+from twinmill.data.clock import place_of_least
 from twinmill.data.lost_commands import beat_s, keeps_beat
 
 FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
+ABOUT_S = np.arange(-0.6, 0.6 + 1e-9, 0.02)  # about a shift that is far off
+ANY_LAG_S = np.geomspace(0.004, 0.5, 13)
 FINE_S = np.arange(-0.06, 0.06 + 1e-9, 0.01)  # about a shift of the coarse search
 RATES_PPM = (-3000, -2000, -1000, -500, 0, 500, 1000, 2000, 3000)
 OWN_CLOCKS = "stamp both with one clock or keep them in step (chrony, NTP)"
@@ -41,6 +44,25 @@ def stepped(
     if _gained(_drifted(search, own, rate), step.explained) < -CHECKS.step_sure:
         return _with(late, _of_drift(checked, _in_words(search, rate, std), rate))
     return _with(late, _of_step(checked, own, step))
+
+
+def shift_s(search: Search, coarse_s: float) -> float:
+    """By how much the poses come late against the commands, to milliseconds.
+
+    What a lag makes late is no shift: of lags that which explains most is taken, and between those
+    that are tried their shifts are taken as they change.
+
+    Args:
+        search: of the motion, the columns as they are right.
+        coarse_s: the shift, to some tenths of a second.
+    """
+    near_s, logs, found = coarse_s + ABOUT_S, np.log(ANY_LAG_S), []
+    for lag_s in ANY_LAG_S:
+        felt = {lag_s: search.motion.felt(lag_s)}
+        found.append(Search(search.motion, search.wheels, felt, near_s).best_shift(lag_s))
+    shifts_s, left = np.array(found).T
+    found_s = float(np.interp(place_of_least(logs, left), logs, shifts_s))
+    return found_s - search.motion.ahead_s
 
 
 def _refined(search: Search, own: Explained, jump: Jump) -> Jump:

@@ -13,7 +13,7 @@ from twinmill.data.checks.alternatives import (
     pose_alternatives,
     wheel_alternatives,
 )
-from twinmill.data.checks.clocks import FAR_S, stepped
+from twinmill.data.checks.clocks import FAR_S, shift_s, stepped
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
@@ -180,14 +180,15 @@ def _shifted(
     far = Search(search.motion, search.wheels, search.felt, FAR_S).own()
     if far.left > CHECKS.alike * best.left + CHECKS.alike_left or not far_better(far, own):
         return None
-    late = "late" if far.late_s > 0 else "early"
+    late_s = shift_s(search, far.late_s)
+    late = "late" if late_s > 0 else "early"
     return checked.finding(
-        f"the poses come {abs(far.late_s):.1f} s {late} against the commands",
+        f"the poses come {abs(late_s):.2f} s {late} against the commands",
         f"the commands explain {1 - own.left:.0%} of the motion as it is stamped, and "
         f"{1 - far.left:.0%} with that shift",
         "stamp both with one clock, or import anew with "
-        f"{checked.option('--pose-shift-s')}{0.1 - far.late_s:.1f}; what is then left of the "
-        "shift is searched",
+        f"{checked.option('--pose-shift-s')}{-late_s:.3f}; a constant delay of the robot is in "
+        "that shift",
     )
 
 

@@ -101,14 +101,22 @@ class Motion:
         linear[:, 0], linear[:, 1] = along.real, along.imag
         return replace(self, shapes=_powers(linear))
 
+    @property
+    def ahead_s(self) -> float:
+        """By which what is felt comes too soon: an even window has its middle between two steps."""
+        return GRID_S / 2 * (len(self._window) % 2 == 0)
+
+    @property
+    def _window(self) -> np.ndarray:
+        s = np.arange(-self.half_s, self.half_s + GRID_S / 2, GRID_S)
+        weight = np.maximum(self.half_s**2 - s**2, 0)
+        return weight / weight.sum()
+
     def felt(self, lag_s: float) -> Felt:
         """Commands through a first-order lag, averaged over the window."""
         keep = np.exp(-GRID_S / lag_s)
         lagged = filtered([1 - keep], [1, -keep], self.shapes, axis=0)
-        s = np.arange(-self.half_s, self.half_s + GRID_S / 2, GRID_S)
-        weight = np.maximum(self.half_s**2 - s**2, 0)
-        weight /= weight.sum()
-        return float(self.grid_s[0]), _averaged(lagged, weight)
+        return float(self.grid_s[0]), _averaged(lagged, self._window)
 
     def at(self, felt: Felt, late_s: float) -> np.ndarray:
         """(K, ...) of what was felt `late_s` before each pose."""
