@@ -89,7 +89,7 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "robot": ("robots", *BY_NAME),
     "rename": ("rename", *BY_NAME),
     "mapping": ("mapping", (str, Path), A_PATH),
-    "flip": ("flips", *NAMES),
+    "flip": ("flips", (*NAMES[0], Mapping), "a list of names, or a dictionary of these by robot"),
     "up": ("up", str, "`y` or `z`"),
     "pose_shift_s": ("pose_shift_s", *OF_ROBOTS),
     "pose_clock_ppm": ("pose_clock_ppm", *OF_ROBOTS),
@@ -1477,7 +1477,7 @@ def import_log(
     bag: str | Path | None = None,
     detections: str | Path | pd.DataFrame | None = None,
     robot_id: int | None = None,
-    heading_offset_deg: float = 0.0,
+    heading_offset_deg: float | Mapping[int, float] = 0.0,
     **options: Any,
 ) -> Log:
     """Makes a log from motion capture and commands: tables, or files of other programs.
@@ -1497,12 +1497,13 @@ def import_log(
         bag: ROS bag, with its topics in `pose` and `command`.
         detections: CSV or table of what cameras saw: t_s, robot_id, seen.
         robot_id: whose the rows are, for files that do not say.
-        heading_offset_deg: from the tracked body's x axis to the robot's front, left positive.
+        heading_offset_deg: from the tracked body's x axis to the robot's front, left positive; or
+            by robot.
         options: `robot` (numbers by name) and `rename` (our column by the file's), dictionaries;
-            `mapping`, a path; `flip`, a list of our columns; `up`; `pose_shift_s` and
-            `pose_clock_ppm`, numbers, or dictionaries by robot; `heading_from_path`,
-            `same_clock`; of a bag `pose` and `command` (lists of topics), `receive_stamps`,
-            `wheelbase_m`, `full_duty`.
+            `mapping`, a path; `flip`, a list of our columns, or lists by robot; `up`;
+            `pose_shift_s` and `pose_clock_ppm`, numbers, or dictionaries by robot;
+            `heading_from_path`, `same_clock`; of a bag `pose` and `command` (lists of
+            topics), `receive_stamps`, `wheelbase_m`, `full_duty`.
 
     Returns:
         A log; its file goes with the object unless it is saved.
@@ -1519,8 +1520,12 @@ def import_log(
         Log(imported.lcmlog: robot 0, 60 s)
     """
     checked("robot_id", robot_id, (Integral, NoneType), "the number of a robot")
-    checked("heading_offset_deg", heading_offset_deg, Real, "an angle in degrees")
-    offset_rad = float(np.radians(heading_offset_deg))
+    turn_deg = _of_robots("heading_offset_deg", heading_offset_deg, *OF_ROBOTS)
+    offset_rad = (
+        {robot: float(np.radians(deg)) for robot, deg in turn_deg.items()}
+        if isinstance(turn_deg, Mapping)
+        else float(np.radians(turn_deg))
+    )
     how = ImportOptions(
         robot_id=robot_id, heading_offset_rad=offset_rad, **_import_options(options)
     )
@@ -1548,16 +1553,25 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
     told = {}
     for name in known("option", options, IMPORT_OPTIONS):
         field, kinds, wanted = IMPORT_OPTIONS[name]
-        told[field] = checked(name, options[name], kinds, wanted)
-        if isinstance(told[field], Mapping) and OF_ROBOTS[0] == kinds:
-            for robot, number in told[field].items():
-                checked(f"{name} of {robot!r}", number, Real, "a number")
-                checked(f"{robot!r} in {name}", robot, Integral, "the number of a robot")
+        told[field] = _of_robots(name, options[name], kinds, wanted)
     if "mapping" in told:
         told["mapping"] = Path(told["mapping"])
     if "flips" in told:
-        told["flips"] = frozenset(told["flips"])
+        flips = told["flips"]
+        by_robot = flips if isinstance(flips, Mapping) else {None: flips}
+        told["flips"] = {robot: frozenset(names) for robot, names in by_robot.items()}
     return told
+
+
+def _of_robots(name: str, given: Any, kinds: Any, wanted: str) -> Any:
+    """What is given for all robots, or by robot, once it is known to be of its kind."""
+    checked(name, given, kinds, wanted)
+    if isinstance(given, Mapping) and kinds is not Mapping:
+        of_one, one = (Real, "a number") if Real in kinds else NAMES
+        for robot, own in given.items():
+            checked(f"{name} of {robot!r}", own, of_one, one)
+            checked(f"{robot!r} in {name}", robot, Integral, "the number of a robot")
+    return given
 
 
 def _format(to: str, forms: type[Form]) -> Form:

@@ -156,3 +156,41 @@ def test_commands_are_counted_as_the_table_has_them(imports):
     assert len(robots[1].command_t_s) > 1000
     row = next(line.split() for line in said.splitlines() if " duty " in line)
     assert row == ["1", "duty", "3", "1", "2000", "2000"]
+
+
+def test_rows_without_a_robot_are_left_out_and_counted(imports):
+    (p1, c1), (p2, c2) = _drive(1), _drive(2)
+    right, _ = imports([p1, p2], [c1, c2])
+    poses, commands = pd.concat([p1, p2]).astype(object), pd.concat([c1, c2]).astype(object)
+    poses.iloc[[100, 101, 2500], poses.columns.get_loc("robot_id")] = ""
+    robots, said = imports([poses], [commands])
+    assert "p.csv: 3 rows have no robot_id (the first is row 102); left out." in said
+    for number, gone in ((1, [100, 101]), (2, [500])):
+        assert np.array_equal(robots[number].pose, np.delete(right[number].pose, gone, axis=0))
+        np.testing.assert_array_equal(robots[number].command, right[number].command)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "option"),
+    [
+        (lambda p: p.assign(y_m=-p.y_m, theta_rad=-p.theta_rad), "--flip R02="),
+        (lambda p: p.assign(theta_rad=p.theta_rad - np.pi / 2), "--heading-offset-deg R02=90"),
+    ],
+    ids=["mirrored", "turned"],
+)
+def test_a_mistake_of_one_robot_has_a_remedy_of_that_robot_alone(imports, spoil, option):
+    (p1, c1), (p2, c2) = _drive(1), _drive(2)
+    right, _ = imports([p1, p2], [c1, c2])
+    _, said = imports([p1, spoil(p2)], [c1, c2])
+    assert option in said
+    *_, remedy = re.search(r"import anew with ([^.;]*)", said)[1].split(", or ")
+    robots, said = imports([p1, spoil(p2)], [c1, c2], *shlex.split(remedy))
+    assert "!" not in said
+    _same(robots[1], right[1])
+    np.testing.assert_allclose(robots[2].pose, right[2].pose, atol=1e-6)
+
+
+def test_a_mistake_of_all_robots_has_one_remedy(imports):
+    tables = [(p.assign(y_m=-p.y_m, theta_rad=-p.theta_rad), c) for p, c in map(_drive, (1, 2))]
+    _, said = imports(*zip(*tables, strict=True))
+    assert said.count(" --flip y_m --flip theta_rad.") == 2 and "R02=" not in said

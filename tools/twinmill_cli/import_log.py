@@ -14,7 +14,6 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
 
 if working():  # not for --help
-    import numpy as np
     from rich.console import Console
 
     from twinmill.data.importers.columns import Guess, to_toml
@@ -37,15 +36,33 @@ def _of_robots(option: str, given: list[str] | None) -> dict[int | None, float]:
     sums: dict[int | None, float] = {}
     for text in given or []:
         robot, equals, number = text.rpartition("=")
-        digits = robot.removeprefix("R")
-        if not is_number(number) or (equals and not digits.isdecimal()):
+        if not is_number(number) or (equals and _number_of(robot) is None):
             wrong = f"{text} is no number, and not that of one robot, as R02=0.4 is."
             raise typer.BadParameter(wrong, param_hint=f"'{option}'")
         if not math.isfinite(float(number)):
             raise typer.BadParameter(f"{text} is no finite number.", param_hint=f"'{option}'")
-        key = int(digits) if equals else None
+        key = _number_of(robot) if equals else None
         sums[key] = sums.get(key, 0.0) + float(number)
     return sums
+
+
+def _number_of(robot: str) -> int | None:
+    """Of a robot as R02 or 2; None of other words."""
+    digits = robot.removeprefix("R")
+    return int(digits) if digits.isdecimal() else None
+
+
+def _flips(given: list[str]) -> dict[int | None, frozenset[str]]:
+    """Columns by robot; None stands for all of them."""
+    columns: dict[int | None, frozenset[str]] = {}
+    for text in given:
+        robot, equals, name = text.rpartition("=")
+        key = _number_of(robot) if equals else None
+        if equals and key is None:
+            wrong = f"{text} is no column, and not that of one robot, as R02=y_m is."
+            raise typer.BadParameter(wrong, param_hint="'--flip'")
+        columns[key] = columns.get(key, frozenset()) | {name}
+    return columns
 
 
 def register(app: typer.Typer) -> None:
@@ -154,7 +171,10 @@ def _command(
     ] = None,
     flip: Annotated[
         list[str] | None,
-        typer.Option(metavar="COLUMN", help="Change the sign of one of our columns, as in y_m."),
+        typer.Option(
+            metavar="[ROBOT=]COLUMN",
+            help="Change the sign of one of our columns, as in y_m, or R02=y_m of one robot.",
+        ),
     ] = None,
     up: Annotated[
         str | None,
@@ -179,9 +199,12 @@ def _command(
         ),
     ] = None,
     heading_offset_deg: Annotated[
-        float,
-        typer.Option(help=("From the tracked body's x axis to the robot's front, left positive.")),
-    ] = 0.0,
+        list[str] | None,
+        typer.Option(
+            metavar="[ROBOT=]DEGREES",
+            help="From the tracked body's x axis to the robot's front, left positive; likewise.",
+        ),
+    ] = None,
     path_heading: Annotated[
         bool,
         typer.Option(
@@ -208,6 +231,7 @@ def _command(
     """
     shifts_s = _of_robots("--pose-shift-s", pose_shift_s)
     gains_ppm = _of_robots("--pose-clock-ppm", pose_clock_ppm)
+    turns_deg = _of_robots("--heading-offset-deg", heading_offset_deg)
     if beside:
         raise LogError(
             f"{beside[0]}: stands alone; write the option before each file, or quote the "
@@ -228,7 +252,7 @@ def _command(
         raise LogError("--out is missing: name the log to write.")
     options = ImportOptions(
         mapping=mapping,
-        flips=frozenset(flip or []),
+        flips=_flips(flip or []),
         pose_clock_ppm=gains_ppm,
         pose_topics=tuple(pose or []),
         command_topics=tuple(command or []),
@@ -246,7 +270,7 @@ def _command(
         path_heading=path_heading,
         same_clock=same_clock,
         force=force,
-        heading_offset_rad=float(np.radians(heading_offset_deg)),
+        heading_offset_rad={k: math.radians(deg) for k, deg in turns_deg.items()},
     )
     summary = import_log(
         poses,

@@ -7,7 +7,7 @@ import difflib
 import gzip
 import io
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -135,6 +135,15 @@ class Table:
         index = np.flatnonzero(kept).tolist()
         rows, line = [self.rows[k] for k in index], [self.line[k] for k in index]
         return replace(self, rows=rows, line=line)
+
+    def flipped(self, rows: np.ndarray, columns: Collection[str]) -> "Table":
+        """The numbers of some rows, (rows,) bool, with another sign in some columns."""
+        places = [(k, self.zero.get(n, 0.0)) for k, n in enumerate(self.header) if n in columns]
+        changed = [[*row] for row in self.rows]
+        for row in (changed[k] for k in np.flatnonzero(rows)):
+            for k, zero in places:
+                row[k] = repr(2 * zero - float(row[k])) if is_number(row[k]) else row[k]
+        return replace(self, rows=changed)
 
     def cells(self, column: str) -> list[str]:
         """(rows,) texts of a column.

@@ -127,7 +127,7 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
             notes.append(
                 f"driven straight, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
                 "left of its heading; turn the poses by that (`twinmill import "
-                f"--heading-offset-deg {np.degrees(astray_rad):.0f}`)."
+                f"--heading-offset-deg R{robot.robot_id:02d}={np.degrees(astray_rad):.0f}`)."
             )
     else:
         heading_smooth = np.where(segment < 0, np.nan, 0.0)

@@ -6,6 +6,9 @@ in a sentence with its evidence and its remedy. Effects of physics are no mistak
 or a heading that is a few degrees off are left to the diagnosis.
 """
 
+from collections import Counter
+from dataclasses import replace
+
 import twinmill_native as native
 
 from twinmill.data.checks.clocks import check_lateness
@@ -24,6 +27,7 @@ from twinmill.data.checks.series import (
     check_poses,
     check_track,
 )
+from twinmill.data.checks.words import of_all
 from twinmill.data.track import Track
 
 __all__ = [
@@ -76,7 +80,8 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
         body = body_by_command(model, track.command_kind)
         if body is None:
             continue
-        checked = CheckedTrack(label, track, body)
+        others = sum(name == label for name, _ in tracks) > 1
+        checked = CheckedTrack(label, track, body, others)
         wrong, search, explained = check_commands(checked)
         if explained is None:
             found += wrong
@@ -94,4 +99,15 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
             found += check_foreign(checked, search, explained)
             if not wrong:
                 found += check_lateness(checked, search, explained)
-    return found
+    return _of_all_robots(found, tracks)
+
+
+def _of_all_robots(found: list[InputFinding], tracks: Tracks) -> list[InputFinding]:
+    """Findings, with one remedy for all robots of a log where each of them has the same."""
+    plain = [of_all(f.remedy, f"R{f.robot_id:02d}=") for f in found]
+    robots = Counter(label for label, _ in tracks)
+    alike = Counter((f.log_name, remedy) for f, remedy in zip(found, plain, strict=True))
+    return [
+        replace(f, remedy=remedy) if alike[f.log_name, remedy] == robots[f.log_name] > 1 else f
+        for f, remedy in zip(found, plain, strict=True)
+    ]

@@ -131,7 +131,9 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     alike.sort(key=lambda e: (e.alternative.steps, e.left))
     most = alike[0].alternative.steps + CHECKS.steps
     simplest = [e for e in alike if e.alternative.steps < most][:3]
-    words = [described(e.alternative, track.command_kind, e.turned_rad) for e in simplest]
+    words = [
+        described(e.alternative, track.command_kind, e.turned_rad, checked.own) for e in simplest
+    ]
     of_columns = not all(e.alternative.of_poses for e in simplest)
     return [
         checked.finding(

@@ -47,11 +47,22 @@ class InputFinding:
 
 @dataclass(frozen=True)
 class CheckedTrack:
-    """One robot's track and what its commands do by the model's wheels, (3, 4)."""
+    """One robot's track and what its commands do by the model's wheels, (3, 4).
+
+    Attributes:
+        label: name of its log.
+        beside_others: other robots are in it.
+    """
 
     label: str
     track: Track
     body: np.ndarray
+    beside_others: bool = False
+
+    @property
+    def own(self) -> str:
+        """Before what an option says of this robot alone; empty where it is the only one."""
+        return f"R{self.track.robot_id:02d}=" if self.beside_others else ""
 
     def option(self, name: str) -> str:
         """An option of `twinmill import` up to its number: of this robot, not of all."""

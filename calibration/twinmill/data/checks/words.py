@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """An alternative in words: what is wrong, and the options of `twinmill import` that mend it."""
 
+import re
+
 import numpy as np
 
 from twinmill.data.checks.alternatives import Alternative
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.log import CommandKind
 
+OF_A_ROBOT = re.compile(r"(--flip|--heading-offset-deg)[ =]")
+OF_ITS_TABLE = ", with this robot alone in its tables"
 COLUMNS: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
     "wheel_speed": ("w1_radps", "w2_radps", "w3_radps", "w4_radps"),
@@ -23,10 +27,20 @@ FLIPS = {
 }
 
 
-def described(a: Alternative, kind: CommandKind, turned_rad: float) -> tuple[str, str]:
-    """What is wrong, a clause; and options that put it right."""
+def described(
+    a: Alternative, kind: CommandKind, turned_rad: float, own: str = ""
+) -> tuple[str, str]:
+    """What is wrong, a clause; and options that put it right.
+
+    Args:
+        a: what is wrong.
+        kind: of the commands.
+        turned_rad: angle that goes with it.
+        own: before what an option says of one robot; empty: of all.
+    """
     if a.of_poses:
-        return _of_poses(a, float(np.degrees(turned_rad)))
+        what, options = _of_poses(a, float(np.degrees(turned_rad)))
+        return what, _of_robot(options, own)
     names = COLUMNS[kind]
     what, options = [], []
     if a.place in SIDES and kind != "twist":
@@ -45,7 +59,22 @@ def described(a: Alternative, kind: CommandKind, turned_rad: float) -> tuple[str
         wrong = [names[k] for k, s in enumerate(a.sign) if s < 0]
         what += [f"{name} has the wrong sign" for name in wrong]
     options += [f"--flip {names[k]}" for k, s in enumerate(a.sign) if s < 0]
-    return " and ".join(what), " ".join(options)
+    return " and ".join(what), _of_robot(" ".join(options), own)
+
+
+def _of_robot(options: str, own: str) -> str:
+    """Options that hold for one robot alone, where there are others."""
+    if not own:
+        return options
+    renamed = OF_ITS_TABLE if "--rename" in options else ""
+    return OF_A_ROBOT.sub(rf"\g<1> {own}", options) + renamed
+
+
+def of_all(remedy: str, own: str) -> str:
+    """A remedy of one robot, as it is told where it is that of all."""
+    for option, before in (("--heading-offset-deg", "="), ("", " ")):
+        remedy = remedy.replace(f"{option} {own}", f"{option}{before}")
+    return remedy.replace(OF_ITS_TABLE, "")
 
 
 def _of_poses(a: Alternative, turned_deg: float) -> tuple[str, str]:

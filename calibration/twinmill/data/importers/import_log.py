@@ -2,7 +2,7 @@
 """Makes a log from motion capture exports and command tables of others."""
 
 import hashlib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -52,6 +52,7 @@ SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in leng
 SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
+Flips = frozenset[str] | Mapping[int | None, frozenset[str]]
 OfRobots = float | Mapping[int | None, float]  # of all robots; or by robot_id, None for all
 
 
@@ -65,11 +66,12 @@ class ImportOptions:
             name of a robot's own table or in a bag's topics.
         rename: column in a plain CSV file to column as we name it, or with another unit.
         mapping: file that says which column is what, in place of `rename`.
-        flips: our columns that are to change their sign.
+        flips: our columns that are to change their sign: of all robots, or by robot_id (None: all).
         up: "y" or "z", the axis that an export of Motive or Vicon calls up; None: its default.
         pose_shift_s: added to the stamps of poses; of a robot that is named, to that of all.
         pose_clock_ppm: by which the poses' clock gains on the commands', taken out; likewise.
-        heading_offset_rad: from the tracked body's x axis to the robot's front, left positive.
+        heading_offset_rad: from the tracked body's x axis to the robot's front, left positive;
+            likewise.
         path_heading: take the heading from the path, where positions alone were recorded.
         same_clock: one clock stamped poses and commands: no offset is estimated.
         pose_topics, command_topics: of a ROS bag, one of each for each robot.
@@ -83,11 +85,11 @@ class ImportOptions:
     robots: dict[str, int] = field(default_factory=dict)
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Path | None = None
-    flips: frozenset[str] = frozenset()
+    flips: Flips = frozenset()
     up: str | None = None
     pose_shift_s: OfRobots = 0.0
     pose_clock_ppm: OfRobots = 0.0
-    heading_offset_rad: float = 0.0
+    heading_offset_rad: OfRobots = 0.0
     path_heading: bool = False
     same_clock: bool = False
     pose_topics: tuple[str, ...] = ()
@@ -283,13 +285,15 @@ def _detections(
 
 def _columns(options: ImportOptions, kind: str) -> Columns:
     """How to read the table of poses, or that of commands."""
-    if unknown := options.flips - KNOWN:
+    flips = _by_robot(options.flips)
+    if unknown := frozenset().union(*flips.values()) - KNOWN:
         raise LogError(
             f"--flip {min(unknown)}: is not one of our columns; they are "
             f"{', '.join(sorted(KNOWN))}."
         )
     mapping = read_mapping(options.mapping, kind, KNOWN) if options.mapping else None
-    return Columns(options.rename, mapping, options.flips, options.robot_id, options.robots)
+    of_all = flips.pop(None, frozenset())
+    return Columns(options.rename, mapping, of_all, flips, options.robot_id, options.robots)
 
 
 def explain_columns(
@@ -308,20 +312,24 @@ def _check_names(options: ImportOptions, ids: list[int]) -> None:
             raise LogError(
                 f"--robot {name}={number}: no robot in the files has that name; correct it."
             )
-    of_poses = {"--pose-shift-s": options.pose_shift_s, "--pose-clock-ppm": options.pose_clock_ppm}
+    of_poses = {
+        "--pose-shift-s": options.pose_shift_s,
+        "--pose-clock-ppm": options.pose_clock_ppm,
+        "--heading-offset-deg": options.heading_offset_rad,
+        "--flip": options.flips,
+    }
     for option, given in of_poses.items():
         named = set(given) - {None} if isinstance(given, Mapping) else set()
         if unknown := named - set(ids):
             raise LogError(
-                f"{option} R{min(unknown):02d}={given[min(unknown)]:g}: no robot in the files has "
-                f"that number, they are {', '.join(f'R{k:02d}' for k in sorted(set(ids)))}; "
-                "correct it."
+                f"{option} R{min(unknown):02d}=...: no robot in the files has that number, they "
+                f"are {', '.join(f'R{k:02d}' for k in sorted(set(ids)))}; correct it."
             )
 
 
 def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
     """Poses on the shifted clock, of the body whose x axis is the robot's front."""
-    half = options.heading_offset_rad / 2
+    half = _of(series.robot_id, options.heading_offset_rad) / 2
     turn = np.array([np.cos(half), 0, 0, np.sin(half)])
     return PoseSeries(
         series.robot_id,
@@ -353,6 +361,11 @@ def _on_our_clock(series: PoseSeries, options: ImportOptions) -> np.ndarray:
     gains = 1 + 1e-6 * _of(number, options.pose_clock_ppm)
     since_us = np.round((series.utime_us - first_us) / gains).astype(np.int64)
     return first_us + since_us + round(1e6 * _of(number, options.pose_shift_s))
+
+
+def _by_robot(flips: Flips) -> dict[int | None, frozenset[str]]:
+    """Columns by robot; None: of all."""
+    return dict(flips) if isinstance(flips, Mapping) else {None: flips}
 
 
 def _of(robot_id: int, given: OfRobots) -> float:
@@ -481,8 +494,8 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "wheelbase_m": options.wheelbase_m or 0.0,
                 "full_duty": options.full_duty or 0.0,
                 "mapping": options.mapping.read_text() if options.mapping else "",
-                "flips": sorted(options.flips),
-                "heading_offset_rad": options.heading_offset_rad,
+                "flips": _flips_in_toml(options.flips),
+                "heading_offset_rad": _in_toml(options.heading_offset_rad),
                 "rename": options.rename,
             }
         }
@@ -496,6 +509,15 @@ def _in_toml(given: OfRobots) -> float | dict[str, float]:
     return {"all" if k is None else f"R{k:02d}": value for k, value in given.items()}
 
 
+def _flips_in_toml(flips: Flips) -> list[str]:
+    """Names, those of one robot behind its number."""
+    return sorted(
+        name if k is None else f"R{k:02d}={name}"
+        for k, names in _by_robot(flips).items()
+        for name in names
+    )
+
+
 def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> dict:
     """What import_log returns, by reading the log as everybody else will.
 
@@ -506,7 +528,7 @@ def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> 
         rows: of commands in the sources, by robot.
     """
     warnings = warnings + log.warnings
-    robots, end_s = [], 0.0
+    robots, judged, end_s = [], [], 0.0
     for robot in log.robots.values():
         series = [t for t in (robot.command_t_s, robot.pose_t_s) if len(t)]
         end_s = max(end_s, *(float(t[-1]) for t in series))
@@ -523,7 +545,7 @@ def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> 
             }
         )
         if len(series) == 2 and robot.valid.sum() > 1:
-            warnings += _judged(robot)
+            judged.append(robot)
         elif len(series) == 2:
             warnings.append(
                 f"robot {robot.robot_id}: {robot.valid.sum()} of its {len(robot.pose_t_s)} poses "
@@ -534,22 +556,28 @@ def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> 
         "robots": robots,
         "messages": sum(robot["commands"] + robot["poses"] for robot in robots),
         "duration_s": end_s,
-        "warnings": warnings,
+        "warnings": warnings + _told_of(judged),
     }
 
 
-def _judged(robot: RobotLog) -> list[str]:
+def _told_of(robots: Sequence[RobotLog]) -> list[str]:
     """What was cut, and what is wrong with poses or velocities; a mistake stands alone.
 
     Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
     model to be judged by.
     """
-    found, notes = check_commanded(robot, "") or check_poses(robot, ""), []
-    if not found:
-        track = make_track(robot)
-        tracks = [("", track)]
-        found = [f for f in check_recorded(tracks, None) if f.fatal] or check_driven(tracks, None)
-        found += check_changes(robot, "")
-        notes = [] if any(f.fatal for f in found) else track.notes
-    said = [f"{f.what}: {f.evidence}; {f.remedy}." for f in found]
-    return [f"robot {robot.robot_id}: {words}" for words in (*notes, *said)]
+    found = {r.robot_id: check_commanded(r, "") or check_poses(r, "") for r in robots}
+    cleaned = {r.robot_id: ("", make_track(r)) for r in robots if not found[r.robot_id]}
+    for number, track in cleaned.items():
+        found[number] = [f for f in check_recorded([track], None) if f.fatal]
+    for wrong in check_driven([t for k, t in cleaned.items() if not found[k]], None):
+        found[wrong.robot_id].append(wrong)
+    said = []
+    for robot in robots:
+        number, own, notes = robot.robot_id, found[robot.robot_id], []
+        if number in cleaned:
+            own = [*own, *check_changes(robot, "")]
+            notes = [] if any(f.fatal for f in own) else cleaned[number][1].notes
+        words = (*notes, *(f"{f.what}: {f.evidence}; {f.remedy}." for f in own))
+        said += [f"robot {number}: {word}" for word in words]
+    return said

@@ -51,6 +51,7 @@ class Columns:
 
     Attributes:
         rename, mapping, flips: as there.
+        own_flips: of single robots, by number.
         robot_id: of all rows, for files without that column, or with one name in it.
         robots: robot_id by what stands in that column.
         lacks_robot: what to do about a file without robots, beside adding that column.
@@ -59,6 +60,7 @@ class Columns:
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Mapping | None = None
     flips: frozenset[str] = frozenset()
+    own_flips: dict[int, frozenset[str]] = field(default_factory=dict)
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
     lacks_robot: str = "give --robot-id for a file of one robot"
@@ -205,7 +207,7 @@ def _of_sound_robots(
     Raises:
         CellError: those of no robot can.
     """
-    left_out: list[str] = []
+    table, left_out = _with_own_flips(_with_robots(table), columns), []
     while True:
         try:
             found = read(table, columns)
@@ -219,6 +221,28 @@ def _of_sound_robots(
             continue
         found[0].warnings.extend(left_out)
         return found
+
+
+def _with_robots(table: Table) -> Table:
+    """Without the rows that do not say whose they are."""
+    if not table.has("robot_id"):
+        return table
+    told = np.array([cell.lower() not in LOST for cell in table.cells("robot_id")])
+    if told.all() or not told.any():
+        return table
+    note = (
+        f"{table.name}: {np.count_nonzero(~told)} rows have no robot_id (the first is row "
+        f"{table.line[int((~told).argmax())]}); left out."
+    )
+    return replace(table.where(told), notes=[*table.notes, note])
+
+
+def _with_own_flips(table: Table, columns: Columns) -> Table:
+    """With the signs changed that are wrong in the rows of single robots."""
+    ids = _robot_ids(table, columns)[0] if columns.own_flips else None
+    for number, names in columns.own_flips.items():
+        table = table.flipped(ids == number, names)
+    return table
 
 
 def _input(table: Table, name: str) -> np.ndarray:
