@@ -5,14 +5,14 @@ A number that is constant within a run and differs between runs looks like a pla
 one set of numbers stands for all. It is told first, by what each run tells of it alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import twinmill_native as native
 
-from twinmill.chance import chi2_above
+from twinmill.chance import chi2_above, f_above
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import State, Trial, fitted
 from twinmill.fitting.compare import GOOD
@@ -132,7 +132,9 @@ def of_runs(found: Apart | None) -> bool:
 def runs_with_own(
     opened: Sequence[Opened], first: State, last: Trial, usual: float
 ) -> list[Opened]:
-    """Runs of one robot with numbers of their own, where these tell that they differ; else none.
+    """Runs with numbers of their own, where these tell that they differ; else none.
+
+    Of several robots each run of each has its own; runs differ where all robots do so alike.
 
     Args:
         opened: of the search.
@@ -140,9 +142,8 @@ def runs_with_own(
         last: the final trial, of one set of numbers for all.
         usual: score that is no news.
     """
-    one_robot = len({d.robot_id for d in first.datasets}) == 1
-    enough = len(opened) >= SETTINGS.fewest_robots and all(o.floor for o in opened)
-    if not (one_robot and enough) or last.held_score <= GOOD * usual:
+    logs = {o.measurement.log_sha256 for o in opened}
+    if len(logs) < 2 or not all(o.floor for o in opened) or last.held_score <= GOOD * usual:
         return []
     own = with_own_of_runs(opened)
     numbers = _differing(replace(first, datasets=[o.data for o in own]))
@@ -153,12 +154,14 @@ def tells_more(own: Trial, alike: Trial) -> bool:
     """Whether runs with numbers of their own leave little of what one set for all leaves.
 
     What acts at some commands, at a place or from a moment on makes runs differ, too, if each has
-    its own share of it; but then much is left within them.
+    its own share of it; but then much is left within them. Two runs show least of that.
     """
+    runs = {d.measurement.log_sha256 for d in own.fit.datasets}
+    within = SETTINGS.within_two_runs if len(runs) == 2 else SETTINGS.within_runs
     evidence, without_best, _ = own.fit.against(alike.fit)
     left, before = (max(t.fit.held_square - 1, 0.0) for t in (own, alike))
     beyond = evidence > SETTINGS.passing and without_best > SETTINGS.without_best
-    return beyond and left < SETTINGS.within_runs * before
+    return beyond and left < within * before
 
 
 def middles(fit: ScoreFit, found: Apart) -> list[ParameterEstimate]:
@@ -188,37 +191,71 @@ def _differing(state: State) -> tuple[Differing, ...]:
         return ()
     free = tuple(p for p in state.begun() if not p.name.startswith("base."))
     fit, found = fitted(replace(state, free=free)).fit, []
+    whose, labels = _whose(fit.datasets)
+    robots = [d.robot_id if d.by_run else 0 for d in fit.datasets]
     for name in OWN:
-        values, variances = {}, {}
-        for i, data in enumerate(fit.datasets):
-            own = fit.own_estimates(i).get(name)
-            if own:
-                label = _label(data, values)
-                values[label], variances[label] = own.value, own.std**2
-        if len(values) < 2:
+        own = [fit.own_estimates(i).get(name) for i in range(len(fit.datasets))]
+        told = [(r, w, e) for r, w, e in zip(robots, whose, own, strict=True) if e]
+        if len({w for _, w, _ in told}) < 2:
             continue
-        number = Differing(name, values)
-        size, weight = np.array([*values.values()]), 1 / np.array([*variances.values()])
-        away = float(np.sum(weight * (size - np.average(size, weights=weight)) ** 2))
+        values, away, chance = _of_each(told)
+        number = Differing(name, {labels[w]: value for w, value in values.items()})
         least = LATE_LEAST_S if name == LAG else SETTINGS.spread
-        if chi2_above(away, len(values) - 1) < SETTINGS.odd_chance and number.std > least:
+        if chance < SETTINGS.odd_chance and number.std > least:
             found.append((away, number))
     return tuple(number for _, number in sorted(found, key=lambda f: -f[0]))
 
 
-def _label(data: Trajectory, known: Mapping[str, float]) -> str:
-    """Of the robot or run whose numbers these are; logs of one name are numbered."""
-    if not data.by_run:
-        return f"R{data.robot_id:02d}"
-    name = data.measurement.log_name
-    return f"{name} ({1 + len(known)})" if name in known else name
+def _of_each(
+    told: Sequence[tuple[int, str, ParameterEstimate]],
+) -> tuple[dict[str, float], float, float]:
+    """What each robot or run has of a number that is a sum of a robot's part and a run's.
+
+    Args:
+        told: robot, whose, and estimate; where robots differ, one robot for all.
+
+    Returns:
+        By whose; how far they are from one value, as chi2; and the chance of that if they are one.
+        What robots disagree in beyond their errors makes the runs' parts as unsure.
+    """
+    robots, runs = (list(dict.fromkeys(column)) for column in list(zip(*told, strict=True))[:2])
+    design = np.zeros((len(told), len(robots) + len(runs) - 1))
+    for row, (robot, run, _) in zip(design, told, strict=True):
+        row[robots.index(robot)] = 1
+        if run != runs[0]:
+            row[len(robots) + runs.index(run) - 1] = 1
+    values, stds = np.array([[e.value, e.std] for _, _, e in told]).T
+    whitened = design / stds[:, None]
+    found, *_ = np.linalg.lstsq(whitened, values / stds, rcond=None)
+    parts = np.append(0.0, found[len(robots) :])
+    free, beside = len(runs) - 1, len(told) - design.shape[1]
+    spread = np.linalg.pinv(whitened.T @ whitened)[len(robots) :, len(robots) :]
+    away = float(parts[1:] @ np.linalg.solve(spread, parts[1:]))
+    scale = float(np.sum((values / stds - whitened @ found) ** 2)) / max(beside, 1)
+    one = f_above(away / scale / free, free, beside) if scale > 1 else chi2_above(away, free)
+    middle = float(values.mean())
+    return dict(zip(runs, middle + parts - parts.mean(), strict=True)), away, one
+
+
+def _whose(datasets: Sequence[Trajectory]) -> tuple[list[str], dict[str, str]]:
+    """Key of the robot or run whose numbers each has, and labels; logs of one name are numbered."""
+    if not any(d.by_run for d in datasets):
+        keys = [f"R{d.robot_id:02d}" for d in datasets]
+        return keys, {key: key for key in keys}
+    logs = [d.measurement for d in datasets]
+    keys, labels = [m.log_sha256 for m in logs], {}
+    for key, name in dict(zip(keys, (m.log_name for m in logs), strict=True)).items():
+        labels[key] = f"{name} ({1 + len(labels)})" if name in labels.values() else name
+    return keys, labels
 
 
 def _alike(opened: Sequence[Opened], state: State) -> State:
-    """The same with one set of numbers for all, free."""
+    """The same with one set of numbers for all, free; of runs that differ robots keep gains."""
     middle_s = float(np.mean([m.get(LAG) for m in state.models]))
     models = [_of_all(m, middle_s) for m in state.models]
-    data = [_without_own(d) for d in state.datasets]
+    by_run = any(isinstance(d, Trajectory) and d.by_run for d in state.datasets)
+    kept = GAINS if by_run and len({d.robot_id for d in state.datasets}) > 1 else ()
+    data = [_without_own(d, kept) for d in state.datasets]
     known = {p.name for p in state.free}
     names = [n for n in base_names(models[0], opened) if n not in known]
     free = (*state.begun(), *base_parameters(models[0], names))
@@ -232,7 +269,8 @@ def _of_all(model: native.Model, lag_s: float) -> native.Model:
     return model
 
 
-def _without_own(data: Trajectory) -> Trajectory:
+def _without_own(data: Trajectory, kept: Collection[str]) -> Trajectory:
     if not isinstance(data, Trajectory):
         return data
-    return replace(data, own=tuple(p for p in data.own if p.name not in OWN), by_run=False)
+    own = tuple(p for p in data.own if p.name not in OWN or p.name in kept)
+    return replace(data, own=own, by_run=False)

@@ -181,7 +181,17 @@ def _diagnosed(
     done = search(first, progress, known=usual, begun=course.searches.append)
     course.searches.append(done)
     lags_s = 0.0
-    if not off:
+    runs = [] if off else runs_with_own(known, first, done.last, usual)
+    if runs:
+        progress("looking again, each run with its numbers")
+        own_first = first_state(runs, model_file, {*excluded, *unseen})
+        own_done = search(own_first, progress, known=usual, begun=course.searches.append)
+        if tells_more(own_done.last, done.last):
+            known, first, done = runs, own_first, own_done
+        else:
+            runs = []
+        course.searches.append(done)
+    if not (off or runs):
         progress("looking for robots that differ")
         alone = one_by_one(known, done, progress)
         course.off = off = outliers(alone)
@@ -193,15 +203,6 @@ def _diagnosed(
             progress("looking again without them" if off else "looking again, each with its lag")
             first = first_state(known, model_file, {*excluded, *unseen})
             done = search(first, progress, known=usual, begun=course.searches.append)
-            course.searches.append(done)
-    if not off:
-        own = runs_with_own(known, first, done.last, usual)
-        if own:
-            progress("looking again, each run with its numbers")
-            own_first = first_state(own, model_file, {*excluded, *unseen})
-            own_done = search(own_first, progress, known=usual, begun=course.searches.append)
-            if tells_more(own_done.last, done.last):
-                known, first, done = own, own_first, own_done
             course.searches.append(done)
     progress("looking for what no effect explains")
     course.motion = _concluded(

@@ -153,8 +153,9 @@ class Settings(Numbers):
     camera_spread_in_view: float = number(0.2, "... and over frames with a robot in view")
     resolved: float = number(4.0, "standard errors, from which a robot's difference would be seen")
     within_runs: float = number(
-        0.25, "share of the excess that is left within runs, if they are told to differ"
+        0.25, "share of the excess that is left within runs, if they are told to differ ..."
     )
+    within_two_runs: float = number(0.05, "... or within two, of which numbers take more by chance")
     noisy: float = number(4.0, "times the sensor noise of the others, from which it is said")
 
     # The verdict.

@@ -318,10 +318,10 @@ def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:
 def with_own_of_runs(
     opened: Sequence[Opened], stds: Mapping[str, float] | None = None
 ) -> list[Opened]:
-    """Each run of one robot with a motor lag and gains of its own.
+    """Each run of each robot with a motor lag and gains of its own.
 
     Args:
-        opened: logs of one robot.
+        opened: logs.
         stds: of those that differ among the runs, by name; None: of all, and they are in question.
     """
     return [_with_own_of_run(o, stds) for o in opened]
@@ -334,7 +334,8 @@ def _with_own_of_run(own: Opened, stds: Mapping[str, float] | None) -> Opened:
         usual = p.value if p.name == LAG else 1.0
         std = stds.get(p.name, 0.0) if stds else p.std
         free += [replace(p, usual=usual, std=std)] if std else []
-    return replace(own, data=replace(own.data, own=(*own.data.own, *free), by_run=True))
+    others = tuple(p for p in own.data.own if p.name not in OWN)
+    return replace(own, data=replace(own.data, own=(*others, *free), by_run=True))
 
 
 def with_own_lags(opened: Sequence[Opened], spread_s: float) -> list[Opened]:

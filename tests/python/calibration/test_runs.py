@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs of one robot that differ are told to, and what is of one run is predicted into no other."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -64,6 +65,54 @@ def test_the_middle_of_runs_is_not_written_where_the_model_as_given_predicts_the
     assert written.model.get("base.motor_lag_s") == one_clock_base.model.get("base.motor_lag_s")
     before = compare(runs, one_clock_base).score
     assert compare(runs, written).score == pytest.approx(before) == told.after.score
+
+
+@pytest.mark.parametrize(("at", "share"), [("top_mps", 0.8), ("yaw", 0.85)])
+def test_two_runs_of_one_robot_whose_gains_differ_are_told_to(
+    at, share, tanh_robot, measure, one_clock_base
+):
+    """Place had been blamed: both runs were never at the same one."""
+    usual = tanh_robot()
+    other = replace(usual, **{at: share * getattr(usual, at)})
+    found = diagnose([measure(usual, 306, 40.0), measure(other, 307, 40.0)], one_clock_base)
+    assert found.apart.whose == "runs" and found.sentence.startswith("Runs differ in ")
+    gain = "theta_a1" if at == "top_mps" else "theta_a2"
+    (number,) = [n for n in found.apart.numbers if n.name == gain]
+    first, second = number.values.values()
+    assert second / first == pytest.approx(share, rel=0.02)
+
+
+def fleet(measure, robots):
+    """Measurements of robots by run, which each drive in each of them."""
+    return [
+        replace(
+            own := measure(robot, 360 + 10 * run + k, 25.0),
+            track=replace(own.track, robot_id=k),
+            log_name=f"run{run}.lcmlog",
+            log_sha256=str(run),
+        )
+        for run, row in enumerate(robots)
+        for k, robot in enumerate(row)
+    ]
+
+
+def test_runs_of_four_robots_that_all_are_slower_in_the_second_are_told_to_differ(
+    tanh_robot, measure, one_clock_base
+):
+    """As on a softer floor; each robot alone is as the others."""
+    slower = replace(tanh_robot(), top_mps=0.85 * tanh_robot().top_mps)
+    found = diagnose(fleet(measure, [[tanh_robot()] * 4, [slower] * 4]), one_clock_base)
+    assert found.apart.whose == "runs" and found.robots_off == ()
+    (speed,) = [n for n in found.apart.numbers if n.name == "theta_a1"]
+    assert [*speed.values] == ["run0.lcmlog", "run1.lcmlog"]
+    first, second = speed.values.values()
+    assert second / first == pytest.approx(0.85, abs=0.01)
+
+
+def test_robots_that_differ_alike_in_two_runs_are_told_to(tanh_robot, measure, one_clock_base):
+    row = [tanh_robot(lag_s=s) for s in (0.08, 0.10, 0.12, 0.14)]
+    found = diagnose(fleet(measure, [row, row]), one_clock_base)
+    assert found.apart.whose == "robots" and found.robots_off == ()
 
 
 def test_equal_runs_are_not_told_to_differ(tanh_robot, measure, one_clock_base):
