@@ -54,7 +54,7 @@ from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import catalogue, find_effect
+from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
 from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
 from twinmill.report import detections, show
@@ -929,7 +929,7 @@ class Finding(Shown):
         self._result, self._ranked, self._log = finding, ranked, log
         self.effect, self.score_heldout = finding.effect, ranked.score_heldout
         self.share, self.certainty = finding.share, finding.certainty
-        self.parameters = {e.name.split(".", 1)[-1]: e.value for e in finding.parameters}
+        self.parameters = {key_of(e.name): e.value for e in finding.parameters}
 
     def to_json(self) -> dict:
         """What the diagnosis tells of this effect.
@@ -960,7 +960,7 @@ class Finding(Shown):
             >>> d.best.add_to(tm.Model.load("fitted.toml")).effects
             ['coasting']
         """
-        model, effect = _model(model), self.effect.split("#")[0]
+        model, effect = _model(model), catalogue_name(self.effect)
         if effect in model.effects and not self._result.again:
             raise ValueError(
                 f"{model.name}: has {effect} already, and the model of the diagnosis had not; fit "

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill.data.checks import check_commanded, check_poses, check_tracks
+from twinmill.data.checks import check_commanded, check_poses, check_tracks, clocks
+from twinmill.data.checks.lateness import lateness_of
 from twinmill.data.log import LogError, RobotLog
 from twinmill.data.measurement import load_measurements
 from twinmill.data.track import make_track
@@ -198,6 +199,20 @@ def test_drift_of_the_clocks_is_measured(robot, ppm):
     assert not found[0].fatal
     told, std = (float(w) for w in found[0].evidence.split(" ppm")[0][3:].split(" +- "))
     assert abs(told - ppm) < 4 * std + 20
+
+
+def test_how_late_a_robot_is_is_looked_for_once_in_a_log(robot, monkeypatch):
+    """It is half of the time of the checks; a mistake asks for it, and what is no mistake again."""
+    asked = []
+
+    def counted(search):
+        asked.append(search)
+        return lateness_of(search)
+
+    monkeypatch.setattr(clocks, "lateness_of", counted)
+    pose = robot.pose + np.random.default_rng(1).normal(size=robot.pose.shape) * [0.01, 0.01, 0.06]
+    _findings([replace(robot, pose=pose)])
+    assert len(asked) == 1
 
 
 @pytest.mark.parametrize("late_s", [-3.0, 1.7, 4.4, 6.1])

@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 
 from twinmill.challenge.cases import Case
 from twinmill.challenge.physics import Hidden
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import catalogue, key_of
 
 LARGEST_GROUP = 4
 WITHIN = 1.96  # standard errors: 95 %
@@ -244,7 +244,7 @@ def _estimates(hidden: Hidden, findings: list[Said]) -> list[dict]:
     mine = next((f for f in findings if f.effect == hidden.name), None)
     if mine is None or hidden.kind != "plain":
         return []
-    values = {p["name"].split(".")[-1]: p for p in mine.parameters}
+    values = {key_of(p["name"]): p for p in mine.parameters}
     truth = {name: v for name, v in hidden.values.items() if name in values}
     leading = max(truth, key=lambda name: abs(truth[name]), default=None)
     return [

@@ -10,6 +10,7 @@ from twinmill.model.parameters import (
     GAINS,
     NO_SIZE,
     catalogue_of,
+    instance_of,
     is_local,
     making_late,
     newest_instance,
@@ -87,7 +88,7 @@ def _changes_enough_bits(before: Trial, trial: Trial, settings: Settings) -> boo
     """Whether it changes more detections than clock errors of a few ms and blurred poses do."""
     seen = before.fit.in_view
     least = min(settings.bits, settings.bits_in_view * min(seen, 1 - seen))
-    own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0] in trial.names]
+    own = [e for e in trial.fit.shared_estimates() if instance_of(e.name) in trial.names]
     by_clock = any(e.unit == "s" and abs(e.value) < settings.late_s for e in own)
     by_clock &= any(d.clock_free for d in trial.fit.datasets)
     return trial.fit.changed(before.fit) > least and not by_clock

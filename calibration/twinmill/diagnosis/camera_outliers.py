@@ -11,7 +11,7 @@ from twinmill.diagnosis.outliers import Outlier, middle_and_scale, odd_ones
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import camera_state
-from twinmill.model.parameters import ParameterEstimate
+from twinmill.model.parameters import ParameterEstimate, instance_of
 from twinmill.predict.detection_errors import DetectionComparison, compare_detections
 from twinmill.predict.detections import Detections
 
@@ -95,7 +95,7 @@ def _judge_camera(
     p_value = count * (
         done.rounds[0].p_value(first) if first else t_above(away[robot_id], count - 1)
     )
-    parameters = [e for e in done.last.fit.estimates if e.name.split(".")[0] in done.found]
+    parameters = [e for e in done.last.fit.estimates if instance_of(e.name) in done.found]
     told = f"the detections of its camera err {before:.2f} times as much as they should with the "
     told += f"model of all, those of the others {others:.2f} times; "
     told += (

@@ -15,7 +15,14 @@ from twinmill.data.track import command_at
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import PLACE, TIME
 from twinmill.diagnosis.trials import Trial
-from twinmill.model.parameters import Parameter, effect_names, needing
+from twinmill.model.parameters import (
+    Parameter,
+    catalogue_name,
+    effect_names,
+    instance_of,
+    key_of,
+    needing,
+)
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S
 
@@ -83,7 +90,7 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     fit = trial.fit
     logs = [i for i, d in enumerate(fit.datasets) if isinstance(d, Trajectory)]
     instances = set(effect_names(trial.state.model))
-    named = [(u.parameter.name.split(".")[0], u.parameter.role) for u in fit.unknowns]
+    named = [(instance_of(u.parameter.name), u.parameter.role) for u in fit.unknowns]
     sizes = {
         c: name
         for c, (name, role) in enumerate(named)
@@ -106,7 +113,7 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
     heading = done(("heading", "cos")) + 1j * done(("heading", "sin"))
     for c, instance in sizes.items():
         own = columns[:, c] ** 2 * of_way
-        of_heading = instance.split("#")[0] in needing("heading")
+        of_heading = catalogue_name(instance) in needing("heading")
         if of_heading and abs(own @ heading) > SETTINGS.one_heading * own.sum():
             found[instance] = OneHeading()
     for on, way in [key for key in doing[0] if all(key in d for d in doing)]:
@@ -131,8 +138,8 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
 
 def _may_change(parameter: Parameter, on: str, way: str) -> bool:
     """Whether a change of a number with something tells that it is not one number."""
-    instance, key = parameter.name.split(".", 1)
-    effect = instance.split("#")[0]
+    instance, key = instance_of(parameter.name), key_of(parameter.name)
+    effect = catalogue_name(instance)
     if on == RIM:
         return (effect, key) == (WHEELS, way)
     if on == PLACE and effect in needing("places"):
@@ -204,10 +211,10 @@ def _change(
 
 def _size(trial: Trial, parameter: Parameter) -> float:
     """Distance from neutral of the effect's largest parameter of this unit."""
-    instance, away = parameter.name.split(".")[0], []
+    instance, away = instance_of(parameter.name), []
     for u, value in zip(trial.fit.unknowns, trial.fit.x, strict=True):
         p = u.parameter
         alike = (p.role, p.unit) == (parameter.role, parameter.unit)
-        if alike and p.name.split(".")[0] == instance:
+        if alike and instance_of(p.name) == instance:
             away.append(abs(value - p.usual))
     return max(away)

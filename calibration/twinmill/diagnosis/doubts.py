@@ -28,6 +28,7 @@ from twinmill.model.parameters import (
     catalogue,
     catalogue_of,
     effect_names,
+    key_of,
     lasts_for_a_while,
     late_part,
     needing,
@@ -242,7 +243,7 @@ def _sizes(
     """Each estimate with its entry of the card and its distance from neutral."""
     entry = {p["name"]: p for p in card["parameters"]}
     for e in own:
-        p = entry[e.name.split(".", 1)[1]]
+        p = entry[key_of(e.name)]
         yield e, p, abs(e.value - p["neutral"])
 
 
@@ -686,7 +687,7 @@ def _adjoin(one: Finding, other: Finding) -> bool:
 def _when_s(finding: Finding) -> list[float]:
     """When it begins and, if it does, ends, s since the first command."""
     keys = with_role(finding.effect, "moment")
-    return [e.value for e in finding.parameters if e.name.split(".", 1)[1] in keys]
+    return [e.value for e in finding.parameters if key_of(e.name) in keys]
 
 
 def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict]) -> list[Finding]:
@@ -829,6 +830,4 @@ KINDS = (
 def _lateness_s(finding: Finding) -> float:
     """By how much a finding makes the motion later; 0 where it makes nothing late."""
     part = late_part(finding.effect)
-    return next(
-        (e.value for e in finding.parameters if part and e.name.split(".", 1)[1] == part[1]), 0.0
-    )
+    return next((e.value for e in finding.parameters if part and key_of(e.name) == part[1]), 0.0)

@@ -353,7 +353,7 @@ def _on_own_clocks(diagnosis: Diagnosis) -> list[Opened]:
 
 def _passes(estimate: ParameterEstimate, diagnosis: Diagnosis) -> bool:
     """Whether a number is of an effect that no other run has."""
-    return estimate.name.split(".")[0].split("#")[0] in diagnosis.passing
+    return catalogue_name(estimate.name) in diagnosis.passing
 
 
 def _with_middles(told: Covariance, middle: Sequence[ParameterEstimate]) -> Covariance:
@@ -397,9 +397,9 @@ def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | Non
     moved = diagnosis.model.effects[len(model.effects) :]
     kept = beyond.formula if beyond and beyond.kept else None
     gone = (*(kept.instead_of if kept else ()), *diagnosis.passing)
-    moved = [name for name in moved if name.split("#")[0] not in gone]
+    moved = [name for name in moved if catalogue_name(name) not in gone]
     for effect in dict.fromkeys([*moved, *(f.effect for f in diagnosis.camera), *own_effects]):
-        model.add_effect(effect.split("#")[0])
+        model.add_effect(catalogue_name(effect))
     if kept:
         model.add_effect(EFFECT, kept.equation)
     return model

@@ -31,8 +31,11 @@ from twinmill.model.parameters import (
     LAG_EFFECT,
     NORMAL_95,
     ParameterEstimate,
+    catalogue_name,
     catalogue_of,
     effect_names,
+    instance_of,
+    key_of,
     late_part,
     making_late,
     needing,
@@ -216,7 +219,7 @@ def _does_as_much(this: Round, trial: Trial) -> bool:
 
 def _late_s(model: native.Model) -> float:
     """How late a model is by its lags and delays."""
-    own = [(i, late_part(i.split("#")[0])) for i in effect_names(model)]
+    own = [(i, late_part(catalogue_name(i))) for i in effect_names(model)]
     return model.get(LAG) + sum(model.get(f"{i}.{late[1]}") for i, late in own if late)
 
 
@@ -244,7 +247,7 @@ def _stale_clock(
     if clock_std_s <= 0 or not names & shifts or not all(late_part(n) for n in names):
         return []
     _, key = late_part(finding.effect)
-    late = next(e for e in finding.parameters if e.name.split(".", 1)[1] == key)
+    late = next(e for e in finding.parameters if key_of(e.name) == key)
     if abs(late.value) > SETTINGS.within * np.hypot(late.std, clock_std_s):
         return []
     offset_s = model.get(CLOCK) + late.value
@@ -253,8 +256,8 @@ def _stale_clock(
 
 def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, float]) -> bool:
     """Whether a number that changed did so within the error of the one that the model had."""
-    instance, key = own.name.split(".", 1)
-    name = instance.split("#")[0]
+    instance, key = instance_of(own.name), key_of(own.name)
+    name = catalogue_name(instance)
     card = next(p for p in catalogue_of(model)[name]["parameters"] if p["name"] == key)
     known = stds.get(f"{name}.{key}", 0.0)
     return abs(own.value - card["neutral"]) <= SETTINGS.within * np.hypot(own.std, known)
@@ -423,7 +426,7 @@ def ranking_of(done: Search, found: Sequence[Finding]) -> list[Ranked]:
 
 
 def _ranked(trial: Trial, name: str, *, this: Round, first: float, group: int | None) -> Ranked:
-    own = [e for e in trial.fit.shared_estimates() if e.name.split(".")[0].split("#")[0] == name]
+    own = [e for e in trial.fit.shared_estimates() if catalogue_name(e.name) == name]
     fall = this.before.held_score**2 - trial.held_score**2
     share = float(np.clip(fall / max(first - 1, fall, 1e-9), 0.0, 1.0))
     half = float(trial.evidence / 2)
@@ -464,7 +467,7 @@ def _late_parts(model: native.Model) -> dict[str, list[str]]:
     """Names of what makes a model late: lag, delay, clock."""
     parts = {"lag": [LAG], "delay": [], "clock": []}
     for instance in effect_names(model):
-        if late := late_part(instance.split("#")[0]):
+        if late := late_part(catalogue_name(instance)):
             kind, key = late
             parts[kind].append(f"{instance}.{key}")
     return parts

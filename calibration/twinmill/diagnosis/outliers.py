@@ -25,6 +25,7 @@ from twinmill.model.parameters import (
     Parameter,
     ParameterEstimate,
     catalogue,
+    catalogue_name,
     effect_parameters,
     key_of,
     newest_instance,
@@ -460,7 +461,7 @@ def _plain(robot_id: int, parameters: Sequence[ParameterEstimate]) -> str:
 
 def in_words(parameters: Sequence[ParameterEstimate]) -> str:
     """What the parameters of an effect do to a robot; those that say something."""
-    of_wheels = {e.name.split(".")[1]: e.value for e in parameters if _of_wheel(e)}
+    of_wheels = {key_of(e.name): e.value for e in parameters if _of_wheel(e)}
     if words := _side_words(of_wheels) or _odd_wheel_words(of_wheels):
         return words
     told = [e for e in parameters if abs(_away(e)) > max(2 * e.std, _least(e))]
@@ -468,7 +469,7 @@ def in_words(parameters: Sequence[ParameterEstimate]) -> str:
     gains = {e.name: e.value - 1 for e in told if e.name in GAINS}
     if gains:
         return " and ".join(_gain_words(gains))
-    wheels = {e.name.split(".")[1]: e.value for e in told if _of_wheel(e)}
+    wheels = {key_of(e.name): e.value for e in told if _of_wheel(e)}
     if wheels:
         return _wheel_words(wheels)
     said: dict[str, list[str]] = {}
@@ -485,7 +486,7 @@ def _away(estimate: ParameterEstimate) -> float:
     """Distance of a value from neutral."""
     if estimate.name in GAINS:
         return estimate.value - 1
-    effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
+    effect, key = catalogue_name(estimate.name), key_of(estimate.name)
     return estimate.value - _entry(effect, key)["neutral"]
 
 
@@ -560,7 +561,7 @@ def _wheel_words(wheels: dict[str, float]) -> str:
 
 
 def _effect_words(estimate: ParameterEstimate) -> str:
-    effect, key = estimate.name.split("#")[0].split(".")[0], estimate.name.split(".")[1]
+    effect, key = catalogue_name(estimate.name), key_of(estimate.name)
     p = _entry(effect, key)
     return p["above" if _away(estimate) > 0 else "below"] or catalogue()[effect]["phrase"]
 

@@ -8,6 +8,7 @@ import numpy as np
 from twinmill.diagnosis.screening import Screened
 from twinmill.diagnosis.settings import Settings
 from twinmill.diagnosis.trials import REFIT, Trial
+from twinmill.model.parameters import catalogue_name
 
 
 @dataclass
@@ -68,7 +69,7 @@ class Search:
 
         Beside a slew limit that is in the model, another one does nothing: so it has no trace.
         """
-        had = {name.split("#")[0] for name in self.last.state.model.effects}
+        had = {catalogue_name(name) for name in self.last.state.model.effects}
         return [(name, why) for name, why in self.without_trace if name not in had]
 
     @property

@@ -19,6 +19,7 @@ from twinmill.model.parameters import (
     Parameter,
     base_lag_is_identifiable,
     base_parameters,
+    catalogue_name,
     catalogue_of,
     effect_names,
     effect_parameters,
@@ -59,7 +60,7 @@ def candidates(state: State) -> list[str]:
     An effect that the model has with numbers that are held can be there once more: they changed.
     """
     model = state.model
-    moved = {p.name.split(".")[0].split("#")[0] for p in state.free}
+    moved = {catalogue_name(p.name) for p in state.free}
     if model.get(LAG) == 0 and base_lag_is_identifiable(model):
         # Without a first lag, a second one is no other than the first.
         moved |= {n for n in making_late("lag") if n != LAG_EFFECT}

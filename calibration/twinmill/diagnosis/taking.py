@@ -25,6 +25,7 @@ from twinmill.model.parameters import (
     catalogue,
     effect_names,
     effect_parameters,
+    instance_of,
     is_local,
     newest_instance,
     phases,
@@ -342,7 +343,7 @@ def _with_equation(
 def _phases_of(model: native.Model) -> list[str]:
     """Names of those of the newest formula."""
     instance = newest_instance(model, EFFECT)
-    return [p.name for p in phases(model) if p.name.split(".")[0] == instance]
+    return [p.name for p in phases(model) if instance_of(p.name) == instance]
 
 
 def _phases_in(formula: Formula) -> list[float]:
@@ -352,7 +353,7 @@ def _phases_in(formula: Formula) -> list[float]:
 def _still_free(fit: ScoreFit, less: native.Model) -> list[Parameter]:
     """What is free in a fit and in a model that lacks some of its effects."""
     lost = {*effect_names(fit.models[0])} - {*effect_names(less)}
-    return [p for p in fit.shared_values if p.name.split(".")[0] not in lost]
+    return [p for p in fit.shared_values if instance_of(p.name) not in lost]
 
 
 def _without(model: native.Model, gone: Sequence[str]) -> native.Model:

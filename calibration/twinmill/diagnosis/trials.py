@@ -16,6 +16,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     all_effect_parameters,
     base_parameters,
+    catalogue_name,
     effect_names,
     effect_parameters,
     is_local,
@@ -204,7 +205,7 @@ def without_effect(trial: Trial, name: str) -> Trial | None:
 
 def _without_effect(trial: Trial, name: str) -> Trial | None:
     names = effect_names(trial.state.model)
-    own = [i for i, n in enumerate(names) if n.split("#")[0] == name]
+    own = [i for i, n in enumerate(names) if catalogue_name(n) == name]
     if not own:
         return None
     models = []

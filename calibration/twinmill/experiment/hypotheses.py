@@ -16,6 +16,7 @@ from twinmill.model.parameters import (
     all_effect_parameters,
     beginning_at_a_moment,
     catalogue_of,
+    key_of,
 )
 from twinmill.predict.modelled_log import ModelledLog
 
@@ -149,7 +150,7 @@ def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> S
 
 def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:
     """Fitted parameters by effect and short name."""
-    return {r.effect: {e.name.split(".", 1)[1]: e.value for e in r.parameters} for r in ranked}
+    return {r.effect: {key_of(e.name): e.value for e in r.parameters} for r in ranked}
 
 
 def _from(names: list[str]) -> str:

@@ -11,7 +11,7 @@ import tomlkit
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import catalogue_of, effect_names
+from twinmill.model.parameters import catalogue_name, catalogue_of, effect_names
 
 HULL_HEIGHT_M = 0.08  # of the body: no model file states it
 WHEEL_SHARE = 0.03  # of the robot's mass, each, as in the twin's own MuJoCo robots
@@ -103,7 +103,7 @@ class RobotModel:
         cards = catalogue_of(self.model)
         found = []
         for instance in effect_names(self.model):
-            card = cards[instance.split("#")[0]]
+            card = cards[catalogue_name(instance)]
             values = {
                 p["name"]: self.model.get(f"{instance}.{p['name']}") for p in card["parameters"]
             }

@@ -16,7 +16,7 @@ from twinmill.diagnosis.trials import REFIT
 from twinmill.export.formula_cpp import in_cpp
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.model_file import ModelError, ModelFile, write_whole
-from twinmill.model.parameters import catalogue, effect_names, words
+from twinmill.model.parameters import catalogue, catalogue_name, effect_names, words
 
 CATALOGUE, TESTS = Path("twin/effects/catalogue"), Path("tests/effects")
 LISTED = "add_executable(test_effects\n"  # in the tests' CMakeLists.txt; the new one follows
@@ -156,7 +156,7 @@ def write_effect(name: str, model_file: ModelFile, instance: str | None, root: P
 
 def _chosen(model_file: ModelFile, instance: str | None) -> str:
     """Of a model's equations the one that is asked for, or the only one."""
-    has = [n for n in effect_names(model_file.model) if n.split("#")[0] == "equation"]
+    has = [n for n in effect_names(model_file.model) if catalogue_name(n) == "equation"]
     if not has:
         raise ModelError(f"{model_file.path.name}: has no equation; `add equation` takes one in.")
     if instance is None and len(has) > 1:

@@ -18,6 +18,7 @@ from twinmill.model.parameters import (
     CLOCK,
     HEADING,
     ParameterEstimate,
+    instance_of,
     starting_angles,
     unevenness,
 )
@@ -268,7 +269,7 @@ def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
 
 def _of(phase: ParameterEstimate) -> str:
     """The formula whose phase it is."""
-    return phase.name.split(".")[0]
+    return instance_of(phase.name)
 
 
 def comparison(

@@ -7,7 +7,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelError
-from twinmill.model.parameters import effect_names, phases, words
+from twinmill.model.parameters import catalogue_name, effect_names, instance_of, phases, words
 from twinmill.predict.datasets import ErrorDataset, Trajectory, errors_of
 
 EQUATION = "equation"
@@ -60,7 +60,7 @@ def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[s
         named = [p for p in ("p0", "p1", "p2", "p3") if p in words(" ".join(texts.values()))]
         if named and not any(m.get(f"{name}.{p}") for m in models for p in named):
             continue
-        if any(p.name.split(".")[0] == name for p in phases(models[0])):
+        if any(instance_of(p.name) == name for p in phases(models[0])):
             continue
         if not any(_acts(d, m, name) for d, m in zip(data, models, strict=True)):
             found.append(
@@ -76,7 +76,7 @@ def unseen(data: ErrorDataset, model: native.Model) -> list[str]:
     At the best moment of its period it must bring more than the best of so many would by chance.
     """
     found = []
-    own = [p.name.split(".")[0] for p in phases(model)] if isinstance(data, Trajectory) else []
+    own = [instance_of(p.name) for p in phases(model)] if isinstance(data, Trajectory) else []
     for name in dict.fromkeys(own):
         without, with_it = (np.sum(errors_of(data, m) ** 2) for m in (_without(model, name), model))
         if data.n_eff.sum() * np.log(without / with_it) < SHOWN:
@@ -107,4 +107,4 @@ def _acts(data: ErrorDataset, model: native.Model, name: str) -> bool:
 def _equations(model: native.Model) -> dict[str, dict[str, str]]:
     """Texts of a model's formulas by name."""
     pairs = zip(effect_names(model), model.texts, strict=True)
-    return {name: texts for name, texts in pairs if name.split("#")[0] == EQUATION}
+    return {name: texts for name, texts in pairs if catalogue_name(name) == EQUATION}

@@ -27,6 +27,8 @@ from twinmill.model.parameters import (
     Parameter,
     ParameterEstimate,
     acting_by_wheel_angle,
+    catalogue_name,
+    instance_of,
     is_local,
     lasts_for_a_while,
     phases,
@@ -155,10 +157,10 @@ class ScoreFit:
         """
         held: set[int] = set()
         counted: set[int | None] = set()  # robots with sizes of their own; None: all
-        shared = {p.name.split(".")[0] for p in self.shared}
+        shared = {instance_of(p.name) for p in self.shared}
         for i, (d, model) in enumerate(zip(self.datasets, self.models, strict=True)):
             acting = set(acting_by_wheel_angle(model))
-            own = acting & {p.name.split(".")[0] for p in d.own}
+            own = acting & {instance_of(p.name) for p in d.own}
             whose = None if acting & shared else d.robot_id
             first = bool(acting & shared or own) and whose not in counted
             if first or not acting:
@@ -291,7 +293,7 @@ class ScoreFit:
         What is a limit alone has no slope where nothing reaches it: a fit that begins there stays
         there.
         """
-        if self._angles and any(p.name.split(".")[0] in self._by_angle for p in fresh):
+        if self._angles and any(instance_of(p.name) in self._by_angle for p in fresh):
             self._begin_with_one(fresh)
             return
         roles = {p.name: p.role for p in fresh if p.role not in NO_SIZE}
@@ -302,8 +304,8 @@ class ScoreFit:
             return
         away = self.x - self.usual
         points = [np.where(new, self.usual + s * away, self.x) for s in STARTS]
-        instances = {p.name.split(".")[0] for p in fresh}
-        if any(self.unknowns[c].parameter.name.split(".")[0] in instances for c in self._phases):
+        instances = {instance_of(p.name) for p in fresh}
+        if any(instance_of(self.unknowns[c].parameter.name) in instances for c in self._phases):
             points = [self._with_best_phases(point) for point in points]
         self._begin_at(points)
 
@@ -454,8 +456,8 @@ class ScoreFit:
 
     def _own_to(self, kind: Callable[[str], bool]) -> np.ndarray:
         """(P,) bool: of an effect of this kind."""
-        instances = [u.parameter.name.split(".")[0] for u in self.unknowns]
-        return np.array([kind(i.split("#")[0]) for i in instances], bool)
+        instances = [instance_of(u.parameter.name) for u in self.unknowns]
+        return np.array([kind(catalogue_name(i)) for i in instances], bool)
 
     @cached_property
     def held_out(self) -> list[np.ndarray]:
@@ -733,7 +735,7 @@ class ScoreFit:
         roles = {
             c: u.parameter.role
             for c, u in enumerate(self.unknowns)
-            if u.parameter.name.split(".")[0] == instance
+            if instance_of(u.parameter.name) == instance
         }
         own = [c for c, role in roles.items() if role == "size"]
         if not own or "limit" in roles.values():

@@ -16,7 +16,13 @@ import twinmill_native as native
 
 from twinmill.files import replacing
 from twinmill.model.covariance import Covariance
-from twinmill.model.parameters import LAG_EFFECT, ParameterEstimate, catalogue_of, effect_names
+from twinmill.model.parameters import (
+    LAG_EFFECT,
+    ParameterEstimate,
+    catalogue_name,
+    catalogue_of,
+    effect_names,
+)
 
 UNSURE = 0.05  # share of a speed: one that is told worse may be anything
 
@@ -335,7 +341,7 @@ def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     instances = zip(effect_names(fitted.model), fitted.model.texts, strict=True)
     for i, (instance, texts) in enumerate(instances):
         table = tomlkit.table() if i >= len(old) else old[i]
-        name = instance.split("#")[0]
+        name = catalogue_name(instance)
         table["name"] = name
         table.update({key: text for key, text in texts.items() if text})
         keys = [p["name"] for p in entries[name]["parameters"]]

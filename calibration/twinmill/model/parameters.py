@@ -181,7 +181,7 @@ def acting_by_wheel_angle(model: native.Model) -> list[str]:
     return [
         instance
         for instance, texts in zip(effect_names(model), model.texts, strict=True)
-        if instance.split("#")[0] in phased or any("angle" in words(t) for t in texts.values())
+        if catalogue_name(instance) in phased or any("angle" in words(t) for t in texts.values())
     ]
 
 
@@ -242,7 +242,7 @@ def take_alignment(model: native.Model, of: native.Model) -> None:
     texts = dict(zip(effect_names(of), of.texts, strict=True))
     own = dict(zip(effect_names(model), model.texts, strict=True))
     alike = {name for name, text in own.items() if texts.get(name) == text}
-    known = [p.name for p in phases(model) if p.name.split(".")[0] in alike]
+    known = [p.name for p in phases(model) if instance_of(p.name) in alike]
     for name in (*ALIGNMENT, *known):
         model.set(name, of.get(name))
 
@@ -253,7 +253,7 @@ def unevenness(model: native.Model, wheel: str) -> float:
     own = [
         model.get(f"{instance}.{p['name']}")
         for instance in acting_by_wheel_angle(model)
-        for p in cards[instance.split("#")[0]]["parameters"]
+        for p in cards[catalogue_name(instance)]["parameters"]
         if p["name"].startswith(f"{wheel}_")
     ]
     return math.hypot(*own)
@@ -327,7 +327,7 @@ def newest_instance(model: native.Model, effect: str) -> str:
     Raises:
         IndexError: the model has none.
     """
-    return [n for n in effect_names(model) if n.split("#")[0] == effect][-1]
+    return [n for n in effect_names(model) if catalogue_name(n) == effect][-1]
 
 
 def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter]:
@@ -364,7 +364,7 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
     in the model.
     """
     place = effect_names(model).index(instance)
-    texts, name = model.texts[place], instance.split("#")[0]
+    texts, name = model.texts[place], catalogue_name(instance)
     own = _phase_keys(texts)
     found = []
     for p in catalogue_of(model)[name]["parameters"]:
@@ -405,7 +405,7 @@ def all_effect_parameters(
     return [
         p
         for instance in effect_names(model)
-        if catalogue()[instance.split("#")[0]]["stage"] in stages
+        if catalogue()[catalogue_name(instance)]["stage"] in stages
         for p in effect_parameters(model, instance)
     ]
 

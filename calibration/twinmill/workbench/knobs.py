@@ -14,8 +14,11 @@ from twinmill.model.parameters import (
     Parameter,
     all_effect_parameters,
     base_parameters,
+    catalogue_name,
     catalogue_of,
     effect_names,
+    instance_of,
+    key_of,
 )
 
 WITHIN_95 = 1.96
@@ -82,13 +85,11 @@ def knobs(model_file: ModelFile, told: ModelFile, opened: Sequence[Opened]) -> l
     intervals = _intervals(told)
     base = [_knob(p, "base", intervals, p.name in names) for p in base_parameters(model, names)]
     others = [_knob(p, "base", intervals, False) for p in base_parameters(model, rest)]
-    effects = [
-        _knob(p, p.name.split(".")[0], intervals, True) for p in all_effect_parameters(model)
-    ]
+    effects = [_knob(p, instance_of(p.name), intervals, True) for p in all_effect_parameters(model)]
     words = {
         f"{instance}.{p['name']}": p["doc"]
         for instance in effect_names(model)
-        for p in catalogue_of(model)[instance.split("#")[0]]["parameters"]
+        for p in catalogue_of(model)[catalogue_name(instance)]["parameters"]
     }
     known = {**BASE_WORDS, **words}
     return [_worded(k, known.get(k.name, "")) for k in [*base, *effects, *others]]
@@ -108,7 +109,7 @@ def _knob(
         reach = max(0.1, 1.5 * spread)
     middle = [p.value, *(interval or ())] if group == "base" else [p.value, p.usual]
     low, high = max(p.min, min(middle) - reach), min(p.max, max(middle) + reach)
-    label = p.words or p.name.split(".", 1)[1]
+    label = p.words or key_of(p.name)
     return Knob(
         p.name, p.unit, group, label, p.words, p.value, low, high, p.min, p.max, interval, fitted
     )

@@ -6,9 +6,11 @@ left to one factor per channel. Each mistake gives another direction. All are fi
 stretch of the log and judged on the others.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations, product
+from typing import TypeVar
 
 import numpy as np
 import twinmill_native as native
@@ -25,6 +27,7 @@ from twinmill.data.checks.motion import (
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.clock import place_of_least
 
+Told = TypeVar("Told")
 NEGLIGIBLE = 1e-4  # share of the largest channel's squared speed: no unit is told from it
 LEVERS_M = (0.05, 0.3)  # turning (rad/s) is weighed against moving (m/s) by the wheels' lever
 TWIST_LEVER_M = 0.2  # where there are no wheels
@@ -173,7 +176,14 @@ class Search:
         self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
         self._own_key: list[tuple[float, float]] = []
+        self._told: dict[Callable, object] = {}
         self._sums_by_shift: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+
+    def once(self, tell: Callable[["Search"], Told]) -> Told:
+        """What `tell` says of this search; several ask, and it takes long."""
+        if tell not in self._told:
+            self._told[tell] = tell(self)
+        return self._told[tell]
 
     def _by_block(self, rows: np.ndarray, other: np.ndarray) -> np.ndarray:
         """(B, SHAPES, 4, n) sums over stretches of products of (K, SHAPES, 4) with (K, ..., n)."""

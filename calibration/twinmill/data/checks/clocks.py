@@ -31,7 +31,7 @@ def stepped(
     checked: CheckedTrack, search: Search, own: Explained, best: Explained
 ) -> InputFinding | None:
     """A step of the poses against the commands, where it explains more than any other mistake."""
-    late = lateness_of(search)
+    late = search.once(lateness_of)
     if late and _is_no_clock(checked, late) and _left_moved(search, late) < best.left:
         return _of_lateness(checked, search, own, late)
     far = Search(search.motion, search.wheels, search.felt, FAR_S)
@@ -122,7 +122,7 @@ def check_lateness(checked: CheckedTrack, search: Search, own: Explained) -> lis
     """Commands that act later or sooner at some times than at others, or clocks that run apart."""
     if own.left > CHECKS.drift_left:
         return []
-    late = lateness_of(search)
+    late = search.once(lateness_of)
     if late and _is_no_clock(checked, late):
         return [_of_lateness(checked, search, own, late)]
     if checked.track.same_clock or np.ptp(search.motion.t_s) < CHECKS.drift_span_s:

@@ -9,7 +9,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import NO_SIZE, NORMAL_95, catalogue_of, effect_names
+from twinmill.model.parameters import NO_SIZE, NORMAL_95, catalogue_name, catalogue_of, effect_names
 from twinmill.model.ranges import Quantity, ranges
 from twinmill.swarm.matters.hidden import Hidden
 from twinmill.swarm.model_text import for_all_robots, with_effect, with_robot, with_values
@@ -96,14 +96,14 @@ def factors(
 
 def neutral(model: native.Model, instance: str) -> dict[str, float]:
     """Values at which an effect of the model does nothing, by parameter."""
-    parameters = catalogue_of(model)[instance.split("#")[0]]["parameters"]
+    parameters = catalogue_of(model)[catalogue_name(instance)]["parameters"]
     return {p["name"]: p["neutral"] for p in parameters if p["role"] not in NO_SIZE}
 
 
 def _effects(file: ModelFile) -> list[Factor]:
     found = []
     for instance in effect_names(file.model):
-        if catalogue_of(file.model)[instance.split("#")[0]]["stage"] == "observe":
+        if catalogue_of(file.model)[catalogue_name(instance)]["stage"] == "observe":
             continue
         off = neutral(file.model, instance)
         named = _named(instance, off)
