@@ -195,7 +195,8 @@ def _differing(state: State) -> tuple[Differing, ...]:
     robots = [d.robot_id if d.by_run else 0 for d in fit.datasets]
     for name in OWN:
         own = [fit.own_estimates(i).get(name) for i in range(len(fit.datasets))]
-        told = [(r, w, e) for r, w, e in zip(robots, whose, own, strict=True) if e]
+        by_both = {(r, w): e for r, w, e in zip(robots, whose, own, strict=True) if e}
+        told = [(*both, e) for both, e in by_both.items()]
         if len({w for _, w, _ in told}) < 2:
             continue
         values, away, chance = _of_each(told)
@@ -216,7 +217,8 @@ def _of_each(
 
     Returns:
         By whose; how far they are from one value, as chi2; and the chance of that if they are one.
-        What robots disagree in beyond their errors makes the runs' parts as unsure.
+        What robots disagree in beyond their errors makes the runs' parts as unsure; where each
+        robot has a run of its own, what is the robot's and what is the run's are not told apart.
     """
     robots, runs = (list(dict.fromkeys(column)) for column in list(zip(*told, strict=True))[:2])
     design = np.zeros((len(told), len(robots) + len(runs) - 1))
@@ -224,17 +226,20 @@ def _of_each(
         row[robots.index(robot)] = 1
         if run != runs[0]:
             row[len(robots) + runs.index(run) - 1] = 1
+    free, beside = len(runs) - 1, len(told) - design.shape[1]
+    told_apart = len(robots) == 1 or beside > 0
+    if not told_apart or np.linalg.matrix_rank(design) < design.shape[1]:
+        return {run: e.value for _, run, e in told}, 0.0, 1.0
     values, stds = np.array([[e.value, e.std] for _, _, e in told]).T
     whitened = design / stds[:, None]
     found, *_ = np.linalg.lstsq(whitened, values / stds, rcond=None)
     parts = np.append(0.0, found[len(robots) :])
-    free, beside = len(runs) - 1, len(told) - design.shape[1]
-    spread = np.linalg.pinv(whitened.T @ whitened)[len(robots) :, len(robots) :]
+    spread = np.linalg.inv(whitened.T @ whitened)[len(robots) :, len(robots) :]
     away = float(parts[1:] @ np.linalg.solve(spread, parts[1:]))
     scale = float(np.sum((values / stds - whitened @ found) ** 2)) / max(beside, 1)
     one = f_above(away / scale / free, free, beside) if scale > 1 else chi2_above(away, free)
-    middle = float(values.mean())
-    return dict(zip(runs, middle + parts - parts.mean(), strict=True)), away, one
+    by_whose = dict(zip(runs, values.mean() + parts - parts.mean(), strict=True))
+    return by_whose, away, one
 
 
 def _whose(datasets: Sequence[Trajectory]) -> tuple[list[str], dict[str, str]]:
