@@ -33,6 +33,9 @@ TOLD = 0.5  # of the usual way: where as much is predicted and it stands, a robo
 HELD_S = 2.0  # ... if that lasts
 HARDLY = 0.05  # share of the way: events that all change it by less must be twice as many
 
+NEAR_S = 0.3  # from a change of the command ...
+CHANGES = 0.2  # ... of so much of the largest command: a moment is at it
+
 EVEN = 4  # moments, of which the times between are a few tenths of a second from one period
 EVEN_S = 0.4
 
@@ -63,6 +66,7 @@ class Moment:
         t_s: capture's clock, when it begins.
         way: share of the predicted way that was gone in the half second within it that is farthest
             off; negative if backwards, NaN where hardly any was predicted.
+        at_change: it is one of moments that all are at changes of the command.
         what: it went "less" or "more" of the way, "back", "elsewhere" if more of the miss is across
             the way than along it, or moved "unasked".
     """
@@ -72,6 +76,7 @@ class Moment:
     t_s: float
     way: float
     what: What
+    at_change: bool = False
 
     def to_json(self) -> dict:
         """Fields of JSON output."""
@@ -104,6 +109,11 @@ class Events:
 
     moments: tuple[Moment, ...] = ()
     later: tuple[Later, ...] = ()
+
+    @property
+    def at_changes(self) -> bool:
+        """All moments are at changes of the command: what acts at each of these may be them."""
+        return bool(self.moments) and all(m.at_change for m in self.moments)
 
     @property
     def sentence(self) -> str:
@@ -151,9 +161,32 @@ def _of_log(own: Opened, errors: np.ndarray, events: Sequence[np.ndarray]) -> li
     if faint and _weight(events, data.start_s) < 2 * SETTINGS.several:
         return []
     name, robot_id = data.measurement.log_name, data.measurement.track.robot_id
+    begins_s = [_begin_s(data, errors, e) for e in events]
+    at = _at_changes(own, np.array(begins_s))
     return [
-        Moment(name, robot_id, _begin_s(data, errors, e), *_done(data, errors, e)) for e in events
+        Moment(name, robot_id, begin_s, *_done(data, errors, e), at)
+        for begin_s, e in zip(begins_s, events, strict=True)
     ]
+
+
+def _at_changes(own: Opened, begins_s: np.ndarray) -> bool:
+    """Whether all events begin at changes of the command, by more than chance.
+
+    Args:
+        own: the log.
+        begins_s: of events, capture's clock.
+    """
+    track = own.data.measurement.track
+    share = track.command / np.maximum(np.abs(track.command).max(axis=0), 1e-9)
+    way = np.cumsum(np.abs(np.diff(share, axis=0, prepend=share[:1])).max(axis=1))
+
+    def near(t_s: np.ndarray) -> np.ndarray:
+        first, last = (np.searchsorted(track.command_t_s, t_s + s) - 1 for s in (-NEAR_S, NEAR_S))
+        return way[last.clip(0)] - way[first.clip(0)] > CHANGES
+
+    usual = near(np.arange(track.command_t_s[0], track.command_t_s[-1], NEAR_S / 2)).mean()
+    at = near(begins_s - own.floor.offset_s)
+    return bool(at.all() and usual ** len(begins_s) < SETTINGS.dependence_chance)
 
 
 def _begin_s(data: Trajectory, errors: np.ndarray, event: np.ndarray) -> float:
@@ -275,7 +308,13 @@ def sentence(moments: Sequence[Moment]) -> str:
     at = f"At {len(moments)} moments ({_listed(moments)})"
     period_s = every_s(moments)
     at += f", one every {period_s:.1f} s as by a clock," if period_s else ""
-    return f"{at} the robot did not follow its commands: {told}."
+    missed = f"{at} the robot did not follow its commands: {told}."
+    if not Events(tuple(moments)).at_changes:
+        return missed
+    return (
+        f"{missed} All are at changes of the command: what is late or lost at each of these, and "
+        "more where the robot is faster, may be there instead."
+    )
 
 
 def every_s(moments: Sequence[Moment]) -> float:

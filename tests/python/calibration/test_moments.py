@@ -12,7 +12,15 @@ from twinmill.diagnosis.doubts import undetermined
 from twinmill.diagnosis.explain import _gained
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.later import Later, later_from
-from twinmill.diagnosis.moments import Moment, _begin_s, _done, held, sentence, to_look_at
+from twinmill.diagnosis.moments import (
+    Moment,
+    _at_changes,
+    _begin_s,
+    _done,
+    held,
+    sentence,
+    to_look_at,
+)
 from twinmill.diagnosis.notes import held_notes
 from twinmill.model.parameters import LAG, ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
@@ -111,6 +119,27 @@ def test_where_a_robot_is_told_to_stand_no_share_of_its_way_is_told():
 def test_the_sentence_says_what_most_moments_have_in_common(done, words):
     told = sentence([Moment("run", 1, 8.0 * k, way, what) for k, (way, what) in enumerate(done)])
     assert words in told
+
+
+@pytest.mark.parametrize(
+    ("begins_s", "told"),
+    [
+        ([4.1, 12.1, 20.2, 28.0], True),
+        ([4.1, 12.1, 20.2, 29.5], False),  # one is not
+        ([4.1, 12.1], False),  # which chance does: a sixth of the time is near a change
+    ],
+)
+def test_moments_that_all_are_at_changes_of_the_command_may_be_what_acts_there(begins_s, told):
+    """A lag that grows with the speed misses most at changes from one fast speed to another."""
+    t_s = 4.0 * np.arange(20)
+    command = np.tile([[0.2, 0, 0], [-0.2, 0, 0]], (10, 1))
+    track = SimpleNamespace(command=command, command_t_s=t_s)
+    data = SimpleNamespace(measurement=SimpleNamespace(track=track))
+    own = SimpleNamespace(data=data, floor=SimpleNamespace(offset_s=0.0))
+    at = _at_changes(own, np.array(begins_s))
+    assert at == told
+    words = sentence([Moment("run", 1, b, 0.7, "less", at) for b in begins_s])
+    assert ("at changes of the command" in words) == told
 
 
 @pytest.mark.parametrize(("what", "asked"), [("elsewhere", True), ("back", True), ("less", False)])
