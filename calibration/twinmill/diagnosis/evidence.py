@@ -11,6 +11,7 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.independence import LONGEST, fresh_of_blocks, told_before
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict.windows import HORIZONS_S
@@ -56,10 +57,11 @@ class Evidence:
         self.weighed(np.ones(len(self._left)))
 
     def _divide(self) -> None:
-        """Of rows that are kept: stretches, blocks that have one sign, and channels."""
-        kept, stretch, block = [], [], []
+        """Of rows that are kept: stretches, blocks of one sign, channels, when they begin."""
+        kept, stretch, block, longest, begin_s = [], [], [], [], []
         self._inside = []  # (W, HORIZONS, 3) of each log: rows that are kept, of these horizons
         first_stretch = first_block = 0
+        after_s = 0.0
         for _, own in self.logs:
             data = own.data
             shape = data.measured.shape
@@ -74,14 +76,33 @@ class Evidence:
             self._inside.append(np.repeat(inside[:, list(HORIZONS), None], shape[2], axis=2))
             stretch.append(np.broadcast_to((first_stretch + at)[:, None, None], shape).ravel())
             block.append(np.broadcast_to((first_block + fine)[:, None, None], shape).ravel())
+            last = np.arange(shape[1]) == LONGEST
+            longest.append(np.broadcast_to(last[:, None], shape).ravel())
+            begin_s.append(np.broadcast_to((start_s + after_s)[:, None, None], shape).ravel())
+            after_s += start_s[-1] + STRETCH_S  # apart from what follows
             first_stretch, first_block = stretch[-1].max() + 1, block[-1].max() + 1
         self.kept = np.concatenate(kept)
         _, self.stretch = np.unique(np.concatenate(stretch)[self.kept], return_inverse=True)
         self.block = np.concatenate(block)[self.kept]
+        self.longest = np.concatenate(longest)[self.kept]
+        self.begin_s = np.concatenate(begin_s)[self.kept]
         channels = [3 * k + own.data.channel for k, (_, own) in enumerate(self.logs)]
         self.channel = np.concatenate(channels)[self.kept]
         edges = np.flatnonzero(np.diff(self.stretch, prepend=-1))
         self.parts = [slice(a, b) for a, b in pairwise([*edges, len(self.stretch)])]
+
+    def fresh(self, own: np.ndarray, after: np.ndarray) -> float:
+        """Share of the evidence of blocks with signs of their own that no block before tells.
+
+        Args:
+            own: (R,) bool, rows that are judged.
+            after: (r,) what is left of these.
+        """
+        longest = self.longest[own]
+        begin_s, window = np.unique(self.begin_s[own][longest], return_inverse=True)
+        made = self.left[own] - after
+        says = np.bincount(window, (made * after)[longest])
+        return fresh_of_blocks(told_before((says - says.mean())[:, None], begin_s)[0], SIGN_S)
 
     def weighed(self, scale: np.ndarray) -> None:
         """Weighs each row (R,) anew."""

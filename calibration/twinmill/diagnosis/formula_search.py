@@ -384,17 +384,25 @@ def _proof(rows: Evidence, chosen: Chosen, half: np.ndarray, *, tests: int) -> P
     chance = 1.0
     if gain > 0:
         errors = np.sum((left / rows.scale[judging]) ** 2)
-        chance = max(_by_signs(np.bincount(block, (x @ numbers) * left)), _by_f(x, left, errors))
+        fresh = rows.fresh(judging, left - x @ numbers)
+        pushes = np.bincount(block, (x @ numbers) * left)
+        chance = max(_by_signs(pushes, fresh), _by_f(x, left, fresh * errors))
     return Proof(chosen, min(1.0, tests * chance), float(gain / max(total, 1e-9)), rows.scale)
 
 
-def _by_signs(pushes: np.ndarray) -> float:
-    """Chance of so large a sum of the blocks' parts if each had a random sign."""
+def _by_signs(pushes: np.ndarray, fresh: float = 1.0) -> float:
+    """Chance of so large a sum of the blocks' parts if each had a random sign.
+
+    Args:
+        pushes: of the blocks.
+        fresh: share of them that no block before tells: of a wander sums are larger by its root.
+    """
+    least = np.sqrt(fresh) * pushes.sum()
     if len(pushes) <= ALL_SIGNS:
         signs = np.array(list(product((1.0, -1.0), repeat=len(pushes))))
-        return float(np.mean(signs @ pushes >= pushes.sum() * (1 - 1e-12)))
+        return float(np.mean(signs @ pushes >= least * (1 - 1e-12)))
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWN, len(pushes)))
-    return float((1 + np.sum(signs @ pushes >= pushes.sum())) / (1 + DRAWN))
+    return float((1 + np.sum(signs @ pushes >= least)) / (1 + DRAWN))
 
 
 def _by_f(x: np.ndarray, left: np.ndarray, errors: float) -> float:

@@ -14,6 +14,7 @@ LONGEST = HORIZONS_S.index(INDEPENDENT_S)
 SURE = 2.0  # standard errors of a correlation of which there is none: below it counts as none
 MOST_SIZE = 3.0  # times the median size: errors beyond are as large
 MOST = 0.9  # correlation with the next prediction
+LATEST = 5  # predictions, up to which a wander is followed
 
 
 def independent_shares(errors: np.ndarray, start_s: np.ndarray) -> np.ndarray:
@@ -31,7 +32,78 @@ def independent_shares(errors: np.ndarray, start_s: np.ndarray) -> np.ndarray:
     alike = _correlations(own, own)
     following, there = _following(start_s)
     again = np.diag(_correlations(own[there], own[following])).clip(0.0, MOST)
-    return (1 - again) / (1 + again) / np.sum(alike**2, axis=0).clip(1.0)
+    return _fresh(again) / np.sum(alike**2, axis=0).clip(1.0)
+
+
+def fresh_shares(errors: np.ndarray, made: np.ndarray, start_s: np.ndarray) -> tuple[float, float]:
+    """Shares of a log's evidence for what explains its errors that are new, and told once.
+
+    What each prediction says of it is the product of what is made and what is left. A slow wander
+    says it again in the next prediction, but not of what comes at each start; and one disturbance
+    says it in several channels. So sums of these products vary by more than if each were new (Newey
+    and West 1987).
+
+    Args:
+        errors: (W, 3) of the longest horizon that are left, over their sizes; NaN where not judged.
+        made: (W, 3) of what was explained.
+        start_s: (W,) ascending begins of the predictions.
+    """
+    each = np.nan_to_num(errors * made)
+    each -= each.mean(axis=0)
+    every = each.sum(axis=1)
+    square, alone = np.mean(every**2), np.sum(np.mean(each**2, axis=0))
+    if square <= 0:
+        return 1.0, 1.0
+    return 1 / (1 + 2 * _again(every, start_s) / square), float(min(alone / square, 1.0))
+
+
+def _again(every: np.ndarray, start_s: np.ndarray) -> float:
+    """Sum of the covariances of (W,) values with those of later predictions, while they are alike.
+
+    The first that is not ends it: those beyond are chance (Geyer 1992).
+    """
+    total = 0.0
+    for later in range(1, LATEST + 1):
+        following, there = _following(start_s, later)
+        alike = float(np.mean(every[there] * every[following])) if len(there) else 0.0
+        if alike <= 0:
+            break
+        total += alike
+    return total
+
+
+def told_before(errors: np.ndarray, start_s: np.ndarray) -> np.ndarray:
+    """(C,) correlation of (W, C) errors of the longest horizon with those before, 0 to MOST."""
+    own = _of_size_one(errors)
+    following, there = _following(start_s)
+    return np.diag(_means(own[there], own[following])[0]).clip(0.0, MOST)
+
+
+def along_the_way(errors: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """(W, 4) errors along the way that was gone, across it, of the heading, and the way it turned.
+
+    A gain that wanders shows in the first and the last, with one sign in whatever direction the
+    robot moves; a push aside and a turn in the others.
+
+    Args:
+        errors: (W, 3) m, m, rad of one horizon; NaN where not judged.
+        moved: (W, 3) displacements.
+    """
+    forward, left, turned = errors.T
+    course = np.arctan2(moved[:, 1], moved[:, 0])
+    c, s = np.cos(course), np.sin(course)
+    along, across = c * forward + s * left, c * left - s * forward
+    return np.column_stack([along, across, turned, turned * np.sign(moved[:, 2])])
+
+
+def fresh_of_blocks(again: float, block_s: float) -> float:
+    """Share that counts of sums over blocks, of a correlation from prediction to prediction."""
+    return float(_fresh(again ** (block_s / INDEPENDENT_S)))
+
+
+def _fresh(again: np.ndarray) -> np.ndarray:
+    """Share that counts of a first-order process of such correlations."""
+    return (1 - again) / (1 + again)
 
 
 def _of_size_one(errors: np.ndarray) -> np.ndarray:
@@ -46,9 +118,9 @@ def _of_size_one(errors: np.ndarray) -> np.ndarray:
     return np.where(middle > 0, cut, np.nan) / size
 
 
-def _following(start_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Predictions that begin as others end, and those others."""
-    wanted_s = start_s + INDEPENDENT_S
+def _following(start_s: np.ndarray, later: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Predictions that begin as others end, or so many later, and those others."""
+    wanted_s = start_s + later * INDEPENDENT_S
     at = np.searchsorted(start_s, wanted_s - EVERY_S / 2)
     there = np.flatnonzero(at < len(start_s))
     there = there[np.abs(start_s[at[there]] - wanted_s[there]) < EVERY_S]
@@ -57,8 +129,13 @@ def _following(start_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _correlations(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(3, 3) of (W, 3) errors of size one; 0 where chance would make so much."""
-    product = a[:, :, None] * b[:, None, :]
-    count = np.isfinite(product).sum(axis=0)
-    mean = np.nansum(product, axis=0) / np.maximum(count, 1)
+    mean, count = _means(a, b)
     chance = SURE / np.sqrt(np.maximum(count * EVERY_S / INDEPENDENT_S, 1))
     return np.where(np.abs(mean) > chance, mean, 0.0)
+
+
+def _means(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(3, 3) mean products of (W, 3) errors, and of how many."""
+    product = a[:, :, None] * b[:, None, :]
+    count = np.isfinite(product).sum(axis=0)
+    return np.nansum(product, axis=0) / np.maximum(count, 1), count
