@@ -43,6 +43,7 @@ from twinmill.diagnosis.notes import (
     is_random,
     lag_notes,
     marker_notes,
+    random_in_words,
     scatters_of,
     time_base_notes,
 )
@@ -417,6 +418,7 @@ def _concluded(
         random,
         () if rest.events.later else unsteady([o.measurement for o in known]),
         own,
+        random_in_words(scatters, [r.noise for r in modelled], model_file.model) if random else "",
     )
     if weighed.verdict == "outside_catalogue":
         rest = rest.with_first(acted_on(findings, rest.least))

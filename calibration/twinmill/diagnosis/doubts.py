@@ -695,6 +695,7 @@ def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict])
 
     A lag is doubtful where much is left at all: something else at changes of the command is late,
     too. Numbers of the base are where they alone were found: they take a part of most that is left.
+    So they are where more is left than they take.
 
     Args:
         found: in the order of worth.
@@ -711,8 +712,9 @@ def beside_more(found: Sequence[Finding], rest: Rest, cards: Mapping[str, dict])
     def judged(finding: Finding) -> Finding:
         if finding.effect == REFIT:
             something = no_noise and rest.share > SETTINGS.nothing_left
+            less = finding.share < rest.share and rest.share > SETTINGS.nothing_left
             why = "something else is left, a part of which these numbers may stand for"
-            return doubted(finding, why) if alone and something else finding
+            return doubted(finding, why) if (alone and something) or less else finding
         if rest.share > taken and no_noise:
             why = "more is left than it takes, so that it may be a part of something else"
             return doubted(finding, why, depends_on=_depends_on(finding.effect))

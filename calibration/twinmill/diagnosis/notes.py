@@ -10,17 +10,19 @@ import twinmill_native as native
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import held, left_out
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.floor import overlapping
 from twinmill.fitting.opening import Opened, of_few_commands
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import HEADING, drives_sideways
 from twinmill.predict.datasets import ErrorDataset, Trajectory
 from twinmill.predict.modelled_log import ModelledLog
-from twinmill.predict.noise import ChannelNoise, Noise
+from twinmill.predict.noise import MEMORY_S, ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S, rms
 
 MOST_TOLD = 3  # stretches
 WHILE = "transient_loss"  # for a while
 NOTABLE = 0.01  # change of a gain that is worth a sentence
+HARDLY_LONGER = 0.95  # of the longest memory that a fit of noise finds: it may be longer
 LEAST_DRIVE = (2e-3, 2e-2)  # m/s, rad/s: no robot follows more regularly
 
 
@@ -83,9 +85,13 @@ def _no_more_than_left(own: Opened) -> Opened:
     """The same over a floor that is nowhere above what its model leaves.
 
     The smooth response is the same all the time: a loss for a while, or a slew, it cannot follow,
-    and has it for noise. What a model explains is none.
+    and has it for noise. What a model explains is none, nor what reaches into a stretch that is
+    left out.
     """
-    left = np.where(own.data.keep[:, None, None], own.data.errors(own.model), np.nan)
+    seen = own.data.keep
+    if not seen.all():
+        seen = seen & ~overlapping(own.data, ~seen)
+    left = np.where(seen[:, None, None], own.data.errors(own.model), np.nan)
     return replace(own, floor=replace(own.floor, rms=np.fmin(own.floor.rms, rms(left))))
 
 
@@ -98,6 +104,30 @@ def is_random(scatters: Sequence[float], score: float) -> bool:
     """
     alone = score <= SETTINGS.level
     return max(scatters) > (SETTINGS.random_alone if alone else SETTINGS.random)
+
+
+def random_in_words(
+    scatters: Sequence[float], noises: Sequence[Noise | None], model: native.Model
+) -> str:
+    """By how much, and for how long, the least regular log is disturbed; empty if that is not told.
+
+    Args:
+        scatters: of each log, as `scatters_of` has them.
+        noises: that each shows.
+        model: that states another noise.
+    """
+    noise = noises[int(np.argmax(scatters))]
+    if noise is None:
+        return ""
+    told = []
+    for own, key, unit in (
+        (noise.position, "drive_mps", "m/s"),
+        (noise.heading, "drive_radps", "rad/s"),
+    ):
+        if own.drive > SETTINGS.irregular * model.get(f"noise.{key}"):
+            more = " or more" if own.memory_s > HARDLY_LONGER * MEMORY_S[1] else ""
+            told.append(f"{own.drive:.2g} {unit} for {own.memory_s:.1g} s{more}")
+    return f"by about {' and '.join(told)} at a time" if told else ""
 
 
 def irregularity_notes(opened: Sequence[Opened], scatters: Sequence[float]) -> list[str]:

@@ -7,7 +7,7 @@ regression of the errors on groups of velocity terms without physics names, each
 that it was not fitted to.
 """
 
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -16,19 +16,26 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.diagnosis.columns import Columns
-from twinmill.diagnosis.finding import Finding
+from twinmill.diagnosis.finding import HARDLY, Finding
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.formula_search import Rival, formula_of
 from twinmill.diagnosis.library import LEFT_OVER, library
 from twinmill.diagnosis.moments import Events, Moment, events_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import COUPLING, PLACE, TIME, Term
+from twinmill.diagnosis.term import COUPLING, PLACE, TIME, WAY, Term
 from twinmill.fitting.boosting import squares
 from twinmill.fitting.compare import GOOD
+from twinmill.fitting.independence import (
+    LONGEST,
+    SURE,
+    along_the_way,
+    fresh_shares,
+    told_before,
+)
 from twinmill.fitting.opening import Opened, thinned
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.predict.datasets import thinning
+from twinmill.predict.datasets import INDEPENDENT_S, Trajectory, thinning
 
 MOST_BLOCKS = 200
 FOLDS = 5
@@ -39,6 +46,8 @@ MOMENTS = "single moments"
 STEADY = ("speed", "turning rate", COUPLING, "direction of rotation")
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
 NOT_LOOKED_AT = "not looked at"
+SLOW = (TIME, WAY, PLACE)  # groups that change slowly along any drive
+FOLLOWS = 4  # numbers over time beyond which a group follows a wander: one formula has no more
 
 
 @dataclass(frozen=True)
@@ -64,6 +73,10 @@ class Tested:
     grams: "Grams"
 
 
+# Share of a test's evidence that counts, of (R,) errors that it leaves and those that it explained.
+Fresh = Callable[[Tested, np.ndarray, np.ndarray], float]
+
+
 @dataclass(frozen=True)
 class Rest:
     """What is left over.
@@ -84,6 +97,8 @@ class Rest:
         again: least share of the squared error of way that comes again at the same places. The
             floor counts it as noise, since it follows from no command.
         proven: a formula for it that blocks which neither chose nor fitted it bear out.
+        wanders: errors tell the next ones, as those of what wanders by itself do, or far more is
+            random than was.
         looked_at: false where the share alone is known.
     """
 
@@ -102,6 +117,7 @@ class Rest:
     likely: bool = False
     family_takes: float = 0.0
     little: bool = False
+    wanders: bool = False
     looked_at: bool = True
 
     def with_findings(self, findings: Sequence[Finding]) -> "Rest":
@@ -114,8 +130,10 @@ class Rest:
         )
 
     def with_first(self, names: Sequence[str]) -> "Rest":
-        """With these before all else that it depends on."""
-        return replace(self, depends_on=list(dict.fromkeys([*names, *self.depends_on])))
+        """With these before all else that it depends on: likely, where nothing else is known."""
+        likely = self.likely or bool(names and not self.depends_on)
+        every = dict.fromkeys([*names, *self.depends_on])
+        return replace(self, depends_on=list(every), likely=likely)
 
     def most_likely(self, names: Sequence[str]) -> "Rest":
         """With what it may depend on, if nothing is known of that."""
@@ -157,8 +175,9 @@ class Rest:
     def on(self) -> str:
         """On what it depends all the time, as `on X and Y`; empty if that is not known."""
         names = [name for name in self.depends_on if name != MOMENTS]
-        if self.likely:
-            return f"most likely on {' or '.join(names)}"
+        if self.likely and names:
+            by_itself = ", or wanders by itself" if self.wanders else ""
+            return f"most likely on {' or '.join(names)}{by_itself}"
         return f"on {' and '.join(names)}" if names else ""
 
     @property
@@ -167,6 +186,8 @@ class Rest:
         if not self.looked_at:
             return NOT_LOOKED_AT
         known = self.depends_on and not self.likely
+        if self.share < HARDLY and not self.again:  # of which no score tells
+            return FEW if self.far else NOISE
         if known or (self.firm and not self.little):
             return FIRM
         return FEW if self.far else NOISE
@@ -317,12 +338,15 @@ def rest_of(
         *([MOMENTS] if events.moments else []),
         *([PLACE] if again else []),
     ]
+    likely = found.likely or bool(events.at_changes and not (found.depends_on or again or proven))
     return replace(
         found,
         share=share,
         firm=firm,
         far=fit.held_square > SETTINGS.no_noise**2,
         little=fit.held_square <= GOOD**2,
+        likely=likely,
+        wanders=random or found.wanders,
         depends_on=_in_order(proven, found, others),
         events=events,
         again=again,
@@ -366,7 +390,9 @@ def _dependences(
 ) -> Rest:
     whole = formulas.products(fit)
     terms = [t for t, seen in zip(formulas.terms, whole.seen, strict=True) if seen]
-    return _verdict(terms, whole.only(whole.seen), whole.total, known, there=there)
+    own, fresh = whole.only(whole.seen), _fresh_of(formulas.logs, whole)
+    found = _verdict(terms, own, whole.total, known, there=there, fresh=fresh)
+    return replace(found, wanders=_wander(formulas.logs, whole))
 
 
 def _verdict(
@@ -376,9 +402,10 @@ def _verdict(
     known: Mapping[str, float],
     *,
     there: bool,
+    fresh: Fresh,
 ) -> Rest:
     """The groups beyond chance; where something is there, else those that stand out."""
-    every = _tested(terms, products)
+    every = _tested(terms, products, fresh)
     left_over = {d.group: d.gain / total for d in every if d.gain > 0}
     news = [d for d in every if d.gain / total > SETTINGS.again * known.get(d.group, 0.0)]
     sure = [d for d in news if d.sure]
@@ -411,22 +438,32 @@ def _standing_out(groups: Sequence[Dependence]) -> list[Dependence]:
     return near if best > SETTINGS.likely and len(near) <= SETTINGS.likely_ones else []
 
 
-def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
+def _tested(
+    terms: list[Term], products: "Products", fresh: Fresh = lambda *_: 1.0
+) -> list[Dependence]:
     """What each group brings, by a family or by one formula, and whether that is beyond chance.
 
     It is if it is more than the largest of all that is tested is under random signs of blocks, each
-    over its own spread there, and if it is evidence enough for one of so many.
+    over its own spread there, and if it is evidence enough for one of so many. What wanders by
+    itself looks like whatever is slow, and goes on wandering beside it: evidence counts by as much
+    as what is left is new from one prediction to the next.
+
+    Args:
+        terms: of the products.
+        products: with what is left.
+        fresh: share of the evidence that counts.
     """
     tested = list(_tests(terms, products))
     if not tested:
         return []
     gains, nulls = _gains(products, tested, 0)
-    sure = gains > 2 * np.log(len(tested) / SETTINGS.dependence_chance)
+    sure = gains > _enough(tested)
     if sure.any():
         _, nulls = _gains(products, tested, FLIPS)
         spread = np.maximum(nulls.std(axis=-1), 1e-12)
         highest = (nulls / spread[..., None]).max(axis=(0, 1))
         sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
+        sure = _beyond_memory(np.where(sure, gains, 0.0), tested, products, fresh)
     best: dict[str, Dependence] = {}
     for of_ridge, beyond in zip(gains, sure, strict=True):
         for test, gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
@@ -435,6 +472,86 @@ def _tested(terms: list[Term], products: "Products") -> list[Dependence]:
             if known is None or (this.sure, gain) > (known.sure, known.gain):
                 best[test.group] = this
     return sorted(best.values(), key=lambda d: -d.gain)
+
+
+def _beyond_memory(
+    gains: np.ndarray, tested: Sequence[Tested], products: "Products", fresh: Fresh
+) -> np.ndarray:
+    """(K, N) bool: of each group the strongest whose new evidence is enough.
+
+    Args:
+        gains: (K, N) of N tests at K ridges; 0 where they may be chance.
+        tested: N tests.
+        products: with what is left.
+        fresh: share of the evidence that counts.
+    """
+    enough = _enough(tested)
+    found, done = np.zeros_like(gains, bool), set()
+    for k, n in sorted(np.argwhere(gains > enough).tolist(), key=lambda at: -gains[tuple(at)]):
+        if tested[n].group in done:
+            continue
+        after = products.left_by(tested[n], RIDGES[k])
+        if gains[k, n] * fresh(tested[n], after, products.left - after) > enough:
+            found[k, n] = True
+            done.add(tested[n].group)
+    return found
+
+
+def _enough(tested: Sequence[Tested]) -> float:
+    """Evidence for one of so many."""
+    return float(2 * np.log(len(tested) / SETTINGS.dependence_chance))
+
+
+def _fresh_of(logs: Sequence[tuple[int, Opened]], products: "Products") -> Fresh:
+    """For errors of the rows of some logs.
+
+    Many numbers over the time of one log follow any wander, and tell nothing. No wander follows
+    what changes within seconds.
+    """
+
+    def fresh(test: Tested, left: np.ndarray, made: np.ndarray) -> float:
+        if test.group not in SLOW:
+            return 1.0
+        if test.group != PLACE and len(logs) == 1 and test.own.sum() > FOLLOWS:
+            return 0.0
+        fell, share = [], []
+        errors = (_errors_of(logs, products, v) for v in (left, made))
+        for (data, own), (_, gone) in zip(*errors, strict=True):
+            new, alone = fresh_shares(own[:, LONGEST], gone[:, LONGEST], data.start_s)
+            fell.append(max(np.nansum(gone * (gone + 2 * own)), 0.0))
+            share.append(new * alone)
+        return float(np.dot(fell, share) / max(sum(fell), 1e-12))
+
+    return fresh
+
+
+def _errors_of(
+    logs: Sequence[tuple[int, Opened]], products: "Products", rows: np.ndarray
+) -> Iterator[tuple[Trajectory, np.ndarray]]:
+    """Each log, and its (W, H, 3) errors; NaN where not judged.
+
+    Args:
+        logs: one after the other in the rows.
+        products: over these rows.
+        rows: (R,) errors as weighted there.
+    """
+    first = 0
+    for _, own in logs:
+        place = slice(first, first + own.data.weight.size)
+        judged = own.data.weight > 0
+        yield own.data, np.where(judged, rows[place].reshape(judged.shape), np.nan)
+        first = place.stop
+
+
+def _wander(logs: Sequence[tuple[int, Opened]], products: "Products") -> bool:
+    """Whether errors tell the next ones by more than chance, in any log."""
+    for data, errors in _errors_of(logs, products, products.left):
+        chance = SURE / np.sqrt(data.covered_s / INDEPENDENT_S)
+        last, size = errors[:, LONGEST], data.weight[:, LONGEST]
+        ways = along_the_way(last / np.where(size > 0, size, np.nan), data.measured[:, LONGEST])
+        if (told_before(ways, data.start_s) > chance).any():
+            return True
+    return False
 
 
 def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
@@ -540,6 +657,7 @@ class Products:
         free: (R, P) what is free, weighted.
 
     Attributes:
+        left: (R,) the errors.
         seen: (T,) columns of which enough is left beside what is free; the others count as 0.
         total: squared errors of all.
     """
@@ -561,7 +679,8 @@ class Products:
         self.fold = np.arange(len(self.parts)) % FOLDS
         self.columns, self.own = columns, np.arange(len(columns))
         self.weight, self.total = weight[:, None], float(left @ left)
-        basis = np.linalg.qr(free)[0]
+        self.left, self.basis = left, np.linalg.qr(free)[0]
+        basis = self.basis
         known = self.weight * np.column_stack([left, basis])
         square, across = (
             np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
@@ -584,6 +703,19 @@ class Products:
         blocks = squares(rows, self.parts)
         self._project(blocks, own, self.across[:, :, some], self.inside)
         return Grams(blocks, self._by_fold(blocks))
+
+    def left_by(self, test: Tested, ridge: float) -> np.ndarray:
+        """(R,) what some columns leave of the errors, fitted to other blocks."""
+        some = self.own[test.own]
+        rows = self.weight * self.columns.some(some) - self.basis @ self.along[:, some]
+        moments = self._by_fold(self.moments[:, test.own])
+        left = self.left.copy()
+        for k, own in enumerate(test.grams.folds):
+            others = test.grams.folds.sum(0) - own + ridge * np.eye(len(own))
+            numbers = np.linalg.solve(others, moments.sum(0) - moments[k])
+            for b in np.flatnonzero(self.fold == k):
+                left[self.parts[b]] -= rows[self.parts[b]] @ numbers
+        return left
 
     def _folds(self, own: np.ndarray) -> np.ndarray:
         """(FOLDS, k, k) of the same, without blocks: of many columns those fill the memory."""

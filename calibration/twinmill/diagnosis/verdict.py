@@ -28,6 +28,7 @@ class VerdictInputs:
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
         random: the motion is so much less regular than the model says that something is there.
+        disturbed_by: by how much at random, in words; empty if that is not told.
         unsteady: what the input tells of commands that act later from some time on, in sentences.
         apart: numbers in which robots or runs differ; None where one set does as well.
     """
@@ -46,6 +47,7 @@ class VerdictInputs:
     random: bool = False
     unsteady: Sequence[str] = ()
     apart: Apart | None = None
+    disturbed_by: str = ""
 
     @property
     def effects(self) -> list[Finding]:
@@ -71,7 +73,7 @@ class VerdictInputs:
             return "ambiguous" if top.group else "effect_missing"
         if self._outside or self.rest.moments or (self.effects and self.score > MISSING):
             return "outside_catalogue"
-        if self.random:
+        if self.random and (self.effects or self._unexplained):
             return "outside_catalogue"
         if self.effects:
             return "cannot_tell"
@@ -233,6 +235,8 @@ class VerdictInputs:
                 f"{misses[0].upper()}{misses[1:]}, and these logs do not tell why: no effect and "
                 f"no formula that was tried takes it.{self._most_likely}"
             )
+        if verdict == "cannot_tell" and self.random:
+            return self._at_random
         if verdict == "cannot_tell" and self.noises:
             return (
                 "Nothing was found that follows from the commands, but the motion is far less "
@@ -268,6 +272,19 @@ class VerdictInputs:
         if verdict in ("effect_missing", "ambiguous"):
             return f"{lacking(of_all(self.findings, self.rest.share))}{self._left}"
         return self._outside_sentence
+
+    @property
+    def _at_random(self) -> str:
+        """The model leaves no more than what is random, of which there is more than it says."""
+        almost = "" if self.last <= GOOD else "almost "
+        by = f" {self.disturbed_by}," if self.disturbed_by else ""
+        on = f"depends most likely on {' or '.join(self.rest.depends_on)}"
+        if_any = f" If that depends on anything, it {on}." if self.rest.depends_on else ""
+        return (
+            f"The model predicts {almost}as well as these logs allow, but the motion is disturbed "
+            f"at random,{by} far more than the model file says. {self._nothing} is missing that "
+            f"these logs would show.{if_any}"
+        )
 
     @property
     def _as_before(self) -> str:
@@ -312,15 +329,17 @@ class VerdictInputs:
 
     @property
     def _continuous(self) -> list[str]:
-        """What the rest depends on all the time; nothing where several may be it."""
+        """What the rest depends on all the time; nothing where several may be it, or none."""
         names = [name for name in self.rest.depends_on if name != MOMENTS]
-        return [] if self.rest.likely and len(names) > 1 else names
+        none = len(names) > 1 or self.rest.wanders
+        return [] if self.rest.likely and none else names
 
     @property
     def _outside_sentence(self) -> str:
         events = self.rest.events.sentence
         if events and not self._outside:
-            return f"What is missing acts at single moments alone. {events}"
+            alone = ", or at changes of the command" if self.rest.events.at_changes else " alone"
+            return f"What is missing acts at single moments{alone}. {events}"
         proven = self._proven_instead
         named = [] if proven else [_plain(f) for f in self.effects]
         named += ["a refit of the base"] if len(self.effects) < len(self.findings) else []
@@ -330,11 +349,13 @@ class VerdictInputs:
             effects = [_named(f) for f in own if f.effect != REFIT]
             also += f" It was found in place of {_in_turn(effects)}."
         depends = self.rest.depends_on and not self.rest.likely
-        if self.noises and not (depends or self.rest.firm):
+        taken = self._taken > self.rest.share
+        if self.noises and not (depends or self.rest.firm or taken):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{self._most_likely}{also}"
         on = self.rest.on
-        depends = f"it depends {on}" if on else "no formula that was tried describes it"
+        by_itself = "it wanders by itself, or " if self.rest.wanders else ""
+        depends = f"it depends {on}" if on else f"{by_itself}no formula that was tried describes it"
         what = f": {proven.equals}" if proven else ""
         return f"Something outside the catalogue is there{what}; {depends}.{also} {events}".rstrip()
 
@@ -396,7 +417,8 @@ def _named(finding: Finding) -> str:
         values = ", ".join(f"{e.short} {e.value:.3g}{e.of_unit}" for e in finding.parameters[:3])
         instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
         share = f"; {takes}" if finding.share >= 0.005 else ""  # else robots' own gains took it
-        return f"{REFIT_IN_WORDS} ({values}{share}){instead}"
+        doubt = ", doubtful" if finding.certainty == "doubtful" else ""
+        return f"{REFIT_IN_WORDS} ({values}{share}{doubt}){instead}"
     name = f"{finding.effect} beside the model's own" if finding.again else finding.effect
     if finding.group:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"

@@ -244,7 +244,7 @@ def _calm(
     calm = _without_bumps(data, response, far, moved)
     if calm.all():
         return response, calm, far
-    near, response = _near(data, ~calm), response.of_windows(calm)
+    near, response = overlapping(data, ~calm), response.of_windows(calm)
     for _ in range(LOOKS):
         hidden = is_far(response.across, response.errors, FLOOR_SETTINGS.bump_part, moved)
         hidden &= calm & near
@@ -265,12 +265,12 @@ def _without_bumps(
     disturbed = is_far(response.across, response.errors, FLOOR_SETTINGS.bump, moved)
     if not disturbed.any() or disturbed.mean() > FLOOR_SETTINGS.most_bumps:
         return np.ones(len(disturbed), bool)
-    parts = far & _near(data, disturbed)
+    parts = far & overlapping(data, disturbed)
     rare = (disturbed | parts).mean() < FLOOR_SETTINGS.rare_bumps
     return ~disturbed & ~parts if rare else ~disturbed
 
 
-def _near(data: Trajectory, disturbed: np.ndarray) -> np.ndarray:
+def overlapping(data: Trajectory, disturbed: np.ndarray) -> np.ndarray:
     """(W,) windows that may overlap one of those that are disturbed."""
     apart_s = np.abs(data.start_s[:, None] - data.start_s[disturbed])
     return apart_s.min(axis=1) < HORIZONS_S[-1]

@@ -522,6 +522,7 @@ def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, to
     monkeypatch.setattr(moments, "later_from", lambda *_: None)
     monkeypatch.setattr(moments, "_begin_s", lambda *_: 0.0)
     monkeypatch.setattr(moments, "_done", lambda *_: (way, "less"))
+    monkeypatch.setattr(moments, "_at_changes", lambda *_: False)
     measurement = SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1))
     nothing = np.zeros((400, 5, 3))
     data = SimpleNamespace(
@@ -1023,6 +1024,14 @@ def test_a_score_that_no_right_model_has_leaves_no_name_sure(score, left, depend
     found = [Finding("heading_bias", None, [], 0.9, "sure")]
     (judged,) = of_no_right_model(found, Rest(left, False, depends_on), score)
     assert judged.certainty == certainty
+
+
+@pytest.mark.parametrize(("left", "certainty"), [(0.07, "doubtful"), (0.03, "sure")])
+def test_numbers_of_the_base_that_take_less_than_is_left_are_doubtful(left, certainty):
+    """A lag that grows with the speed had been a gain of 0.94 beside a lag, surely."""
+    found = [Finding("motor_lag", None, [], 0.9, "sure"), Finding(REFIT, None, [], 0.05, "sure")]
+    _, refit = beside_more(found, Rest(left, False, []), catalogue())
+    assert refit.certainty == certainty
 
 
 def test_beside_much_that_depends_on_something_a_name_is_doubtful():

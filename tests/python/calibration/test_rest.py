@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is left over: errors that come again at their place, irregular motion, single wheels."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +14,7 @@ from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.moments import Events
-from twinmill.diagnosis.notes import irregularity, is_random
+from twinmill.diagnosis.notes import _no_more_than_left, irregularity, is_random
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import FIRM, Dependence, Products, Rest, _standing_out, _tested
 from twinmill.diagnosis.result import Diagnosis
@@ -224,8 +224,65 @@ def test_scatter_far_beyond_the_models_noise_is_something_random(score, scatter,
     noise = ["the unexplained scatter is far above the noise"]
     assert is_random([1.0, scatter], score) == random
     weighed = VerdictInputs(*[score] * 4, [], Rest(1.0, False, []), [], [], noise, 1.0, (), random)
-    assert weighed.verdict == ("outside_catalogue" if random else "cannot_tell")
+    assert weighed.verdict == "cannot_tell"
     assert ("random" in weighed.sentence) == random
+
+
+@pytest.mark.parametrize(
+    ("last", "firm", "verdict", "words"),
+    [
+        (1.02, False, "cannot_tell", "as well as these logs allow, but the motion is disturbed"),
+        (1.2, False, "cannot_tell", "almost as well as these logs allow"),
+        (1.4, False, "outside_catalogue", "Something random disturbs the motion"),
+        (1.4, True, "outside_catalogue", "it wanders by itself, or no formula"),
+    ],
+)
+def test_where_all_that_is_left_is_random_no_physics_is_called_missing(last, firm, verdict, words):
+    left, by = Rest(1.0, firm, [], wanders=True), "by about 0.05 rad/s for 2 s at a time"
+    told = VerdictInputs(
+        *[last] * 4, [], left, [], [], ["irregular"], 1.0, random=True, disturbed_by=by
+    )
+    assert told.verdict == verdict
+    assert words in told.sentence
+    assert (by in told.sentence) == (verdict == "cannot_tell")
+
+
+def test_what_reaches_into_a_stretch_left_out_is_no_random_scatter():
+    """Commands are lost from 31 s to 37 s; of that 32 s to 36 s are left out, errors 50 fold."""
+    start_s = np.arange(0.0, 70.0, EVERY_S)
+    lost = (start_s > 30.5) & (start_s < 37.5)
+    keep = ~((start_s > 32) & (start_s < 36))
+    errors = np.random.default_rng(3).normal(size=(len(start_s), len(HORIZONS_S), 3))
+    errors[lost] *= 50
+    data = SimpleNamespace(keep=keep, start_s=start_s, errors=lambda _: errors)
+    over = Over(data, Floor(np.full(errors.shape[1:], 20.0)))
+    assert _no_more_than_left(over).floor.rms == pytest.approx(1.0, abs=0.2)
+
+
+@dataclass(frozen=True)
+class Floor:
+    rms: np.ndarray
+
+
+@dataclass(frozen=True)
+class Over:
+    data: SimpleNamespace
+    floor: Floor
+    model: None = None
+
+
+@pytest.mark.parametrize(("depends_on", "likely"), [([], True), (["heading"], False)])
+def test_what_a_doubtful_finding_depends_on_is_likely(depends_on, likely):
+    found = Rest(0.4, False, depends_on).with_first(["time"])
+    assert (found.depends_on, found.likely) == (["time", *depends_on], likely)
+
+
+@pytest.mark.parametrize(
+    ("share", "again", "firm"), [(0.0, 0, False), (0.0, 0.2, True), (0.3, 0, True)]
+)
+def test_nothing_is_not_firm(share, again, firm):
+    """But what comes again at its place, which no score shows."""
+    assert (Rest(share, False, ["place"], again=again).certainty == FIRM) == firm
 
 
 def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
@@ -365,7 +422,7 @@ def test_of_what_chance_could_make_the_data_prefer_some(falls, named):
     ("last", "random", "verdict", "words"),
     [
         (1.17, False, "cannot_tell", "do not tell why"),
-        (1.05, True, "outside_catalogue", "random"),
+        (1.05, True, "cannot_tell", "random"),
     ],
 )
 def test_what_is_likely_is_told_as_such_and_makes_no_verdict(last, random, verdict, words):
