@@ -182,10 +182,12 @@ def test_numbers_that_gain_nothing_are_not_written(squares, verdict, later, gain
     start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))
     search = SimpleNamespace(rounds=[start])
     nothing = {"findings": [], "found": [], "lasting": [], "camera": (), "apart": None}
+    before, after = (SimpleNamespace(score=np.sqrt(np.mean(own))) for own in ((1.0,), squares))
     diagnosis = SimpleNamespace(
-        search=search, verdict=verdict, robots=(None,), rest=rest, **nothing
+        search=search, verdict=verdict, robots=(None,), rest=rest, before=before, **nothing
     )
-    assert _gained(diagnosis, fit(squares), None) == gained
+    told = SimpleNamespace(diagnosis=diagnosis, after=after)
+    assert _gained(told, fit(squares), None) == gained
 
 
 @pytest.mark.parametrize(
