@@ -11,10 +11,11 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.independence import LONGEST, fresh_of_blocks, told_before
+from twinmill.fitting.independence import LONGEST, SURE, fresh_of_blocks, told_before
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.predict.windows import HORIZONS_S
+from twinmill.predict.datasets import INDEPENDENT_S
+from twinmill.predict.windows import EVERY_S, HORIZONS_S
 
 STRETCH_S = 8.0  # of one half, before one of the other
 SIGN_S = 4.0  # errors so far apart have signs of their own
@@ -94,6 +95,8 @@ class Evidence:
     def fresh(self, own: np.ndarray, after: np.ndarray) -> float:
         """Share of the evidence of blocks with signs of their own that no block before tells.
 
+        What so few predictions may show by chance counts as nothing.
+
         Args:
             own: (R,) bool, rows that are judged.
             after: (r,) what is left of these.
@@ -102,7 +105,9 @@ class Evidence:
         begin_s, window = np.unique(self.begin_s[own][longest], return_inverse=True)
         made = self.left[own] - after
         says = np.bincount(window, (made * after)[longest])
-        return fresh_of_blocks(told_before((says - says.mean())[:, None], begin_s)[0], SIGN_S)
+        (again,) = told_before((says - says.mean())[:, None], begin_s)
+        chance = SURE / np.sqrt(len(says) * EVERY_S / INDEPENDENT_S)
+        return fresh_of_blocks(again if again > chance else 0.0, SIGN_S)
 
     def weighed(self, scale: np.ndarray) -> None:
         """Weighs each row (R,) anew."""

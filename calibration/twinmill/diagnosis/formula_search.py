@@ -395,14 +395,18 @@ def _by_signs(pushes: np.ndarray, fresh: float = 1.0) -> float:
 
     Args:
         pushes: of the blocks.
-        fresh: share of them that no block before tells: of a wander sums are larger by its root.
+        fresh: share of them that no block before tells, whose signs alone are of their own: the
+            chance of all that is its power of that of n blocks, as 2^-n is.
     """
-    least = np.sqrt(fresh) * pushes.sum()
+    return _of_all_signs(pushes) ** fresh
+
+
+def _of_all_signs(pushes: np.ndarray) -> float:
     if len(pushes) <= ALL_SIGNS:
         signs = np.array(list(product((1.0, -1.0), repeat=len(pushes))))
-        return float(np.mean(signs @ pushes >= least * (1 - 1e-12)))
+        return float(np.mean(signs @ pushes >= pushes.sum() * (1 - 1e-12)))
     signs = np.random.default_rng(1).choice([-1.0, 1.0], (DRAWN, len(pushes)))
-    return float((1 + np.sum(signs @ pushes >= least)) / (1 + DRAWN))
+    return float((1 + np.sum(signs @ pushes >= pushes.sum())) / (1 + DRAWN))
 
 
 def _by_f(x: np.ndarray, left: np.ndarray, errors: float) -> float:

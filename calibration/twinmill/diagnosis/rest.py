@@ -56,12 +56,14 @@ class Dependence:
 
     Attributes:
         own: (T,) bool, the terms of it that bring most.
+        if_new: chance could not, if each prediction told something new.
     """
 
     group: str
     gain: float
     sure: bool
     own: np.ndarray
+    if_new: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ class Rest:
         again: least share of the squared error of way that comes again at the same places. The
             floor counts it as noise, since it follows from no command.
         proven: a formula for it that blocks which neither chose nor fitted it bear out.
+        if_new: something would be beyond chance if each prediction told something new.
         wanders: errors tell the next ones, as those of what wanders by itself do, or far more is
             random than was.
         looked_at: false where the share alone is known.
@@ -117,6 +120,7 @@ class Rest:
     likely: bool = False
     family_takes: float = 0.0
     little: bool = False
+    if_new: bool = False
     wanders: bool = False
     looked_at: bool = True
 
@@ -325,7 +329,7 @@ def rest_of(
     own_logs, models = [whole[i] for i, _ in logs], [fit.models[i] for i, _ in logs]
     events = events_of(own_logs, models)
     again = comes_again(own_logs, models)
-    something = bool(found.depends_on or events.moments or events.later or again)
+    something = bool(found.depends_on or found.if_new or events.moments or events.later or again)
     proven = None
     if without:
         proven = without.formula(fit)
@@ -412,8 +416,9 @@ def _verdict(
     old = tuple(d.group for d in every if d.sure and d not in news)
     likely = _standing_out(news) if there and not sure and not old else []
     groups = likely or _without_redundant(sure, terms, products)
+    if_new = any(d.if_new for d in news)
     if not groups:
-        return Rest(0.0, False, [], left_over=left_over, old=old)
+        return Rest(0.0, False, [], left_over=left_over, old=old, if_new=if_new)
     best, coefficient = _best_term(terms, products, groups[0].group)
     own = np.array([t == best for t in terms])
     takes = float(products.held_out(own) / max(total, 1e-9))
@@ -428,6 +433,7 @@ def _verdict(
         old,
         family_takes=groups[0].gain / max(total, 1e-9),
         likely=bool(likely),
+        if_new=if_new,
     )
 
 
@@ -457,17 +463,19 @@ def _tested(
     if not tested:
         return []
     gains, nulls = _gains(products, tested, 0)
-    sure = gains > _enough(tested)
+    sure = if_new = gains > _enough(tested)
     if sure.any():
         _, nulls = _gains(products, tested, FLIPS)
         spread = np.maximum(nulls.std(axis=-1), 1e-12)
         highest = (nulls / spread[..., None]).max(axis=(0, 1))
-        sure &= gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance)
-        sure = _beyond_memory(np.where(sure, gains, 0.0), tested, products, fresh)
+        if_new = sure & (gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance))
+        sure = _beyond_memory(np.where(if_new, gains, 0.0), tested, products, fresh)
+    apparent = {tested[n].group for n in np.flatnonzero(if_new.any(axis=0))}
     best: dict[str, Dependence] = {}
     for of_ridge, beyond in zip(gains, sure, strict=True):
         for test, gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
-            this = Dependence(test.group, float(gain), bool(is_sure), test.own)
+            group = test.group
+            this = Dependence(group, float(gain), bool(is_sure), test.own, group in apparent)
             known = best.get(test.group)
             if known is None or (this.sure, gain) > (known.sure, known.gain):
                 best[test.group] = this

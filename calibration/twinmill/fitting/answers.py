@@ -29,12 +29,16 @@ class Slope(NamedTuple):
     t: float
     blocks: int
 
+    def beyond(self, chance: float) -> bool:
+        """Whether it is larger than by such a chance where there is none."""
+        return self.t > t_quantile(1 - chance, self.blocks - 1)
+
 
 def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bool:
     """Whether what late commands make a response add goes with errors from before them.
 
     By least squares beside what early commands add; much in one channel, or some in two: a heading
-    that strays moves the place as well.
+    that strays takes the robot aside as well.
 
     Args:
         errors: (W, H, 3) of a physical model's predictions.
@@ -45,10 +49,11 @@ def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bo
     late = added[:, LATE] - added[:, EARLY]
     block = np.floor((start_s - start_s[0]) / BLOCK_S).astype(int)
     slopes = [_slope(left[:, EARLY, c], added[:, EARLY, c], late[:, c], block) for c in range(3)]
-    one = (s.value > LEAST and s.t > t_quantile(1 - CHANCE / 3, s.blocks - 1) for s in slopes)
-    some = sorted((s for s in slopes if s.value > LEAST_OF_TWO), key=lambda s: s.t)[-2:]
-    limit = t_quantile(1 - CHANCE_OF_TWO, min((s.blocks for s in some), default=FEWEST) - 1)
-    return any(one) or (len(some) == 2 and np.mean([s.t for s in some]) > limit)
+    if any(s.value > LEAST and s.beyond(CHANCE / 3) for s in slopes):
+        return True
+    _, aside, turn = slopes
+    both = aside._replace(t=(aside.t + turn.t) / 2)
+    return min(aside.value, turn.value) > LEAST_OF_TWO and both.beyond(CHANCE_OF_TWO)
 
 
 def _slope(y: np.ndarray, beside: np.ndarray, late: np.ndarray, block: np.ndarray) -> Slope:
