@@ -1636,6 +1636,7 @@ def _told(shown: Told, measurements: Measurements) -> Told:
     """The result, with what was found wrong with its logs."""
     mild = [str(f) for f in measurements.findings if not f.fatal]
     shown.left_out = (*measurements.excluded, *mild)
+    shown.input = tuple(finding.to_json() for finding in measurements.findings)
     return shown
 
 

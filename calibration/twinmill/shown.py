@@ -27,10 +27,12 @@ class Shown:
 
     Attributes:
         left_out: sentences on robots and logs that could not be judged, and on what else is odd.
+        input: what is wrong with the logs, as JSON has it; None where no log was judged.
     """
 
     _result: Any
     left_out: tuple[str, ...] = ()
+    input: tuple[dict, ...] | None = None
 
     def to_json(self) -> dict:
         """The same object as `--json` of the command, without how the command was called.
@@ -42,7 +44,8 @@ class Shown:
             >>> found.to_json()["score"] == found.score
             True
         """
-        return plain(self._result.to_json())
+        told = {} if self.input is None else {"input": self.input}
+        return plain({**self._result.to_json(), **told})
 
     def table(self) -> pd.DataFrame:
         """The numbers; each class says which."""

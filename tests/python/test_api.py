@@ -97,7 +97,7 @@ def test_a_comparison_is_that_of_the_command(here, capsys):
     told = json.loads(capsys.readouterr().out)
     found = tm.compare("run.lcmlog", "fitted.toml")
     assert found.to_json().items() <= told.items()
-    beside = {"command", "version", "model_sha256", "report", "input"}
+    beside = {"command", "version", "model_sha256", "report"}
     assert set(told) - set(found.to_json()) == beside
     assert f"{found.score:.3g}" in repr(found)
     assert found.verdict in " ".join(str(found).split())

@@ -339,7 +339,7 @@ def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
     of_all = spread_of_lags_s(alone) > 0 and best_name != LAG_EFFECT
     if of_all and lag.fit.held_cost < (best or own.before).fit.held_cost - SETTINGS.tie:
         return None
-    if best is None:
+    if best is None or _stands_out(best.held_score, alone):
         return _unexplained(own, alone)
     parameters = _estimates(best)
     after = best.held_score
@@ -416,15 +416,26 @@ def _estimates(trial: Trial) -> list[ParameterEstimate]:
     ]
 
 
+def _usual(alone: Sequence[Alone]) -> tuple[float, float]:
+    """Median and scale of the logarithm of the robots' scores."""
+    return middle_and_scale([np.log(max(a.before.held_score, 1.0)) for a in alone])
+
+
+def _stands_out(score: float, alone: Sequence[Alone]) -> bool:
+    """Whether a robot of such a score is missed by far more than the others are."""
+    middle, scale = _usual(alone)
+    return np.log(max(score, 1.0)) - middle > max(SETTINGS.odd * max(scale, 0.06), np.log(1.5))
+
+
 def _unexplained(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
-    """A robot whose errors stand out although nothing that was tried explains them."""
-    sizes = [np.log(max(a.before.held_score, 1.0)) for a in alone]
-    middle, scale = middle_and_scale(sizes)
-    mine = np.log(max(own.before.held_score, 1.0))
-    if mine - middle < max(SETTINGS.odd * max(scale, 0.06), np.log(1.5)):
-        return None
+    """A robot whose errors stand out although nothing that was tried explains them.
+
+    What takes a part of them and leaves the robot far from all others is not what it has.
+    """
     before = own.before.held_score
-    others = float(np.exp(middle))
+    if not _stands_out(before, alone):
+        return None
+    others = float(np.exp(_usual(alone)[0]))
     return Outlier(
         robot_id=own.robot_id,
         effect=None,

@@ -5,6 +5,7 @@ import os
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
-from twinmill.diagnosis.outliers import in_words
+from twinmill.diagnosis.outliers import _stands_out, in_words
 from twinmill.fitting.compare import MISSING, compare, of_others
 from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements
@@ -343,3 +344,10 @@ def test_the_verdict_is_on_the_robots_that_are_alike(logged):
     assert found.verdict in ("model_adequate", "refit_enough") and not found.findings
     assert len(found.lines) == 2 and " ".join(found.lines) == found.sentence
     assert found.lines[0].startswith("R02: ")
+
+
+@pytest.mark.parametrize(("after", "far"), [(3.97, True), (1.1, False)])
+def test_what_leaves_a_robot_far_from_the_others_is_not_what_it_has(after, far):
+    """Slower ahead alone had been more way on diagonals, surely; that left a score of 3.97."""
+    alone = [SimpleNamespace(before=SimpleNamespace(held_score=s)) for s in (1.02, 1.0, 1.05, 6.5)]
+    assert _stands_out(after, alone) == far

@@ -18,7 +18,7 @@ from twinmill.data.checks.settings import CHECKS
 from twinmill.data.clock import place_of_least
 from twinmill.data.lost_commands import beat_s, keeps_beat
 
-FAR_S = np.arange(-6.0, 6.0 + 1e-9, 0.06)
+FAR_S = np.arange(-12.0, 12.0 + 1e-9, 0.06)
 ABOUT_S = np.arange(-0.6, 0.6 + 1e-9, 0.02)  # about a shift that is far off
 ANY_LAG_S = np.geomspace(0.004, 0.5, 13)
 FINE_S = np.arange(-0.06, 0.06 + 1e-9, 0.01)  # about a shift of the coarse search

@@ -186,7 +186,7 @@ def _shifted(
     late = "late" if late_s > 0 else "early"
     return checked.finding(
         f"the poses come {abs(late_s):.2f} s {late} against the commands",
-        f"the commands explain {1 - own.left:.0%} of the motion as it is stamped, and "
+        f"the commands explain {max(1 - own.left, 0.0):.0%} of the motion as it is stamped, and "
         f"{1 - far.left:.0%} with that shift",
         "stamp both with one clock, or import anew with "
         f"{checked.option('--pose-shift-s')}{-late_s:.3f}; a constant delay of the robot is in "
@@ -211,7 +211,7 @@ def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
         f"under no order and sign of the columns and no turn of the axes more than "
         f"{max(0.0, 1 - left):.0%}",
         "check that commands and poses are of the same robot and run, and shifted by less than "
-        "six seconds against each other (--pose-shift-s)",
+        "twelve seconds against each other (--pose-shift-s)",
     )
 
 

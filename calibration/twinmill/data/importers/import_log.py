@@ -50,6 +50,7 @@ from twinmill.files import check_new_file, replacing
 TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in length
 SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
+MOST_PPM = 1e5  # by which one clock gains on another
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
 Flips = frozenset[str] | Mapping[int | None, frozenset[str]]
@@ -358,7 +359,13 @@ def _headed(poses: list[PoseSeries], commands: list[CommandSeries]) -> list[Pose
 def _on_our_clock(series: PoseSeries, options: ImportOptions) -> np.ndarray:
     """Stamps without the drift, counted from the first, and shifted."""
     first_us, number = series.utime_us[0], series.robot_id
-    gains = 1 + 1e-6 * _of(number, options.pose_clock_ppm)
+    gains_ppm = _of(number, options.pose_clock_ppm)
+    if not abs(gains_ppm) <= MOST_PPM:
+        raise LogError(
+            f"--pose-clock-ppm {gains_ppm:g}: no clock gains or loses more than {MOST_PPM:g} ppm, "
+            "a tenth of its time; give parts per million."
+        )
+    gains = 1 + 1e-6 * gains_ppm
     since_us = np.round((series.utime_us - first_us) / gains).astype(np.int64)
     return first_us + since_us + round(1e6 * _of(number, options.pose_shift_s))
 
