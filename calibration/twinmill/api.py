@@ -1082,7 +1082,9 @@ class Diagnosis(Reported):
         """
         limits = _limits(duration_s, floor_m, max_duty)
         check_limits([o.measurement for o in self._result.opened], self._file, limits)
-        return NextRun(design(self._result, self._file, limits, lambda _: None))
+        planned = NextRun(design(self._result, self._file, limits, lambda _: None))
+        planned.input = self.input
+        return planned
 
     def _page(self) -> tuple[report.Section, str]:
         return diagnosis_report.section(self._result), "twinmill.diagnose"

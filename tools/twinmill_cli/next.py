@@ -27,7 +27,7 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
     from twinmill.terminal import progress_bar
-    from twinmill_cli.frame import command_line, finish, load, open_model, provenance
+    from twinmill_cli.frame import command_line, finish, load, open_model, provenance, told
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
 if TYPE_CHECKING:
@@ -115,10 +115,11 @@ def _next(
         deliver(data, present.narrowing_terminal(narrowing, how), as_json)
         return narrowing
     with telling(f"designing a run with {model}") as progress:
-        plan = plan_run(load(logs, model_file), model_file, limits, progress)
+        measurements = load(logs, model_file)
+        plan = plan_run(measurements, model_file, limits, progress)
     write_whole(output, csv_text(plan.rows), force)
     how = _how(plan, logs, model, output, form=script_as)
-    data = {"script": str(output), **plan.to_json()}
+    data = {"script": str(output), **plan.to_json(), **told(measurements)}
     if script_as:
         twists = TwistScript.of(model_file.model, plan.rows)
         write_script(twists, script_as, ros_path(script_as, output), force, command=source.command)
