@@ -421,9 +421,7 @@ def _concluded(
         random_in_words(scatters, [r.noise for r in modelled], model_file.model) if random else "",
     )
     if weighed.verdict == "outside_catalogue":
-        instead_of = rest.proven.instead_of if rest.proven else ()
-        standing = [f for f in findings if f.effect not in instead_of]
-        rest = rest.with_first(acted_on(standing, rest.least))
+        rest = rest.with_first(acted_on(findings, rest.least))
         weighed = replace(weighed, rest=rest)
     drives = drives_for(faint_names, _shown(done, named), first.model.wheel_kind)
     same_clock = all(o.same_clock for o in known if o.floor)
