@@ -274,7 +274,7 @@ def test_rows_that_are_written_twice_count_once(imported):
 
 
 def test_signs_drift_and_shift_are_taken_out(imported):
-    robot, _ = imported(flips=frozenset({"y_m", "fl_pct"}))
+    robot, _ = imported(flips={None: frozenset({"y_m", "fl_pct"})})
     np.testing.assert_allclose(robot.pose[:, 1], [0, -0.25, -0.5])
     np.testing.assert_allclose(robot.command[0] * 100, [-10, 20, 30, 40])
     robot, _ = imported(pose_clock_ppm=1000)

@@ -133,13 +133,18 @@ def instead_over_time(done: Search, name: str) -> list[str]:
     return [*timed, *(n for n in _same(done, name) if bends_speed(n))]
 
 
-def instead_in_family(done: Search, name: str) -> list[str]:
-    """Effects of its family that do the same as one.
+def instead_in_family(done: Search, name: str, left: float) -> list[str]:
+    """Effects of its family that do the same as one beside which something is left.
 
-    They matter where something is left: a form that is not quite right leaves it, and theirs is as
-    near.
+    A form that is not quite right leaves it, and theirs is as near.
+
+    Args:
+        done: the search.
+        name: of the effect.
+        left: share of the excess that no finding takes.
     """
-    if name == REFIT or done.last.held_score < SETTINGS.level:
+    nothing = left <= SETTINGS.nothing_left or done.last.held_score < SETTINGS.level
+    if name == REFIT or nothing:
         return []
     family = catalogue()[name]["family"]
     return [

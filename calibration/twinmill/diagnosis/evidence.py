@@ -11,10 +11,9 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.independence import LONGEST, SURE, fresh_of_blocks, told_before
+from twinmill.fitting.independence import LONGEST, by_chance, fresh_of_blocks, told_before
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.predict.datasets import INDEPENDENT_S
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
 
 STRETCH_S = 8.0  # of one half, before one of the other
@@ -106,8 +105,8 @@ class Evidence:
         made = self.left[own] - after
         says = np.bincount(window, (made * after)[longest])
         (again,) = told_before((says - says.mean())[:, None], begin_s)
-        chance = SURE / np.sqrt(len(says) * EVERY_S / INDEPENDENT_S)
-        return fresh_of_blocks(again if again > chance else 0.0, SIGN_S)
+        sure = again > by_chance(len(says) * EVERY_S)
+        return fresh_of_blocks(again if sure else 0.0, SIGN_S)
 
     def weighed(self, scale: np.ndarray) -> None:
         """Weighs each row (R,) anew."""

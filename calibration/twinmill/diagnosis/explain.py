@@ -323,6 +323,8 @@ def _made(
 
 def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Outlier]:
     """Robots that differ, with their numbers beside the new model of all; cameras as they are."""
+    if not diagnosis.robots_off:
+        return []
     lags = [p.std for d in fit.datasets for p in d.own if p.name == LAG and not d.by_run]
     opened = thinned_to_search(with_own_gains(judged(diagnosis.opened)))
     logs = [o for o in opened if o.floor]

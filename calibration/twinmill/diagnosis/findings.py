@@ -361,7 +361,7 @@ def _finding(
     instead = seen_once(done, name, less)
     tied = [n for t in _rivals(done, name) for n in t.names]
     tied += [*(instead or ()), *instead_of_moment(done, name), *instead_over_time(done, name)]
-    tied += instead_in_family(done, name) if left > SETTINGS.nothing_left else []
+    tied += instead_in_family(done, name, left)
     tied = list(dict.fromkeys(tied))[: done.settings.group - 1]
     group = (name, *tied) if tied else None
     doubt = of_one(done, name, own, changes.get(instance))

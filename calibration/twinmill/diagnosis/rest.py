@@ -28,14 +28,14 @@ from twinmill.fitting.boosting import squares
 from twinmill.fitting.compare import GOOD
 from twinmill.fitting.independence import (
     LONGEST,
-    SURE,
     along_the_way,
+    by_chance,
     fresh_shares,
     told_before,
 )
 from twinmill.fitting.opening import Opened, thinned
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.predict.datasets import INDEPENDENT_S, Trajectory, thinning
+from twinmill.predict.datasets import Trajectory, thinning
 
 MOST_BLOCKS = 200
 FOLDS = 5
@@ -554,10 +554,9 @@ def _errors_of(
 def _wander(logs: Sequence[tuple[int, Opened]], products: "Products") -> bool:
     """Whether errors tell the next ones by more than chance, in any log."""
     for data, errors in _errors_of(logs, products, products.left):
-        chance = SURE / np.sqrt(data.covered_s / INDEPENDENT_S)
         last, size = errors[:, LONGEST], data.weight[:, LONGEST]
         ways = along_the_way(last / np.where(size > 0, size, np.nan), data.measured[:, LONGEST])
-        if (told_before(ways, data.start_s) > chance).any():
+        if (told_before(ways, data.start_s) > by_chance(data.covered_s)).any():
             return True
     return False
 

@@ -130,8 +130,12 @@ def _following(start_s: np.ndarray, later: int = 1) -> tuple[np.ndarray, np.ndar
 def _correlations(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(3, 3) of (W, 3) errors of size one; 0 where chance would make so much."""
     mean, count = _means(a, b)
-    chance = SURE / np.sqrt(np.maximum(count * EVERY_S / INDEPENDENT_S, 1))
-    return np.where(np.abs(mean) > chance, mean, 0.0)
+    return np.where(np.abs(mean) > by_chance(count * EVERY_S), mean, 0.0)
+
+
+def by_chance(span_s: np.ndarray | float) -> np.ndarray | float:
+    """Up to which a correlation of predictions that span so long counts as none."""
+    return SURE / np.sqrt(np.maximum(span_s / INDEPENDENT_S, 1))
 
 
 def _means(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1361,7 +1361,7 @@ def test_a_form_that_leaves_something_is_not_surely_the_one_of_its_family(
         before=SimpleNamespace(held_score=1.49), accepted=trials[0], trials=trials
     )
     done = SimpleNamespace(last=trials[0], found=[one], round_of=lambda _: this)
-    assert instead_in_family(done, one) == ([other] if found else [])
+    assert instead_in_family(done, one, 0.1) == ([other] if found else [])
 
 
 def test_a_stretch_in_which_the_model_is_right_is_not_told():

@@ -15,8 +15,8 @@ constexpr Card kCard = {
     .equation =
         "v' = v (1 - loss h); 60 s dh/dt = u^2 - h, each wheel by itself, cold at the start",
     .leaves_out =
-        "the room's temperature, cooling by the wind of driving, motors that warm up in another time than "
-        "60 s; a log that starts warm",
+        "the room's temperature, cooling by the wind of driving, motors that warm up in another "
+        "time than 60 s; a log that starts warm",
     .measure =
         "one continuous drive of two minutes at full duty after a rest; battery_sag looks "
         "alike where the battery empties meanwhile",

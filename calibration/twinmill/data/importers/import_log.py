@@ -53,7 +53,7 @@ SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
 MOST_PPM = 1e5  # by which one clock gains on another
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
-Flips = frozenset[str] | Mapping[int | None, frozenset[str]]
+Flips = Mapping[int | None, frozenset[str]]  # of all robots, by None; or by robot_id
 OfRobots = float | Mapping[int | None, float]  # of all robots; or by robot_id, None for all
 
 
@@ -67,7 +67,7 @@ class ImportOptions:
             name of a robot's own table or in a bag's topics.
         rename: column in a plain CSV file to column as we name it, or with another unit.
         mapping: file that says which column is what, in place of `rename`.
-        flips: our columns that are to change their sign: of all robots, or by robot_id (None: all).
+        flips: our columns that are to change their sign.
         up: "y" or "z", the axis that an export of Motive or Vicon calls up; None: its default.
         pose_shift_s: added to the stamps of poses; of a robot that is named, to that of all.
         pose_clock_ppm: by which the poses' clock gains on the commands', taken out; likewise.
@@ -86,7 +86,7 @@ class ImportOptions:
     robots: dict[str, int] = field(default_factory=dict)
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Path | None = None
-    flips: Flips = frozenset()
+    flips: Flips = field(default_factory=dict)
     up: str | None = None
     pose_shift_s: OfRobots = 0.0
     pose_clock_ppm: OfRobots = 0.0
@@ -286,7 +286,7 @@ def _detections(
 
 def _columns(options: ImportOptions, kind: str) -> Columns:
     """How to read the table of poses, or that of commands."""
-    flips = _by_robot(options.flips)
+    flips = dict(options.flips)
     if unknown := frozenset().union(*flips.values()) - KNOWN:
         raise LogError(
             f"--flip {min(unknown)}: is not one of our columns; they are "
@@ -368,11 +368,6 @@ def _on_our_clock(series: PoseSeries, options: ImportOptions) -> np.ndarray:
     gains = 1 + 1e-6 * gains_ppm
     since_us = np.round((series.utime_us - first_us) / gains).astype(np.int64)
     return first_us + since_us + round(1e6 * _of(number, options.pose_shift_s))
-
-
-def _by_robot(flips: Flips) -> dict[int | None, frozenset[str]]:
-    """Columns by robot; None: of all."""
-    return dict(flips) if isinstance(flips, Mapping) else {None: flips}
 
 
 def _of(robot_id: int, given: OfRobots) -> float:
@@ -519,9 +514,7 @@ def _in_toml(given: OfRobots) -> float | dict[str, float]:
 def _flips_in_toml(flips: Flips) -> list[str]:
     """Names, those of one robot behind its number."""
     return sorted(
-        name if k is None else f"R{k:02d}={name}"
-        for k, names in _by_robot(flips).items()
-        for name in names
+        name if k is None else f"R{k:02d}={name}" for k, names in flips.items() for name in names
     )
 
 
