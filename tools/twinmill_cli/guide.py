@@ -192,7 +192,11 @@ def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
         known[name] = answer or kind(Prompt.ask(question, choices=[word.value for word in kind]))
     for name, answer in _following(known).items():
         if known[name] != answer:
-            raise ValueError(f"--{name} {known[name]}: what else was said makes it {answer}.")
+            makes = [f"--{k} {v}" for k, v in known.items() if name in _following({k: v})]
+            raise ValueError(
+                f"--{name} {known[name]}: with {' and '.join(makes)} it is {answer}; leave "
+                f"--{name} out."
+            )
     if (known["robot"], known["poses"]) == (Robot.TURBOPI, Poses.VICON):
         raise ValueError(
             "--poses vicon: our robot's drives are recorded with poses live on the bus, and of "
