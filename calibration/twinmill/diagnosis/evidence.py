@@ -11,10 +11,16 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.fitting.independence import LONGEST, by_chance, fresh_of_blocks, told_before
+from twinmill.fitting.independence import (
+    LONGEST,
+    by_chance,
+    following,
+    fresh_of_blocks,
+    told_before,
+)
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.predict.windows import EVERY_S, HORIZONS_S
+from twinmill.predict.windows import HORIZONS_S
 
 STRETCH_S = 8.0  # of one half, before one of the other
 SIGN_S = 4.0  # errors so far apart have signs of their own
@@ -44,6 +50,7 @@ class Evidence:
         changes: Columns,
     ) -> None:
         self.logs, self.motions = logs, motions
+        self.every_s = logs[0][1].data.every_s
         self._divide()
         rows, _ = fit.state
         weight = np.concatenate([np.sqrt(fit.weight(i, rows[i])) for i, _ in logs])
@@ -94,7 +101,8 @@ class Evidence:
     def fresh(self, own: np.ndarray, after: np.ndarray) -> float:
         """Share of the evidence of blocks with signs of their own that no block before tells.
 
-        What so few predictions may show by chance counts as nothing.
+        What so few pairs of predictions may show by chance counts as nothing: of a half with gaps
+        there are fewer pairs than predictions.
 
         Args:
             own: (R,) bool, rows that are judged.
@@ -105,7 +113,8 @@ class Evidence:
         made = self.left[own] - after
         says = np.bincount(window, (made * after)[longest])
         (again,) = told_before((says - says.mean())[:, None], begin_s)
-        sure = again > by_chance(len(says) * EVERY_S)
+        _, pairs = following(begin_s)
+        sure = again > by_chance(len(pairs) * self.every_s)
         return fresh_of_blocks(again if sure else 0.0, SIGN_S)
 
     def weighed(self, scale: np.ndarray) -> None:

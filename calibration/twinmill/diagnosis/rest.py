@@ -24,15 +24,11 @@ from twinmill.diagnosis.moments import Events, Moment, events_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import COUPLING, PLACE, TIME, WAY, Term
+from twinmill.diagnosis.wander import Wander, wandering
 from twinmill.fitting.boosting import squares
 from twinmill.fitting.compare import GOOD
-from twinmill.fitting.independence import (
-    LONGEST,
-    along_the_way,
-    by_chance,
-    fresh_shares,
-    told_before,
-)
+from twinmill.fitting.floor import NoiseFloor
+from twinmill.fitting.independence import LONGEST, fresh_shares
 from twinmill.fitting.opening import Opened, thinned
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict.datasets import Trajectory, thinning
@@ -45,6 +41,7 @@ FLIPS = 299  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
 STEADY = ("speed", "turning rate", COUPLING, "direction of rotation")
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
+WANDERS = "wanders by itself"
 NOT_LOOKED_AT = "not looked at"
 SLOW = (TIME, WAY, PLACE)  # groups that change slowly along any drive
 FOLLOWS = 4  # numbers over time beyond which a group follows a wander: one formula has no more
@@ -102,6 +99,7 @@ class Rest:
         if_new: something would be beyond chance if each prediction told something new.
         wanders: errors tell the next ones, as those of what wanders by itself do, or far more is
             random than was.
+        by_itself: what wanders, where nothing shows that the rest is anything else.
         looked_at: false where the share alone is known.
     """
 
@@ -122,6 +120,7 @@ class Rest:
     little: bool = False
     if_new: bool = False
     wanders: bool = False
+    by_itself: Wander | None = None
     looked_at: bool = True
 
     def with_findings(self, findings: Sequence[Finding]) -> "Rest":
@@ -145,12 +144,13 @@ class Rest:
 
     def as_before(self) -> "Rest":
         """As no news: what it depends on, the model missed on the logs that it was fitted to."""
-        return replace(self, firm=False, depends_on=[], old=(*self.old, *self.depends_on))
+        old = (*self.old, *self.depends_on)
+        return replace(self, firm=False, depends_on=[], old=old, by_itself=None)
 
     def as_answers(self) -> "Rest":
         """As what a controller's answers may make of noise, of which nothing can be told.
 
-        What follows place or time, or comes at moments, no answer makes.
+        What follows place or time, comes at moments, or wanders by itself, no answer makes.
         """
         if {PLACE, TIME, MOMENTS} & set(self.depends_on):
             return self
@@ -186,7 +186,7 @@ class Rest:
 
     @property
     def certainty(self) -> str:
-        """In words: FIRM, FEW, NOISE or NOT_LOOKED_AT."""
+        """In words: FIRM, FEW, NOISE, WANDERS or NOT_LOOKED_AT."""
         if not self.looked_at:
             return NOT_LOOKED_AT
         known = self.depends_on and not self.likely
@@ -194,6 +194,8 @@ class Rest:
             return FEW if self.far else NOISE
         if known or (self.firm and not self.little):
             return FIRM
+        if self.by_itself and not self.little:
+            return WANDERS
         return FEW if self.far else NOISE
 
     @property
@@ -321,7 +323,7 @@ def rest_of(
     if formulas is None:
         return Rest(share, False, [])
     logs = formulas.logs
-    firm = _firm(formulas.seen, fit)
+    firm = _firm(formulas.seen, fit, lambda floor: floor.across)
     there = random or (firm and fit.held_square > GOOD**2)
     found = _dependences(formulas, fit, known, there=there)
     if fit.held_square <= SETTINGS.level**2 and not random:
@@ -343,23 +345,36 @@ def rest_of(
         *([PLACE] if again else []),
     ]
     likely = found.likely or bool(events.at_changes and not (found.depends_on or again or proven))
+    depends_on = _in_order(proven, found, others)
+    wander = wandering(
+        [
+            (own.data, np.where(own.data.keep[:, None, None], own.data.errors(model), np.nan))
+            for own, model in zip(own_logs, models, strict=True)
+        ]
+    )
+    follows = firm and _firm(formulas.seen, fit, lambda floor: floor.response.unboosted)
+    sure = bool(events.moments or (depends_on and not likely))
+    by_itself = None if sure or follows else wander
     return replace(
         found,
         share=share,
-        firm=firm,
+        firm=firm and not by_itself,
         far=fit.held_square > SETTINGS.no_noise**2,
         little=fit.held_square <= GOOD**2,
         likely=likely,
-        wanders=random or found.wanders,
-        depends_on=_in_order(proven, found, others),
+        wanders=random or bool(wander),
+        by_itself=by_itself,
+        depends_on=depends_on,
         events=events,
         again=again,
         proven=proven,
     )
 
 
-def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
-    """Whether the response predicts left-out blocks better than the model.
+def _firm(
+    logs: list[tuple[int, Opened]], fit: ScoreFit, errors: Callable[[NoiseFloor], np.ndarray]
+) -> bool:
+    """Whether the response, of which a floor tells errors, predicts left-out blocks better.
 
     By t of the relative fall over blocks; or, where only a few drives show what is missing, by
     blocks of a large fall, of which hardly any are as much worse.
@@ -367,7 +382,7 @@ def _firm(logs: list[tuple[int, Opened]], fit: ScoreFit) -> bool:
     falls = []
     for i, own in logs:
         model = fit.block_squares[i]
-        rows = (np.nan_to_num(own.floor.across) * own.data.weight).reshape(-1)
+        rows = (np.nan_to_num(errors(own.floor)) * own.data.weight).reshape(-1)
         response = np.bincount(own.data.block, rows**2, len(model))
         falls += list((model - response) / np.maximum(model + response, 1e-300))
     falls = np.array(falls)
@@ -395,8 +410,7 @@ def _dependences(
     whole = formulas.products(fit)
     terms = [t for t, seen in zip(formulas.terms, whole.seen, strict=True) if seen]
     own, fresh = whole.only(whole.seen), _fresh_of(formulas.logs, whole)
-    found = _verdict(terms, own, whole.total, known, there=there, fresh=fresh)
-    return replace(found, wanders=_wander(formulas.logs, whole))
+    return _verdict(terms, own, whole.total, known, there=there, fresh=fresh)
 
 
 def _verdict(
@@ -549,16 +563,6 @@ def _errors_of(
         judged = own.data.weight > 0
         yield own.data, np.where(judged, rows[place].reshape(judged.shape), np.nan)
         first = place.stop
-
-
-def _wander(logs: Sequence[tuple[int, Opened]], products: "Products") -> bool:
-    """Whether errors tell the next ones by more than chance, in any log."""
-    for data, errors in _errors_of(logs, products, products.left):
-        last, size = errors[:, LONGEST], data.weight[:, LONGEST]
-        ways = along_the_way(last / np.where(size > 0, size, np.nan), data.measured[:, LONGEST])
-        if (told_before(ways, data.start_s) > by_chance(data.covered_s)).any():
-            return True
-    return False
 
 
 def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:

@@ -161,6 +161,7 @@ class Diagnosis:
                 "told": self.is_left,
                 "depends_on": rest.depends_on,
                 "likely": rest.likely,
+                "wander": asdict(rest.by_itself) if rest.by_itself else None,
                 "formula": rest.proven.equals if rest.proven else None,
                 "moments": [m.to_json() for m in rest.moments],
                 "every_s": every_s(rest.moments) or None,

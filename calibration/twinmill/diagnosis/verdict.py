@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from twinmill.diagnosis.apart import Apart, of_runs
 from twinmill.diagnosis.finding import Finding, of_all, part_of_all
 from twinmill.diagnosis.formula import Formula
-from twinmill.diagnosis.rest import FEW, MOMENTS, NOISE, Rest
+from twinmill.diagnosis.rest import FEW, MOMENTS, NOISE, WANDERS, Rest
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.ties import of_levels
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
@@ -71,6 +71,8 @@ class VerdictInputs:
         if self.effects and not (outweighed or self._proven_instead):
             top = self.effects[0]
             return "ambiguous" if top.group else "effect_missing"
+        if self._wanders:
+            return "cannot_tell"
         if self._outside or self.rest.moments or (self.effects and self.score > MISSING):
             return "outside_catalogue"
         if self.random and (self.effects or self._unexplained):
@@ -145,6 +147,17 @@ class VerdictInputs:
         return self.last > (GOOD if self._firm else MISSING) * self.known
 
     @property
+    def _wanders(self) -> bool:
+        """More is left than is usual, and it wanders by itself."""
+        return bool(self.rest.by_itself) and self.last > GOOD * self.known
+
+    @property
+    def _size(self) -> str:
+        """By how much what is left wanders by itself, after a comma; empty if that is not known."""
+        words = self.rest.by_itself.words if self.rest.by_itself else ""
+        return f", {words}" if words else ""
+
+    @property
     def _firm(self) -> bool:
         """The smooth response predicts much of what is left."""
         return self.rest.firm and self.rest.share > SETTINGS.much_left
@@ -173,7 +186,8 @@ class VerdictInputs:
             return False
         if self._continuous and self.rest.share > SETTINGS.much:
             return True
-        return self.rest.firm and self.rest.share > min(self._taken, SETTINGS.much_left)
+        no_noise = self.rest.firm or self.rest.by_itself
+        return bool(no_noise) and self.rest.share > min(self._taken, SETTINGS.much_left)
 
     @property
     def _proven_instead(self) -> Formula | None:
@@ -219,6 +233,8 @@ class VerdictInputs:
                 "The model misses by no more than speeds may be wrong by that another log told; "
                 f"{self._within_told} may be there, and is too small to be sure."
             )
+        if verdict == "cannot_tell" and self._wanders:
+            return self._by_itself
         if verdict == "cannot_tell" and self.effects:
             names = " or ".join(f.effect for f in self.effects)
             return (
@@ -238,9 +254,11 @@ class VerdictInputs:
         if verdict == "cannot_tell" and self.random:
             return self._at_random
         if verdict == "cannot_tell" and self.noises:
+            by_itself = f": it wanders by itself{self._size}."
+            why = by_itself if self.rest.by_itself else ", and these logs do not tell why."
             return (
                 "Nothing was found that follows from the commands, but the motion is far less "
-                "regular than the model file says, and these logs do not tell why."
+                f"regular than the model file says{why}"
             )
         if verdict == "cannot_tell" and self.last > MISSING:
             return f"{self._nothing} new is missing that these logs would show.{self._as_before}"
@@ -277,7 +295,8 @@ class VerdictInputs:
     def _at_random(self) -> str:
         """The model leaves no more than what is random, of which there is more than it says."""
         almost = "" if self.last <= GOOD else "almost "
-        by = f" {self.disturbed_by}," if self.disturbed_by else ""
+        words = self.disturbed_by or self._size.removeprefix(", ")
+        by = f" {words}," if words else ""
         on = f"depends most likely on {' or '.join(self.rest.depends_on)}"
         if_any = f" If that depends on anything, it {on}." if self.rest.depends_on else ""
         return (
@@ -287,10 +306,23 @@ class VerdictInputs:
         )
 
     @property
+    def _by_itself(self) -> str:
+        """The model leaves more than the noise, and that is random."""
+        maybe = " or ".join(_plain(f) for f in self.findings)
+        part = f" Part of it may be {maybe}." if maybe else ""
+        return (
+            f"The model misses by more than the noise (score {self.last:.2f}), and what is left is "
+            f"random: it wanders by itself{self._size}. No formula of the commands, place or time "
+            f"that was tried explains it.{part}"
+        )
+
+    @property
     def _as_before(self) -> str:
         """What the model left in the logs that it was fitted to, it leaves here, too."""
         if self.last <= GOOD:
             return ""
+        if self.rest.by_itself:
+            return f" What is left (score {self.last:.2f}) wanders by itself{self._size}."
         if self.last > SETTINGS.news * self.known:
             return (
                 f" The model misses by a little more than the noise (score {self.last:.2f}): more "
@@ -315,6 +347,8 @@ class VerdictInputs:
         on = self.rest.on
         depends = f", and depends {on}" if on else ""
         share = f"{100 * part_of_all(self.findings, self.rest.share) * self.rest.share:.0f} %"
+        if self.rest.certainty == WANDERS:
+            return f" {share} is left, which seems to wander by itself{self._size}.{events}"
         if not on and self.rest.certainty == NOISE:
             return f" {share} is left, which may be noise.{events}"
         if not on and self.rest.certainty == FEW:

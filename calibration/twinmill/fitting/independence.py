@@ -30,8 +30,8 @@ def independent_shares(errors: np.ndarray, start_s: np.ndarray) -> np.ndarray:
     """
     own = _of_size_one(errors[:, LONGEST])
     alike = _correlations(own, own)
-    following, there = _following(start_s)
-    again = np.diag(_correlations(own[there], own[following])).clip(0.0, MOST)
+    after, there = following(start_s)
+    again = np.diag(_correlations(own[there], own[after])).clip(0.0, MOST)
     return _fresh(again) / np.sum(alike**2, axis=0).clip(1.0)
 
 
@@ -64,8 +64,8 @@ def _again(every: np.ndarray, start_s: np.ndarray) -> float:
     """
     total = 0.0
     for later in range(1, LATEST + 1):
-        following, there = _following(start_s, later)
-        alike = float(np.mean(every[there] * every[following])) if len(there) else 0.0
+        after, there = following(start_s, later * INDEPENDENT_S)
+        alike = float(np.mean(every[there] * every[after])) if len(there) else 0.0
         if alike <= 0:
             break
         total += alike
@@ -75,8 +75,8 @@ def _again(every: np.ndarray, start_s: np.ndarray) -> float:
 def told_before(errors: np.ndarray, start_s: np.ndarray) -> np.ndarray:
     """(C,) correlation of (W, C) errors of the longest horizon with those before, 0 to MOST."""
     own = _of_size_one(errors)
-    following, there = _following(start_s)
-    return np.diag(_means(own[there], own[following])[0]).clip(0.0, MOST)
+    after, there = following(start_s)
+    return np.diag(_means(own[there], own[after])[0]).clip(0.0, MOST)
 
 
 def along_the_way(errors: np.ndarray, moved: np.ndarray) -> np.ndarray:
@@ -118,9 +118,9 @@ def _of_size_one(errors: np.ndarray) -> np.ndarray:
     return np.where(middle > 0, cut, np.nan) / size
 
 
-def _following(start_s: np.ndarray, later: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Predictions that begin as others end, or so many later, and those others."""
-    wanted_s = start_s + later * INDEPENDENT_S
+def following(start_s: np.ndarray, later_s: float = INDEPENDENT_S) -> tuple[np.ndarray, np.ndarray]:
+    """Predictions that begin so much later than others, and those others."""
+    wanted_s = start_s + later_s
     at = np.searchsorted(start_s, wanted_s - EVERY_S / 2)
     there = np.flatnonzero(at < len(start_s))
     there = there[np.abs(start_s[at[there]] - wanted_s[there]) < EVERY_S]

@@ -22,6 +22,7 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT
 from twinmill.diagnosis.verdict import VerdictInputs
+from twinmill.diagnosis.wander import Wander
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S
@@ -157,7 +158,7 @@ def test_what_is_no_more_than_the_noise_depends_on_nothing(score, random, told, 
     found = Rest(0.0, False, ["heading"])
     monkeypatch.setattr(rest, "_dependences", lambda *_, there: found)
     monkeypatch.setattr(rest, "_firm", lambda *_: False)
-    for name, nothing in (("events_of", Events()), ("comes_again", 0.0)):
+    for name, nothing in (("events_of", Events()), ("comes_again", 0.0), ("wandering", None)):
         monkeypatch.setattr(rest, name, lambda *_, nothing=nothing, **__: nothing)
     fit, first = SimpleNamespace(held_square=score**2, models=[]), SimpleNamespace(held_square=1.1)
     formulas = SimpleNamespace(logs=[], seen=[], proven=lambda _: None)
@@ -245,6 +246,46 @@ def test_where_all_that_is_left_is_random_no_physics_is_called_missing(last, fir
     assert told.verdict == verdict
     assert words in told.sentence
     assert (by in told.sentence) == (verdict == "cannot_tell")
+
+
+@pytest.mark.parametrize(
+    ("score", "doubtful", "verdict"),
+    [
+        (1.4, False, "cannot_tell"),
+        (2.0, False, "cannot_tell"),
+        (1.4, True, "cannot_tell"),
+        (1.1, False, "model_adequate"),
+    ],
+)
+def test_what_wanders_by_itself_is_random_and_told_by_its_size(score, doubtful, verdict):
+    """Nothing of the commands, place or time explains it: at no score is that physics."""
+    found = [Finding("scrub", None, (), 0.2, "doubtful", "why")] if doubtful else []
+    left = Rest(0.8, False, ["time"], likely=True, wanders=True, by_itself=Wander(0.04, 3.0))
+    told = VerdictInputs(*[score] * 4, found, left, [], [], [], 1.0)
+    assert told.verdict == verdict
+    assert ("4 % of the way for 3 s" in told.sentence) == (verdict == "cannot_tell")
+    assert ("scrub" in told.sentence) == doubtful
+    assert left.certainty != FIRM
+
+
+def test_a_wander_that_hardly_shows_is_told_where_nothing_is_missing():
+    left = Rest(1.0, False, [], by_itself=Wander(0.02, 3.0))
+    told = VerdictInputs(*[1.2] * 4, [], left, [], [], [], 1.08)
+    assert told.verdict == "model_adequate"
+    assert "wanders by itself, by about 2 % of the way for 3 s at a time" in told.sentence
+
+
+def test_a_wander_is_told_of_a_robot_that_a_controller_steers():
+    left = Rest(1.0, True, ["speed"], likely=True, by_itself=Wander(0.02, 3.0)).as_answers()
+    assert left.by_itself and not left.depends_on
+
+
+def test_what_wanders_beside_an_effect_is_told_beside_it():
+    found = [Finding("scrub", None, (), 0.7, "sure", "")]
+    left = Rest(0.3, False, [], wanders=True, by_itself=Wander(turn_radps=0.05, turn_s=2.0))
+    told = VerdictInputs(1.8, 1.8, 1.8, 1.4, found, left, [], [], [], 1.0)
+    assert told.verdict == "effect_missing"
+    assert "seems to wander by itself, by about 0.05 rad/s for 2 s at a time" in told.sentence
 
 
 def test_what_reaches_into_a_stretch_left_out_is_no_random_scatter():
