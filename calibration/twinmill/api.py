@@ -88,6 +88,7 @@ SWITCH = (bool, "True or False")
 IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "robot": ("robots", *BY_NAME),
     "rename": ("rename", *BY_NAME),
+    "exchange": ("exchange", (list, tuple), "a list of pairs of robots, as [(1, 2)]"),
     "mapping": ("mapping", (str, Path), A_PATH),
     "flip": ("flips", (*NAMES[0], Mapping), "a list of names, or a dictionary of these by robot"),
     "up": ("up", str, "`y` or `z`"),
@@ -1501,8 +1502,10 @@ def import_log(
         robot_id: whose the rows are, for files that do not say.
         heading_offset_deg: from the tracked body's x axis to the robot's front, left positive; or
             by robot.
-        options: `robot` (numbers by name) and `rename` (our column by the file's), dictionaries;
-            `mapping`, a path; `flip`, a list of our columns, or lists by robot; `up`;
+        options: `robot` (numbers by name) and `rename` (our column by the file's; by a robot's
+            number a dictionary of its own), dictionaries; `mapping`, a path; `flip`, a list of our
+            columns, or lists by robot; `exchange`, pairs of robots that have each other's poses;
+            `up`;
             `pose_shift_s` and `pose_clock_ppm`, numbers, or dictionaries by robot;
             `heading_from_path`, `same_clock`; of a bag `pose` and `command` (lists of
             topics), `receive_stamps`, `wheelbase_m`, `full_duty`.
@@ -1558,6 +1561,17 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
         told[field] = _of_robots(name, options[name], kinds, wanted)
     if "mapping" in told:
         told["mapping"] = Path(told["mapping"])
+    if "rename" in told:
+        names = told["rename"]
+        own = {robot: names[robot] for robot in names if isinstance(robot, Integral)}
+        for robot, renames in own.items():
+            checked(f"rename of {robot!r}", renames, *BY_NAME)
+        told["rename"] = {old: new for old, new in names.items() if old not in own}
+        told["own_renames"] = own
+    if "exchange" in told:
+        for pair in told["exchange"]:
+            checked("exchange", pair, (list, tuple), "a list of pairs of robots, as [(1, 2)]")
+        told["exchange"] = tuple(map(tuple, told["exchange"]))
     if "flips" in told:
         flips = told["flips"]
         by_robot = flips if isinstance(flips, Mapping) else {None: flips}
