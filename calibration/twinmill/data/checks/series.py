@@ -152,14 +152,14 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             )
         ]
     if fast_mps > CHECKS.fastest_mps:
-        unit = "mm" if fast_mps > CHECKS.mm_mps else "mm or cm"
-        as_mm = of_robot("--rename x_m=x_mm --rename y_m=y_mm", own)
+        units = ("mm",) if fast_mps > CHECKS.mm_mps else ("cm", "mm")
+        named = [of_robot(f"--rename x_m=x_{u} --rename y_m=y_{u}", own) for u in units]
         return [
             finding(
-                f"the positions are in {unit}, not in m",
+                f"the positions are in {' or '.join(units)}, not in m",
                 f"the robot drives at {fast_mps:.0f} m/s by them, over {max(x_m, y_m):.0f} m",
-                f"choose metres in the export, or import a table anew with {as_mm}"
-                f"{'' if unit == 'mm' else ' (or x_cm and y_cm)'}",
+                "choose metres in the export, or import a table anew with "
+                f"{', or with '.join(named)}",
             )
         ]
     if robot.has_heading and _heading_is_constant(robot, pose):
@@ -167,7 +167,8 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             finding(
                 "the heading was not measured",
                 f"it is {np.degrees(pose[0, 2]):.1f} degrees in all {len(pose)} poses, to the bit",
-                "record it, or import without that column if the robot holds its heading",
+                "record it, or import anew with --heading-from-path, which takes it from the path "
+                "while the robot drives ahead",
             )
         ]
     return []

@@ -324,9 +324,7 @@ def _check_renames(options: ImportOptions, tables: list[Path], detections: Path 
         check_renames(names, files, KNOWN | OF_DETECTIONS, mapped)
 
 
-def _exchanged(
-    poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]
-) -> list[PoseSeries]:
+def _exchanged(poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]) -> list[PoseSeries]:
     """Poses under the numbers of the robots that they are of."""
     ids = {series.robot_id: series.robot_id for series in poses}
     for a, b in pairs:
@@ -516,7 +514,8 @@ def _check_rate(poses: PoseSeries) -> None:
         unit = next((u for u, times in TIME_UNITS.items() if step_s / times < SLOWEST_S), "ns")
         raise LogError(
             f"robot {poses.robot_id}: its poses are {step_s:g} s apart, too far to tell of a "
-            f"drive; if the times are in {unit}, name that column t_{unit}, in both files."
+            f"drive; if the times are in {unit}, name that column t_{unit} in both files, or "
+            f"import anew with --rename t_s=t_{unit}."
         )
 
 
