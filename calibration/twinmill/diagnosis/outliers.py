@@ -218,6 +218,8 @@ def odd_runs(
 ) -> list[Outlier]:
     """Runs of one robot that the model as given misses, where it predicts others, and by what.
 
+    None of those that nothing explains: what they have the others may not show.
+
     Args:
         opened: logs of one robot; of others, and of tables, there is no answer.
         first: the state with the model as given.
@@ -236,7 +238,8 @@ def odd_runs(
     found = []
     for a in missed:
         off = _judged(a, [a, *usual])
-        if off and off.effect and _is_of_it_alone(a, off, usual):
+        explained = off is not None and off.effect and off.score_after <= good
+        if explained and _is_of_it_alone(a, off, usual):
             found.append(off.of_run(opened[a.robot_id].measurement))
     return found
 
