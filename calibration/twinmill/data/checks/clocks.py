@@ -167,8 +167,8 @@ def check_one_clock(
         checked.finding(
             f"the robot follows its commands {late_s:.2f} s after their stamps, beside its lag",
             f"the commands explain {1 - own.left:.1%} of the motion with that shift",
-            "that is a delay of the robot (diagnose names it input_delay), if one clock stamped "
-            f"both as it is declared; else {without}",
+            "that is a delay of the robot (input_delay, or what diagnose names), if one clock "
+            f"stamped both as it is declared; else {without}",
             fatal=False,
         )
     ]
