@@ -82,13 +82,14 @@ NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
 OF_ROBOTS = ((Real, Mapping), "a number, or a dictionary of numbers by robot")
+PAIRS = "a list of pairs of robots, as [(1, 2)]"
 SWITCH = (bool, "True or False")
 # Options of `import_log`, named as those of `twinmill import` and in its sentences: the field of
 # `ImportOptions`, the kinds that it may be of, and these in words.
 IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "robot": ("robots", *BY_NAME),
     "rename": ("rename", *BY_NAME),
-    "exchange": ("exchange", (list, tuple), "a list of pairs of robots, as [(1, 2)]"),
+    "exchange": ("exchange", (list, tuple), PAIRS),
     "mapping": ("mapping", (str, Path), A_PATH),
     "flip": ("flips", (*NAMES[0], Mapping), "a list of names, or a dictionary of these by robot"),
     "up": ("up", str, "`y` or `z`"),
@@ -1570,7 +1571,9 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
         told["own_renames"] = own
     if "exchange" in told:
         for pair in told["exchange"]:
-            checked("exchange", pair, (list, tuple), "a list of pairs of robots, as [(1, 2)]")
+            two = isinstance(pair, (list, tuple)) and [isinstance(n, Integral) for n in pair]
+            if two != [True, True]:
+                raise TypeError(f"exchange: has {pair!r}, and must be {PAIRS}.")
         told["exchange"] = tuple(map(tuple, told["exchange"]))
     if "flips" in told:
         flips = told["flips"]
