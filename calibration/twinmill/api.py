@@ -82,12 +82,14 @@ NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
 OF_ROBOTS = ((Real, Mapping), "a number, or a dictionary of numbers by robot")
+PAIRS = "a list of pairs of robots, as [(1, 2)]"
 SWITCH = (bool, "True or False")
 # Options of `import_log`, named as those of `twinmill import` and in its sentences: the field of
 # `ImportOptions`, the kinds that it may be of, and these in words.
 IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "robot": ("robots", *BY_NAME),
     "rename": ("rename", *BY_NAME),
+    "exchange": ("exchange", (list, tuple), PAIRS),
     "mapping": ("mapping", (str, Path), A_PATH),
     "flip": ("flips", (*NAMES[0], Mapping), "a list of names, or a dictionary of these by robot"),
     "up": ("up", str, "`y` or `z`"),
@@ -1501,8 +1503,10 @@ def import_log(
         robot_id: whose the rows are, for files that do not say.
         heading_offset_deg: from the tracked body's x axis to the robot's front, left positive; or
             by robot.
-        options: `robot` (numbers by name) and `rename` (our column by the file's), dictionaries;
-            `mapping`, a path; `flip`, a list of our columns, or lists by robot; `up`;
+        options: `robot` (numbers by name) and `rename` (our column by the file's; by a robot's
+            number a dictionary of its own), dictionaries; `mapping`, a path; `flip`, a list of our
+            columns, or lists by robot; `exchange`, pairs of robots that have each other's poses;
+            `up`;
             `pose_shift_s` and `pose_clock_ppm`, numbers, or dictionaries by robot;
             `heading_from_path`, `same_clock`; of a bag `pose` and `command` (lists of
             topics), `receive_stamps`, `wheelbase_m`, `full_duty`.
@@ -1558,6 +1562,19 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
         told[field] = _of_robots(name, options[name], kinds, wanted)
     if "mapping" in told:
         told["mapping"] = Path(told["mapping"])
+    if "rename" in told:
+        names = told["rename"]
+        own = {robot: names[robot] for robot in names if isinstance(robot, Integral)}
+        for robot, renames in own.items():
+            checked(f"rename of {robot!r}", renames, *BY_NAME)
+        told["rename"] = {old: new for old, new in names.items() if old not in own}
+        told["own_renames"] = own
+    if "exchange" in told:
+        for pair in told["exchange"]:
+            two = isinstance(pair, (list, tuple)) and [isinstance(n, Integral) for n in pair]
+            if two != [True, True]:
+                raise TypeError(f"exchange: has {pair!r}, and must be {PAIRS}.")
+        told["exchange"] = tuple(map(tuple, told["exchange"]))
     if "flips" in told:
         flips = told["flips"]
         by_robot = flips if isinstance(flips, Mapping) else {None: flips}

@@ -306,6 +306,14 @@ WRONG_TYPES = {  # what is called, and what the sentence says
         lambda log, model: tm.import_log("a.csv", "b.csv", rename=["yaw=theta_rad"]),
         "rename: is a list, and must be a dictionary",
     ),
+    "names of one robot": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", rename={2: ["x_m"]}),
+        "rename of 2: is a list, and must be a dictionary",
+    ),
+    "one robot to be exchanged": (
+        lambda log, model: tm.import_log("a.csv", "b.csv", exchange=[(1,)]),
+        "exchange: has \\(1,\\), and must be a list of pairs",
+    ),
     "shift": (
         lambda log, model: tm.import_log("a.csv", "b.csv", pose_shift_s="1"),
         "pose_shift_s: is '1', and must be a number",

@@ -190,6 +190,7 @@ def test_names_that_are_exchanged_are_told_for_both(robot):
     found = _findings([replace(robot, **theirs), replace(other, **pose)])
     assert [f.robot_id for f in found] == [3, 5]
     assert "exchanged with that of robot 5" in found[0].what
+    assert {f.remedy for f in found} == {"import anew with --exchange R03=R05"}
 
 
 @pytest.mark.parametrize("ppm", [-1000, 1000])

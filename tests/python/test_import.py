@@ -214,7 +214,7 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
         (
             _in_unit(POSES + "1.5,4,0,0,0\n2,4,0,0,0\n", 1e3),
             _in_unit(COMMANDS + "1.9,4,0,0,0,0\n", 1e3),
-            r"poses are 500 s apart.* times are in ms, name that column t_ms, in both files",
+            r"poses are 500 s apart.* times are in ms,.* --rename t_s=t_ms",
         ),
         (
             POSES.replace("\n", "\n1772366400000000", 1),

@@ -4,10 +4,13 @@
 The drive is algebra: a unicycle that obeys at once, whose path is summed here.
 """
 
+import re
+
 import numpy as np
 import pytest
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import read_log
 
 STEP_S, HELD_S, DURATION_S = 0.02, 1.2, 60.0
 TURNED = 0.4  # the heading at the beginning
@@ -91,6 +94,42 @@ def test_velocities_of_the_room_under_the_names_of_the_bodys_are_told(tmp_path):
     (tmp_path / "o.lcmlog").unlink()
     room = "vx_world_mps,vy_world_mps,omega_radps"
     assert not _said(tmp_path, POSES, poses, room, commands)
+
+
+@pytest.mark.parametrize("late_s", [-0.4, -0.08, 0.0, 0.08, 0.4])
+def test_poses_before_their_commands_belie_one_clock_and_those_after_are_a_delay(tmp_path, late_s):
+    t_s, told, pose = _drive()
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    said = _said(tmp_path, POSES, np.column_stack([t_s + late_s, pose]), BODY, commands)
+    assert ("so that one clock did not stamp both" in said) == (late_s < 0)
+    assert ("a delay of the robot (input_delay" in said) == (late_s > 0)
+    if late_s:
+        told_s = float(re.search(r"(\d+\.\d+) s (before|after)", said)[1])
+        assert told_s == pytest.approx(abs(late_s), abs=0.02)
+    if late_s < 0:
+        shift_s = float(re.search(r"--pose-shift-s=(\d+\.\d+)", said)[1])
+        (tmp_path / "o.lcmlog").unlink()
+        mended = np.column_stack([t_s + late_s + shift_s, pose])
+        assert not _said(tmp_path, POSES, mended, BODY, commands)
+
+
+def test_a_heading_that_nobody_measured_is_taken_from_the_path_instead(tmp_path):
+    t_s, told, pose = _drive()
+    tables = {
+        "p.csv": (POSES, np.column_stack([t_s, pose[:, :2], 0 * t_s + 0.3])),
+        "c.csv": (BODY, np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])),
+    }
+    for name, (header, rows) in tables.items():
+        np.savetxt(tmp_path / name, rows, "%.7f", ",", header=f"t_s,{header}", comments="")
+    options = ImportOptions(robot_id=1)
+    done = import_log(*(tmp_path / n for n in tables), tmp_path / "o.lcmlog", options=options)
+    assert "not measured" in done["warnings"][0] and "--heading-from-path" in done["warnings"][0]
+    options = ImportOptions(robot_id=1, path_heading=True, force=True)
+    done = import_log(*(tmp_path / n for n in tables), tmp_path / "o.lcmlog", options=options)
+    (robot,) = read_log(tmp_path / "o.lcmlog").robots.values()
+    heading_rad = np.interp(robot.pose_t_s[robot.valid], t_s, pose[:, 2])
+    off_rad = np.angle(np.exp(1j * (robot.pose[robot.valid, 2] - heading_rad)))
+    assert robot.valid.mean() > 0.2 and np.abs(np.median(off_rad)) < 0.02
 
 
 def test_clocks_that_run_apart_by_a_thousandth_are_told_at_import(tmp_path):

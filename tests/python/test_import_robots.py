@@ -190,6 +190,62 @@ def test_a_mistake_of_one_robot_has_a_remedy_of_that_robot_alone(imports, spoil,
     np.testing.assert_allclose(robots[2].pose, right[2].pose, atol=1e-6)
 
 
+def _swapped(table, *names):
+    """The table with two columns under each other's names, in their place."""
+    return table.rename(columns=dict(zip(names, names[::-1], strict=True)))[list(table.columns)]
+
+
+@pytest.mark.parametrize(
+    ("spoil_poses", "spoil_commands"),
+    [
+        (lambda p: _swapped(p, "x_m", "y_m"), lambda c: c),
+        (lambda p: p, lambda c: _swapped(c, "vx_mps", "omega_radps")),
+        (lambda p: p.assign(theta_rad=np.degrees(p.theta_rad)), lambda c: c),
+        (lambda p: p, lambda c: c.assign(vx_mps=1000 * c.vx_mps)),
+    ],
+    ids=["axes", "commands", "degrees", "millimetres"],
+)
+def test_a_column_of_one_robot_is_read_by_the_remedy_as_printed(
+    imports, spoil_poses, spoil_commands
+):
+    (p1, c1), (p2, c2) = _drive(1), _drive(2)
+    right, _ = imports([p1, p2], [c1, c2])
+    poses, commands = [p1, spoil_poses(p2)], [c1, spoil_commands(c2)]
+    _, said = imports(poses, commands)
+    remedy = re.search(r"import anew with (--rename R02=[^.;,]*)", said)[1]
+    robots, _ = imports(poses, commands, *shlex.split(remedy))
+    _same(robots[1], right[1])
+    np.testing.assert_allclose(robots[2].pose, right[2].pose, atol=1e-6)
+    np.testing.assert_allclose(robots[2].command, right[2].command, atol=1e-6)
+
+
+def test_a_remedy_in_our_names_holds_for_columns_of_other_names(imports):
+    tables = [_drive(1), _drive(2)]
+    right, _ = imports(*zip(*tables, strict=True))
+    as_mm = {"x_m": "y_mm", "y_m": "x_mm"}
+    poses = [p.assign(x_m=1e3 * p.x_m, y_m=1e3 * p.y_m).rename(columns=as_mm) for p, _ in tables]
+    commands = [c for _, c in tables]
+    _, said = imports(poses, commands)
+    assert "import anew with --rename x_m=y_m --rename y_m=x_m." in said
+    robots, said = imports(poses, commands, "--rename=x_m=y_m", "--rename=y_m=x_m")
+    assert "!" not in said
+    np.testing.assert_allclose(robots[2].pose, right[2].pose, atol=1e-6)
+
+
+@pytest.mark.parametrize("under", [{1: 2, 2: 1, 3: 3}, {1: 2, 2: 3, 3: 1}], ids=["two", "three"])
+def test_names_that_are_exchanged_are_put_right_by_the_remedy_as_printed(imports, under):
+    tables = {k: _drive(k) for k in under}
+    poses, commands = zip(*tables.values(), strict=True)
+    right, _ = imports(poses, commands)
+    wrong = [table.assign(robot_id=under[k]) for k, table in zip(tables, poses, strict=True)]
+    _, said = imports(wrong, commands)
+    (remedy,) = set(re.findall(r"import anew with (--exchange[^.;]*)", said))
+    robots, said = imports(wrong, commands, *shlex.split(remedy))
+    assert "!" not in said
+    for number in tables:
+        _same(robots[number], right[number])
+
+
 def test_a_mistake_of_all_robots_has_one_remedy(imports):
     tables = [(p.assign(y_m=-p.y_m, theta_rad=-p.theta_rad), c) for p, c in map(_drive, (1, 2))]
     _, said = imports(*zip(*tables, strict=True))

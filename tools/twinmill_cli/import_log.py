@@ -65,6 +65,26 @@ def _flips(given: list[str]) -> dict[int | None, frozenset[str]]:
     return columns
 
 
+def _renames(given: list[str]) -> dict[int | None, dict[str, str]]:
+    """New names of columns by robot; None stands for all of them."""
+    names: dict[int | None, dict[str, str]] = {}
+    for text in given:
+        old, new = _pair(text, "--rename OLD=NEW")
+        robot, _, own = old.partition("=")
+        key = _number_of(robot) if own else None
+        names.setdefault(key, {})[old if key is None else own] = new
+    return names
+
+
+def _two_robots(text: str) -> tuple[int, int]:
+    numbers = [_number_of(robot) for robot in text.split("=")]
+    if len(numbers) != 2 or None in numbers or numbers[0] == numbers[1]:
+        raise typer.BadParameter(
+            f"{text} is no two robots, as R01=R02 is.", param_hint="'--exchange'"
+        )
+    return numbers[0], numbers[1]
+
+
 def register(app: typer.Typer) -> None:
     """Adds the command `import` to the application."""
     app.command("import", no_args_is_help=True)(_command)
@@ -155,7 +175,16 @@ def _command(
     rename: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="OLD=NEW", help="Read column OLD of the CSV files as NEW, as in yaw=theta_deg."
+            metavar="[ROBOT=]OLD=NEW",
+            help="Read column OLD of the CSV files as NEW, as in yaw=theta_deg, or R02=x_m=y_m of "
+            "one robot.",
+        ),
+    ] = None,
+    exchange: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROBOT=ROBOT",
+            help="Two robots of which each has the other's poses, as in R01=R02.",
         ),
     ] = None,
     mapping: Annotated[
@@ -232,6 +261,7 @@ def _command(
     shifts_s = _of_robots("--pose-shift-s", pose_shift_s)
     gains_ppm = _of_robots("--pose-clock-ppm", pose_clock_ppm)
     turns_deg = _of_robots("--heading-offset-deg", heading_offset_deg)
+    renames = _renames(rename or [])
     if beside:
         raise LogError(
             f"{beside[0]}: stands alone; write the option before each file, or quote the "
@@ -260,7 +290,9 @@ def _command(
         wheelbase_m=wheelbase_m,
         full_duty=full_duty,
         robot_id=robot_id,
-        rename=dict(_pair(text, "--rename OLD=NEW") for text in rename or []),
+        rename=renames.pop(None, {}),
+        own_renames=renames,
+        exchange=tuple(_two_robots(text) for text in exchange or []),
         robots={
             name: _number(number)
             for name, number in (_pair(text, "--robot NAME=ID") for text in robot or [])

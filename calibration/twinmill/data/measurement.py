@@ -16,6 +16,8 @@ from twinmill.data.checks import (
     check_driven,
     check_poses,
     check_recorded,
+    of_all_robots,
+    own_option,
 )
 from twinmill.data.checks.lateness import Lateness
 from twinmill.data.log import Log, LogError, RobotLog, read_log
@@ -66,8 +68,13 @@ class Measurement:
 
     @property
     def same_clock(self) -> bool:
-        """The log says that one clock stamped commands and poses."""
-        return self.track.same_clock
+        """The log says that one clock stamped commands and poses, and they do not belie it."""
+        return self.track.same_clock and not self.two_clocks
+
+    @property
+    def two_clocks(self) -> bool:
+        """Poses that come before their commands belie that one clock stamped both."""
+        return any(f.two_clocks for f in self.findings)
 
     @property
     def steady(self) -> bool:
@@ -138,9 +145,14 @@ class Measurement:
 
 
 def unsteady(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
-    """Sentences on robots that follow later, or sooner, from some time on, by their input."""
+    """Sentences on when commands act by the input: not as declared, or later from some time on."""
     runs = [m for m in measurements if isinstance(m, Measurement)]
-    told = [(m.label, _taken_into_account(f)) for m in runs for f in m.findings if not f.steady]
+    told = [
+        (m.label, _taken_into_account(f))
+        for m in runs
+        for f in m.findings
+        if f.two_clocks or not f.steady
+    ]
     if len(runs) == 1:
         return [f"{what[0].upper()}{what[1:]}." for _, what in told]
     return [f"{label}: {what}." for label, what in told]
@@ -264,16 +276,19 @@ def clean_measurements(
         except LogError as error:
             excluded.append(error)
             continue
-        runs = len(paths) * len(log.robots)
+        name, count = log.path.name, len(log.robots)
+        of_log: list[InputFinding] = []
         for robot in log.robots.values():
-            wrong = check_commanded(robot, log.path.name) or check_poses(robot, log.path.name)
-            findings += wrong
+            own = own_option(robot.robot_id, count)
+            wrong = check_commanded(robot, name) or check_poses(robot, name, own)
+            of_log += wrong
             if any(f.fatal for f in wrong):
                 continue
             try:
-                judged.append(_measured(log, robot, runs))
+                judged.append(_measured(log, robot, len(paths) * count))
             except LogError as error:
                 excluded.append(error)
+        findings += of_all_robots(of_log, {name: count})
     if not (judged or findings):
         raise excluded[0]
     read = Measurements(judged, [f"Left out: {error}" for error in excluded], [])

@@ -124,10 +124,12 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         heading_smooth, _ = local_line(robot.pose_t_s, pose[:, 2], segment, SMOOTH_S)
         astray_rad = _astray_rad(robot, pose, segment)
         if astray_rad:
+            back = abs(astray_rad) > np.pi - ASTRAY_RAD
             notes.append(
                 f"driven straight, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
                 "left of its heading; turn the poses by that (`twinmill import "
-                f"--heading-offset-deg R{robot.robot_id:02d}={np.degrees(astray_rad):.0f}`)."
+                f"--heading-offset-deg R{robot.robot_id:02d}={np.degrees(astray_rad):.0f}`)"
+                f"{', unless all its commands have the wrong sign (--flip)' if back else ''}."
             )
     else:
         heading_smooth = np.where(segment < 0, np.nan, 0.0)

@@ -15,7 +15,7 @@ import twinmill_native as native
 from twinmill.chance import chi2_above, f_above
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import State, Trial, fitted
-from twinmill.fitting.compare import GOOD
+from twinmill.fitting.compare import GOOD, Comparison
 from twinmill.fitting.fit import base_names
 from twinmill.fitting.opening import OWN, Opened, with_own_of_runs
 from twinmill.fitting.score_fit import ScoreFit
@@ -60,12 +60,15 @@ class Differing:
     @property
     def words(self) -> str:
         """What differs, from where to where."""
-        low, high = min(self.values.values()), max(self.values.values())
+        low, high = (of(self.values, key=self.values.get) for of in (min, max))
+        told = " to ".join(f"{self._told(self.values[who])} of {who}" for who in (low, high))
+        return f"{'motor lag' if self.name == LAG else GAIN_WORDS[self.name]} ({told})"
+
+    def _told(self, value: float) -> str:
+        """One of the values in words."""
         if self.name == LAG:
-            return f"motor lag ({low:.3f} to {high:.3f} s)"
-        middle = self.middle
-        ends = (f"{100 * (v / middle - 1):+.1f}" for v in (low, high))
-        return f"{GAIN_WORDS[self.name]} ({' to '.join(ends)} %)"
+            return f"{value:.3f} s"
+        return f"{100 * (value / self.middle - 1):+.1f} %"
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -81,12 +84,14 @@ class Apart:
         numbers: of which each has its own, those that tell most first.
         score_alike: held out, of what was found with one set of numbers for all.
         score_own: the same with numbers of its own for each.
+        missed: of runs those that the model as given misses, where it predicts others.
     """
 
     whose: Whose
     numbers: tuple[Differing, ...]
     score_alike: float
     score_own: float
+    missed: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -95,8 +100,15 @@ class Apart:
         return (
             f"{self.whose.capitalize()} differ in {differ}: one set of numbers for all leaves a "
             f"score of {self.score_alike:.2f}, numbers of its own for each {self.whose[:-1]} "
-            f"{self.score_own:.2f}."
+            f"{self.score_own:.2f}.{self._odd}"
         )
+
+    @property
+    def _odd(self) -> str:
+        """Which of the runs the model as given does not know."""
+        if not self.missed:
+            return ""
+        return f" The model as given misses {listed(self.missed)}, and predicts the others."
 
     def spread(self, name: str) -> float:
         """Standard deviation of a number among them; 0 of what does not differ."""
@@ -107,12 +119,13 @@ class Apart:
         return {**vars(self), "numbers": [n.to_json() for n in self.numbers]}
 
 
-def apart(opened: Sequence[Opened], last: Trial) -> Apart | None:
+def apart(opened: Sequence[Opened], last: Trial, before: Comparison) -> Apart | None:
     """In what those differ that have numbers of their own; None where one set does as well.
 
     Args:
         opened: of the search, in its order.
         last: the final trial.
+        before: of the model as given.
     """
     numbers = _differing(last.state)
     if not numbers:
@@ -121,7 +134,17 @@ def apart(opened: Sequence[Opened], last: Trial) -> Apart | None:
     if alike <= SETTINGS.news * last.held_score:
         return None
     by_run = any(isinstance(d, Trajectory) and d.by_run for d in last.fit.datasets)
-    return Apart("runs" if by_run else "robots", numbers, alike, last.held_score)
+    if not by_run:
+        return Apart("robots", numbers, alike, last.held_score)
+    return Apart("runs", numbers, alike, last.held_score, _missed(last.fit.datasets, before))
+
+
+def _missed(datasets: Sequence[Trajectory], before: Comparison) -> tuple[str, ...]:
+    """Labels of runs of which all robots are missed, where those of others are not."""
+    keys, labels = _whose(datasets)
+    missed = {r.measurement.log_sha256 for r in before.missed}
+    missed -= {r.measurement.log_sha256 for r in before.robots if r not in before.missed}
+    return tuple(labels[key] for key in dict.fromkeys(keys) if key in missed)
 
 
 def of_runs(found: Apart | None) -> bool:

@@ -43,6 +43,7 @@ from twinmill.diagnosis.notes import (
     is_random,
     lag_notes,
     marker_notes,
+    missed_notes,
     random_in_words,
     scatters_of,
     time_base_notes,
@@ -50,6 +51,7 @@ from twinmill.diagnosis.notes import (
 from twinmill.diagnosis.outliers import (
     Outlier,
     odd_of_two,
+    odd_runs,
     one_by_one,
     outliers,
     spread_of_lags_s,
@@ -172,26 +174,37 @@ def _diagnosed(
     unseen = not_shown(opened) | _changing(opened, model_file)
     course.opened, course.before, course.unseen = opened, before, unseen
     known = thinned_to_search(with_own_gains(judged(opened)))
+
+    def look(at: Sequence[Opened], doing: str = "") -> tuple[Sequence[Opened], State, Search]:
+        if doing:
+            progress(doing)
+        first = first_state(at, model_file, {*excluded, *unseen})
+        done = search(first, progress, known=usual, begun=course.searches.append)
+        course.searches.append(done)
+        return at, first, done
+
     first = first_state(known, model_file, {*excluded, *unseen})
     usual = model_file.usual_score([o.measurement.log_sha256 for o in known])
     off = odd_of_two(known, first, GOOD * usual, progress)
     if off:
         known = thinned_to_search(_without(judged(opened), off))
         first = first_state(known, model_file, {*excluded, *unseen})
+    odd = odd_runs(known, first, GOOD * usual, progress)
+    runs_off = [] if all(r.by_own_numbers for r in odd) else odd
     course.off = off
-    done = search(first, progress, known=usual, begun=course.searches.append)
-    course.searches.append(done)
+    known, first, done = look(_without_runs(known, runs_off))
     lags_s = 0.0
     runs = [] if off else runs_with_own(known, first, done.last, usual)
     if runs:
-        progress("looking again, each run with its numbers")
-        own_first = first_state(runs, model_file, {*excluded, *unseen})
-        own_done = search(own_first, progress, known=usual, begun=course.searches.append)
-        if tells_more(own_done.last, done.last):
-            known, first, done = runs, own_first, own_done
+        own = look(runs, "looking again, each run with its numbers")
+        if tells_more(own[-1].last, done.last):
+            known, first, done = own
         else:
             runs = []
-        course.searches.append(done)
+            course.searches.append(done)
+    if odd and not (runs_off or runs):
+        runs_off = odd
+        known, first, done = look(_without_runs(known, odd), "looking again without odd runs")
     if not (off or runs):
         progress("looking for robots that differ")
         alone = one_by_one(known, done, progress)
@@ -201,10 +214,8 @@ def _diagnosed(
         if off or lags_s:
             known = _without(known, off)
             known = with_own_lags(known, lags_s) if lags_s else known
-            progress("looking again without them" if off else "looking again, each with its lag")
-            first = first_state(known, model_file, {*excluded, *unseen})
-            done = search(first, progress, known=usual, begun=course.searches.append)
-            course.searches.append(done)
+            again = "looking again without them" if off else "looking again, each with its lag"
+            known, first, done = look(known, again)
     progress("looking for what no effect explains")
     course.motion = _concluded(
         opened,
@@ -215,18 +226,24 @@ def _diagnosed(
         before=before,
         unseen=unseen,
         off=off,
+        runs_off=runs_off,
         lags_s=lags_s,
     )
     return _robots_first(with_detections(course.motion, model_file, progress, excluded))
 
 
 def _robots_first(diagnosis: Diagnosis) -> Diagnosis:
-    """With the robots that differ at the head of the sentence; the rest of it is on the others."""
-    if not diagnosis.robots_off:
-        return diagnosis
+    """With robots or runs that differ at the head of the sentence; the rest is on the others."""
     off = {r.robot_id: r.sentence for r in diagnosis.robots_off}
-    others = of_others(len(diagnosis.robots) - len(off), diagnosis.sentence)
-    return replace(diagnosis, sentence=" ".join([*off.values(), others]))
+    left = len(diagnosis.robots) - len(off)
+    if diagnosis.runs_off:
+        off = {r.log_sha256: r.sentence for r in diagnosis.runs_off}
+        left = len(diagnosis.opened) - len(off)
+    if not off:
+        return diagnosis
+    return replace(
+        diagnosis, sentence=" ".join([*off.values(), of_others(left, diagnosis.sentence)])
+    )
 
 
 def _as_given(before: Comparison, opened: Sequence[Opened], known: Sequence[Opened]) -> float:
@@ -239,6 +256,11 @@ def _as_given(before: Comparison, opened: Sequence[Opened], known: Sequence[Open
 def _without(opened: Sequence[Opened], off: Sequence[Outlier]) -> list[Opened]:
     gone = {r.robot_id for r in off}
     return [o for o in opened if _robot_of(o) not in gone]
+
+
+def _without_runs(opened: Sequence[Opened], off: Sequence[Outlier]) -> list[Opened]:
+    gone = {r.log_sha256 for r in off}
+    return [o for o in opened if o.measurement.log_sha256 not in gone]
 
 
 def first_state(
@@ -330,6 +352,7 @@ def _concluded(
     before: Comparison,
     unseen: dict[str, str],
     off: Sequence[Outlier],
+    runs_off: Sequence[Outlier],
     lags_s: float,
 ) -> Diagnosis:
     """What the search of the motion tells, before cameras are looked at."""
@@ -402,7 +425,7 @@ def _concluded(
     faint_names = [name for name, _ in faint]
     hidden = [*faint, *unseen.items()]
     refit = _refit(done, findings)
-    own = apart(known, last)
+    own = apart(known, last, before)
     weighed = VerdictInputs(
         given,
         start.held_score,
@@ -451,6 +474,7 @@ def _concluded(
             *held_notes(known, findings),
             *lag_notes(lags_s),
             *marker_notes(modelled),
+            *([] if own or runs_off else missed_notes(before)),
             *heading_notes(last.fit.datasets, last.state.models),
             *few,
             *answers,
@@ -459,6 +483,7 @@ def _concluded(
         ],
         next_experiment=_after_a_look(drive, to_look_at),
         robots_off=tuple(off),
+        runs_off=tuple(runs_off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
         base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
         apart=own,

@@ -395,7 +395,8 @@ def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | Non
     """The model as given with all that was found, before its numbers."""
     model = model_file.model.copy()
     off = diagnosis.robots_off
-    own_effects = [catalogue_name(e.name) for r in off for e in r.parameters if e.name not in GAINS]
+    of_effects = [r for r in off if not r.by_gains]
+    own_effects = [catalogue_name(e.name) for r in of_effects for e in r.parameters]
     moved = diagnosis.model.effects[len(model.effects) :]
     kept = beyond.formula if beyond and beyond.kept else None
     gone = (*(kept.instead_of if kept else ()), *diagnosis.passing)

@@ -10,8 +10,10 @@ import twinmill_native as native
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.moments import held, left_out
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.compare import Comparison
 from twinmill.fitting.floor import overlapping
 from twinmill.fitting.opening import Opened, of_few_commands
+from twinmill.listing import listed
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import HEADING, drives_sideways
 from twinmill.predict.datasets import ErrorDataset, Trajectory
@@ -38,6 +40,14 @@ def time_base_notes(logs: list[ModelledLog]) -> list[str]:
         f"{len(bases)} logs) and {turning.mean():.3f} s in turns ({turning.min():.3f} to "
         f"{turning.max():.3f}); this was put right before anything else."
     ]
+
+
+def missed_notes(before: Comparison) -> list[str]:
+    """Which of several runs of one robot the model as given misses, where it predicts others."""
+    if len({r.robot_id for r in before.robots}) > 1 or not before.missed:
+        return []
+    named = listed([f"{r.measurement.log_name} (score {r.score:.2f})" for r in before.missed])
+    return [f"The model as given misses {named}, and predicts the other logs of this robot."]
 
 
 def geometry_notes(model: native.Model) -> list[str]:

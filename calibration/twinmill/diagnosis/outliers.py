@@ -1,31 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that differ from the others of their kind, how, and what difference would have shown.
 
-The common model is held. On each robot alone its own gains are tried, and, beside gains of its own
-within the spread of a kind, every effect of the catalogue. What a robot would take sets it apart if
-it is far from what each of the others would take: far over its own uncertainty and over the spread
-of the others, all parameters of an effect together (Mahalanobis 1936).
+The common model is held. On each robot alone its own gains are tried, of all its speed or by axis,
+and, beside gains of its own within the spread of a kind, every effect of the catalogue. What a
+robot would take sets it apart if it is far from what each of the others would take: far over its
+own uncertainty and over the spread of the others, all parameters of an effect together (Mahalanobis
+1936). Runs of one robot are compared as robots are.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.chance import chi2_above
+from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.screening import screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted
 from twinmill.fitting.opening import OWN, Opened, wide_gains, with_own_lags
 from twinmill.model.parameters import (
+    BASE_GAINS,
     GAINS,
     LAG_EFFECT,
     Parameter,
     ParameterEstimate,
     catalogue,
     catalogue_name,
+    drives_sideways,
     effect_parameters,
     key_of,
     newest_instance,
@@ -34,6 +38,7 @@ from twinmill.predict.datasets import Trajectory, total_score
 
 TRIED = 3
 WHEELS = "wheel_gain"
+OF_GAINS = {"gains": GAINS, "axes": BASE_GAINS}  # trials of gains alone: of all its speed, by axis
 SIDES = {
     ("fl", "rl"): "left wheels",
     ("fr", "rr"): "right wheels",
@@ -69,6 +74,7 @@ class Outlier:
         smallest_shown: by effect the smallest difference that this log would have shown.
         beside: what else is its own: speed and turn over the model's, its motor lag.
         models: with what all lack and its own, one for each log; none where its camera differs.
+        log_name, log_sha256: of the only run in which it differs; empty where it does in all.
     """
 
     robot_id: int
@@ -83,16 +89,35 @@ class Outlier:
     smallest_shown: dict[str, float]
     beside: list[ParameterEstimate]
     models: Sequence[native.Model] = ()
+    log_name: str = ""
+    log_sha256: str = ""
 
     @property
     def label(self) -> str:
         """The robot as channels name it, such as R03."""
         return f"R{self.robot_id:02d}"
 
+    def of_run(self, run: Measurement) -> "Outlier":
+        """The same of one run of a robot."""
+        told = self.sentence.partition(": ")[2]
+        return replace(
+            self,
+            robot_id=run.track.robot_id,
+            sentence=f"Run {run.log_name} differs: {told}",
+            log_name=run.log_name,
+            log_sha256=run.log_sha256,
+        )
+
     @property
     def by_gains(self) -> bool:
         """Whether its gains alone set it apart."""
-        return bool(self.parameters) and all(e.name in GAINS for e in self.parameters)
+        gains = (*GAINS, *BASE_GAINS)
+        return bool(self.parameters) and all(e.name in gains for e in self.parameters)
+
+    @property
+    def by_own_numbers(self) -> bool:
+        """Whether all its speed, its turning or its motor lag sets it apart, as runs may differ."""
+        return self.effect == LAG_EFFECT or {e.name for e in self.parameters} <= {*GAINS}
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -185,6 +210,65 @@ def odd_of_two(
     return [off] if off and off.effect else []
 
 
+def odd_runs(
+    opened: Sequence[Opened],
+    first: State,
+    good: float,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Outlier]:
+    """Runs of one robot that the model as given misses, where it predicts others, and by what.
+
+    None of those that nothing explains: what they have the others may not show.
+
+    Args:
+        opened: logs of one robot; of others, and of tables, there is no answer.
+        first: the state with the model as given.
+        good: score up to which the model predicts a run.
+        progress: told in words what is being done.
+    """
+    if len(opened) < 2 or len(_ids(opened)) != 1 or not all(o.floor for o in opened):
+        return []
+    runs = [_as_robot(o, k) for k, o in enumerate(opened)]
+    score = [fitted(_alone_state(runs, first, k)).held_score for k in range(len(runs))]
+    if not min(score) <= good < max(score):
+        return []
+    alone = _each_alone(runs, first, progress)
+    usual = [a for a in alone if score[a.robot_id] <= good]
+    missed = [_simplest(a) for a in alone if score[a.robot_id] > good]
+    found = []
+    for a in missed:
+        off = _judged(a, [a, *usual])
+        explained = off is not None and off.effect and off.score_after <= good
+        if explained and _is_of_it_alone(a, off, usual):
+            found.append(off.of_run(opened[a.robot_id].measurement))
+    return found
+
+
+def _as_robot(own: Opened, number: int) -> Opened:
+    """A run under a number of its own, to be compared with others as robots are."""
+    track = replace(own.measurement.track, robot_id=number)
+    return replace(own, measurement=replace(own.measurement, track=track))
+
+
+def _is_of_it_alone(own: Alone, off: Outlier, usual: Sequence[Alone]) -> bool:
+    """Whether another run surely has not what sets one apart; what it does not show it may have."""
+    trial = "gains" if off.by_own_numbers else "axes"
+    name = trial if off.by_gains else off.effect
+    mine, spread = _apart(own.trials[name])
+    others = [_apart(a.trials[name]) for a in usual]
+    aways = [(mine - theirs) @ np.linalg.pinv(spread + s) @ (mine - theirs) for theirs, s in others]
+    return any(chi2_above(float(away), len(mine)) < SETTINGS.odd_chance for away in aways)
+
+
+def _simplest(own: Alone) -> Alone:
+    """The same with gains and lag tried alone, if nothing else does better than one of them."""
+    plain = {name: own.trials[name] for name in ("gains", LAG_EFFECT)}
+    plain_cost, cost = (
+        min(t.fit.held_cost for t in trials.values()) for trials in (plain, own.trials)
+    )
+    return replace(own, trials=plain) if plain_cost < cost + SETTINGS.tie else own
+
+
 def anew(
     off: Outlier, opened: Sequence[Opened], common: native.Model, lag_std_s: float = 0.0
 ) -> Outlier:
@@ -206,7 +290,7 @@ def anew(
     free = tuple(p for name in names for p in _begun_at(off, common, name))
     trial = replace(fitted(State(data, [o.model for o in own], free)), names=names)
     if off.by_gains:
-        trial = _with_gains(trial)
+        trial = _with_gains(trial, [e.name for e in off.parameters])
     if not off.effect:
         beside, after = _own_numbers(trial), trial.held_score
         return replace(off, score_after=after, beside=beside, models=trial.fit.models)
@@ -215,7 +299,7 @@ def anew(
         off,
         parameters=parameters,
         score_after=after,
-        sentence=_plain(off.robot_id, parameters),
+        sentence=_plain(off.robot_id, parameters, common),
         why=_why(off.score_before, off.score_others, off.effect, after),
         beside=_own_numbers(trial),
         models=_models(trial, parameters),
@@ -247,7 +331,9 @@ def _each_alone(
         progress(f"robot {i} alone")
         as_all = fitted(_alone_state(opened, state, i))
         trials = {n: cross_validate(own, (n,)) for n in dict.fromkeys([*names, LAG_EFFECT])}
-        alone.append(Alone(i, as_all, own, {"gains": _with_gains(as_all), **trials}))
+        axes = drives_sideways(as_all.state.model)
+        gains = {n: _with_gains(as_all, g) for n, g in OF_GAINS.items() if n == "gains" or axes}
+        alone.append(Alone(i, as_all, own, {**gains, **trials}))
     return alone
 
 
@@ -290,9 +376,9 @@ def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list
     return [*wheels, *[n for n in best if n != WHEELS][:TRIED]]
 
 
-def _with_gains(as_all: Trial) -> Trial:
+def _with_gains(as_all: Trial, names: Sequence[str]) -> Trial:
     """Gains of its own, however large."""
-    free = wide_gains(as_all.state.model)
+    free = wide_gains(as_all.state.model, names)
     state = replace(as_all.state, free=free)
     fit = state.fit_of(free).fit()
     evidence = as_all.fit.held_cost - fit.held_cost
@@ -325,11 +411,15 @@ def _apart(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
 def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
     """The robot as an outlier, or None: of what sets it apart the most probable.
 
-    A lag in which all robots differ sets none apart; what imitates that is no fault of one.
+    A lag in which all robots differ sets none apart; what imitates that is no fault of one. Gains
+    by axis that do no better than one of all speed are that one.
     """
     best, best_name, best_p = None, "", 1.0
+    by_gains = own.trials["gains"].evidence
     for name, trial in own.trials.items():
         if trial.evidence < SETTINGS.odd_evidence:
+            continue
+        if name == "axes" and trial.evidence < by_gains + SETTINGS.tie:
             continue
         p_value = _p_value(own, name, alone)
         better = best is None or trial.fit.held_cost < best.fit.held_cost
@@ -345,7 +435,7 @@ def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
     after = best.held_score
     before = own.as_all.held_score
     others = total_score([a.as_all.held_score for a in alone if a is not own])
-    effect = best_name if best_name != "gains" else " + ".join(e.name for e in parameters)
+    effect = " + ".join(e.name for e in parameters) if best_name in OF_GAINS else best_name
     return Outlier(
         robot_id=own.robot_id,
         effect=effect,
@@ -354,10 +444,10 @@ def _judged(own: Alone, alone: Sequence[Alone]) -> Outlier | None:
         score_after=after,
         score_others=others,
         p_value=best_p,
-        sentence=_plain(own.robot_id, parameters),
+        sentence=_plain(own.robot_id, parameters, own.as_all.state.model),
         why=_why(before, others, effect, after),
         smallest_shown=_smallest(own),
-        beside=[] if best_name == "gains" else _own_numbers(best),
+        beside=[] if best_name in OF_GAINS else _own_numbers(best),
         models=_models(best, parameters),
     )
 
@@ -394,9 +484,8 @@ def _p_value(own: Alone, name: str, alone: Sequence[Alone]) -> float:
     middle = np.median(theirs, axis=0)
     scale = np.array([middle_and_scale(list(column))[1] for column in theirs.T])
     usual = np.array([p.std for p in own.trials[name].state.free])
-    least = {"gains": SETTINGS.spread, WHEELS: SETTINGS.spread / 2}.get(
-        name, SETTINGS.spread_of_effects * usual
-    )
+    of_gains = dict.fromkeys(OF_GAINS, SETTINGS.spread)
+    least = {**of_gains, WHEELS: SETTINGS.spread / 2}.get(name, SETTINGS.spread_of_effects * usual)
     total = spread + np.diag(np.maximum(scale, least) ** 2)
     away = float((mine - middle) @ np.linalg.solve(total, mine - middle))
     free = len(mine) - (name == WHEELS)
@@ -466,8 +555,11 @@ def _smallest(own: Alone) -> dict[str, float]:
 # -- plain words --------------------------------------------------------------------------------
 
 
-def _plain(robot_id: int, parameters: Sequence[ParameterEstimate]) -> str:
-    return f"R{robot_id:02d}: {in_words(parameters)}."
+def _plain(robot_id: int, parameters: Sequence[ParameterEstimate], common: native.Model) -> str:
+    """A sentence on a robot, by its own numbers beside those of all."""
+    axes = {e.name: e for e in parameters if e.name in BASE_GAINS}
+    words = _axis_words(axes, common) if axes else in_words(parameters)
+    return f"R{robot_id:02d}: {words}."
 
 
 def in_words(parameters: Sequence[ParameterEstimate]) -> str:
@@ -512,10 +604,21 @@ def _least(estimate: ParameterEstimate) -> float:
     return 2 * SETTINGS.spread if estimate.name in GAINS or _of_wheel(estimate) else 0.0
 
 
+def _axis_words(gains: Mapping[str, ParameterEstimate], common: native.Model) -> str:
+    """Axes on which a robot differs from the others; at least that on which it surely does most."""
+    away = {n: (e.value / common.get(n) - 1, e.std / common.get(n)) for n, e in gains.items()}
+    told = [n for n, (by, std) in away.items() if abs(by) > max(2 * std, 2 * SETTINGS.spread)]
+    told = told or [max(away, key=lambda n: abs(away[n][0]) / max(away[n][1], 1e-9))]
+    return " and ".join(_gain_words({n: away[n][0] for n in told}))
+
+
 def _gain_words(gains: dict[str, float]) -> list[str]:
     words = {
-        "theta_a1": ("drives {:.0f} % faster", "drives {:.0f} % slower"),
-        "theta_a2": ("turns {:.0f} % more", "turns {:.0f} % less"),
+        GAINS[0]: ("drives {:.0f} % faster", "drives {:.0f} % slower"),
+        GAINS[1]: ("turns {:.0f} % more", "turns {:.0f} % less"),
+        BASE_GAINS[0]: ("drives {:.0f} % faster ahead", "drives {:.0f} % slower ahead"),
+        BASE_GAINS[1]: ("drives {:.0f} % faster sideways", "drives {:.0f} % slower sideways"),
+        BASE_GAINS[2]: ("turns {:.0f} % more", "turns {:.0f} % less"),
     }
     return [words[n][v < 0].format(100 * abs(v)) + " than the others" for n, v in gains.items()]
 

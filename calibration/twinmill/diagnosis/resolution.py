@@ -4,10 +4,12 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 
+import twinmill_native as native
+
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import State
 from twinmill.fitting.opening import Opened, wide_gains
-from twinmill.model.parameters import GAINS
+from twinmill.model.parameters import BASE_GAINS, GAINS, drives_sideways
 
 
 @dataclass(frozen=True)
@@ -18,11 +20,15 @@ class Resolution:
         robot_id: whose.
         speed, turn: smallest differences of its speed and of its rate of turn from the model's that
             would have been beyond doubt, as shares; None where its drive does not tell.
+        ahead, sideways: the same of its speed along one axis alone; None as well of a robot that
+            cannot drive sideways, of which ahead is all its speed.
     """
 
     robot_id: int
     speed: float | None
     turn: float | None
+    ahead: float | None
+    sideways: float | None
 
     def to_json(self) -> dict:
         """All fields."""
@@ -46,14 +52,24 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
     for model in models:
         for name in GAINS:
             model.set(name, 1.0)
-    free = wide_gains(models[0])
+    speed, turn = _shown(logs, models, GAINS)
+    axes = _shown(logs, models, BASE_GAINS) if drives_sideways(models[0]) else (None, None)
+    return Resolution(logs[0].measurement.track.robot_id, speed, turn, *axes[:2])
+
+
+def _shown(
+    logs: Sequence[Opened], models: Sequence[native.Model], names: Sequence[str]
+) -> tuple[float | None, ...]:
+    """Of each gain the smallest difference that would have been beyond doubt, as a share of it."""
+    free = wide_gains(models[0], names)
     data = [replace(o.data, own=_clock(o)) for o in logs]
-    fit = State(data, models, free).fit_of(free).fit()
+    own = [m.copy() for m in models]
+    fit = State(data, own, free).fit_of(free).fit()
     estimates = {e.name: e for e in fit.estimates}
-    speed, turn = (
-        SETTINGS.resolved * estimates[n].std if estimates[n].seen else None for n in GAINS
+    return tuple(
+        SETTINGS.resolved * estimates[n].std / models[0].get(n) if estimates[n].seen else None
+        for n in names
     )
-    return Resolution(logs[0].measurement.track.robot_id, speed, turn)
 
 
 def _clock(own: Opened) -> tuple:

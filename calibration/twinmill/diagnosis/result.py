@@ -46,6 +46,7 @@ class Diagnosis:
         notes: sentences on what to keep in mind.
         next_experiment: which run would settle what this log leaves open, or None.
         robots_off: those that differ from the others.
+        runs_off: runs of one robot that differ from those that the model as given predicts.
         detections: of the robots' cameras with the model as given, or None.
         detections_after: with the effects of the camera that were found; None if there are none.
         detection_steps: the camera's effects as found, each with the detections' score on held-out
@@ -74,6 +75,7 @@ class Diagnosis:
     notes: list[str]
     next_experiment: dict | None
     robots_off: tuple[Outlier, ...] = ()
+    runs_off: tuple[Outlier, ...] = ()
     detections: DetectionComparison | None = None
     detections_after: DetectionComparison | None = None
     detection_steps: Sequence[tuple[str | None, float]] = ()
@@ -85,8 +87,8 @@ class Diagnosis:
 
     @property
     def lines(self) -> list[str]:
-        """The sentence in parts: one for each robot that differs, then what is said of the rest."""
-        own = [r.sentence for r in self.robots_off]
+        """The sentence in parts: one for each that differs, then what is said of the rest."""
+        own = [r.sentence for r in (*self.robots_off, *self.runs_off)]
         rest = self.sentence
         for sentence in own:
             rest = rest.removeprefix(sentence).lstrip()
@@ -191,6 +193,7 @@ class Diagnosis:
             "robots": [r.to_json() for r in self.robots],
             "apart": self.apart.to_json() if self.apart else None,
             "robots_off": [r.to_json() for r in self.robots_off],
+            "runs_off": [{"log": r.log_name, **r.to_json()} for r in self.runs_off],
             "camera": [f.to_json() for f in self.camera],
             "bits": self.detections.to_json() if self.detections else None,
             "bits_after": self.detections_after.to_json() if self.detections_after else None,

@@ -13,6 +13,10 @@ from twinmill.diagnosis.ties import of_levels
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.compare import GOOD, LACKING, MISSING
 
+CHANGED = (
+    "What changed between them is outside the catalogue: look at battery, load, wheels and floor."
+)
+
 
 @dataclass(frozen=True)
 class VerdictInputs:
@@ -57,8 +61,12 @@ class VerdictInputs:
     @property
     def verdict(self) -> str:
         """One of the verdicts that `Diagnosis.verdict` lists; runs that differ no effect makes."""
-        only_runs = of_runs(self.apart) and not self.effects
-        return "outside_catalogue" if only_runs else self._within
+        return "outside_catalogue" if self._only_runs else self._within
+
+    @property
+    def _only_runs(self) -> bool:
+        """Runs differ, and no effect is found beside that."""
+        return of_runs(self.apart) and not self.effects
 
     @property
     def _within(self) -> str:
@@ -212,10 +220,13 @@ class VerdictInputs:
     def sentence(self) -> str:
         """The verdict for people, after what the input and what robots or runs differ in."""
         apart = [self.apart.sentence] if self.apart else []
+        apart += [CHANGED] if self._only_runs else []
         return " ".join([*self.unsteady, *apart, self._own])
 
     @property
     def _nothing(self) -> str:
+        if self._only_runs:
+            return "Within each run nothing"
         return "Nothing else" if self.unsteady or self.apart else "Nothing"
 
     @property

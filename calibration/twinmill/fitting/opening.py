@@ -174,6 +174,7 @@ def _on_its_clock(measurement: Measurement, model_file: ModelFile) -> tuple[nati
     """
     model = model_file.model.for_robot(measurement.track.robot_id)
     told = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
+    told = told and not measurement.two_clocks
     declared = measurement.same_clock
     if declared and not told:
         model.set(CLOCK, 0.0)
@@ -302,9 +303,10 @@ def thinned(opened: Sequence[Opened], every: int) -> list[Opened]:
     ]
 
 
-def wide_gains(model: native.Model) -> tuple[Parameter, ...]:
-    """A robot's own gains where they are in question."""
-    return tuple(replace(p, usual=1.0, std=WIDE_STD) for p in base_parameters(model, GAINS))
+def wide_gains(model: native.Model, names: Sequence[str] = GAINS) -> tuple[Parameter, ...]:
+    """A robot's own gains where they are in question, those of the base about the model's."""
+    free = base_parameters(model, names)
+    return tuple(replace(p, usual=model.get(p.name), std=WIDE_STD) for p in free)
 
 
 def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:

@@ -17,6 +17,7 @@ from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.settings import FLOOR_SETTINGS
+from twinmill.listing import listed
 from twinmill.model.parameters import ParameterEstimate, catalogue
 from twinmill.report import Figure, Section, comparisons, detections, formula, show, tables
 from twinmill.report.charted import charts
@@ -156,14 +157,20 @@ def each_robot(diagnosis: Diagnosis) -> Table:
 def _would_show(diagnosis: Diagnosis) -> list[str]:
     """How small a difference these logs would have shown, over all robots; nothing if none."""
     told = []
-    for name, key in (("speed", "speed"), ("turning", "turn")):
+    of_which = {
+        "speed": "speed",
+        "turn": "turning",
+        "ahead": "speed ahead alone",
+        "sideways": "speed sideways alone",
+    }
+    for key, name in of_which.items():
         known = [100 * d for r in diagnosis.robots if (d := getattr(r, key)) is not None]
         if known:
             ends = dict.fromkeys(f"{of(known):.1f}" for of in (min, max))
             told.append(f"{' to '.join(ends)} % in {name}")
     if not told:
         return []
-    shown = " and ".join(told)
+    shown = listed(told)
     return [f"These logs would have shown a difference of {shown}; a smaller one may be there."]
 
 
@@ -277,7 +284,7 @@ def _said(diagnosis: Diagnosis) -> list[RenderableType]:
 
 
 def _tone_of(diagnosis: Diagnosis) -> Tone:
-    return "bad" if diagnosis.robots_off else TONES[diagnosis.verdict]
+    return "bad" if diagnosis.robots_off or diagnosis.runs_off else TONES[diagnosis.verdict]
 
 
 def _each(diagnosis: Diagnosis) -> str:

@@ -103,7 +103,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
 
 def _clock(robot: RobotComparison) -> str:
     """Of the poses, against that of the commands."""
-    if robot.measurement.track.same_clock and not robot.time_offset_s:
+    if robot.measurement.same_clock and not robot.time_offset_s:
         return "one stamped poses and commands"
     side = "ahead of" if robot.time_offset_s >= 0 else "behind"
     return f"motion capture {number(1000 * abs(robot.time_offset_s))} ms {side} the robot"

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.add import OWN_GAINS
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import catalogue, instance_of
 from twinmill.workbench.bench import moves
 from twinmill.workbench.panel import PageActions, estimate, scored, tone
 from twinmill.workbench.session import beside_label, effect_of
@@ -159,11 +159,14 @@ class MissingPanel:
             ui.label(note).classes("soft").style("margin-top: 6px")
 
     def _robot(self, off: dict) -> None:
-        """One that differs from the others: how, and its own effect to be taken in."""
+        """One that differs from the others: how, and its own effect to be taken in.
+
+        Gains by axis are of the base, and `explain` writes them.
+        """
         sentence, effect = off.get("sentence"), off["effect"]
         if not sentence:
             return
-        if effect is None or not moves(effect):
+        if effect is None or not moves(effect) or instance_of(effect) == "base":
             _card("wrong", html.escape(sentence))
             return
         with ui.element("div").classes("note wrong").props(f'data-testid="off-{off["robot_id"]}"'):

@@ -9,7 +9,7 @@ import pytest
 from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.resolution import resolutions
+from twinmill.diagnosis.resolution import Resolution, resolutions
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 
@@ -22,14 +22,14 @@ NOISE = (
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory, model_text):
-    """Robots of the twin that are alike but for one, slower by so much; and their model."""
+    """Robots of the twin that are alike but for one, of less of one number; and their model."""
     folder = tmp_path_factory.mktemp("alike")
     write_rich_script(folder / "script.csv", DURATION_S, 1)
     given = model_text("alike") + NOISE
     (folder / "given.toml").write_text(given)
 
-    def run(slower: float):
-        robots = f"[robots.R{SLOW:02d}]\ntheta_a1 = {1 - slower}\n"
+    def run(slower: float, number: str = "theta_a1"):
+        robots = f"[robots.R{SLOW:02d}]\n{number} = {1 - slower}\n"
         (folder / "true.toml").write_text(given + robots)
         command = [os.environ.get("TWIN_RUN", "twin_run"), "--plant", "planar", "--n", ROBOTS]
         command += ["--model", folder / "true.toml", "--script", folder / "script.csv"]
@@ -50,15 +50,16 @@ def drive(tmp_path_factory, model_text):
 
 
 @pytest.fixture(scope="module")
-def told(drive) -> float:
-    """Smallest difference in speed that a log of such robots shows."""
+def told(drive) -> Resolution:
+    """Smallest differences that a log of such robots shows."""
     (*_, last) = resolutions(open_measurements(*drive(0.0)))
     assert last.robot_id == SLOW
-    return last.speed
+    return last
 
 
+@pytest.mark.parametrize(("key", "number"), [("speed", "theta_a1"), ("ahead", "forward_gain")])
 @pytest.mark.parametrize(("times", "named"), [(1.5, [SLOW]), (0.5, [])])
-def test_what_is_larger_is_named_and_what_is_smaller_is_not(drive, told, times, named):
-    found = diagnose(*drive(times * told), lambda words: None)
+def test_what_is_larger_is_named_and_what_is_smaller_is_not(drive, told, key, number, times, named):
+    found = diagnose(*drive(times * getattr(told, key), number), lambda words: None)
     assert [r.robot_id for r in found.robots_off] == named
     assert [r.robot_id for r in found.robots] == list(range(ROBOTS))

@@ -124,6 +124,32 @@ def pushed(measurement, at_s, move_m, turn_rad):
     return measurement.with_pose(pose)
 
 
+def test_a_robot_that_is_slower_ahead_alone_is_told_by_that_axis(
+    tanh_robot, measure, one_clock_base, tmp_path
+):
+    class Slower(tanh_robot):
+        def hindered(self, motion):
+            return motion * (0.94, 1, 1)
+
+    robots = [
+        replace(own := measure(robot, 380 + k, 30.0), track=replace(own.track, robot_id=k))
+        for k, robot in enumerate((tanh_robot(), tanh_robot(), Slower(), tanh_robot()))
+    ]
+    told = explain(robots, one_clock_base, out=tmp_path / "own.toml", command="test")
+    (off,) = told.diagnosis.robots_off
+    assert off.sentence == "R02: drives 6 % slower ahead than the others."
+    common = told.diagnosis.model
+    own = {e.name: e.value / common.get(e.name) for e in off.parameters}
+    assert own == pytest.approx(
+        {"base.forward_gain": 0.94, "base.sideways_gain": 1, "base.yaw_gain": 1}, abs=0.015
+    )
+    # The new file has it as that robot's own, and predicts it.
+    model = ModelFile.load(str(tmp_path / "own.toml"))
+    ahead = [model.model.for_robot(k).get("base.forward_gain") for k in range(4)]
+    assert ahead[2] / ahead[0] == pytest.approx(0.94, abs=0.015) and ahead[0] == ahead[3]
+    assert compare(robots, model).score < compare(robots, one_clock_base).score
+
+
 def test_a_push_is_left_out_of_the_score_and_is_no_trait(logged):
     measurements, plain = logged("")
     (calm,) = open_measurements(measurements[2:], plain)

@@ -19,6 +19,7 @@ from twinmill.model.model_file import ModelFile
 
 LAGS_S = (0.09, 0.12, 0.15, 0.18)  # the base has 0.09
 RUN_S = 20.0
+LEVELS_PCT = (25, 50, 75, 100)
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +81,73 @@ def test_two_runs_of_one_robot_whose_gains_differ_are_told_to(
     (number,) = [n for n in found.apart.numbers if n.name == gain]
     first, second = number.values.values()
     assert second / first == pytest.approx(share, rel=0.02)
+
+
+def test_runs_that_differ_are_outside_the_catalogue_and_the_sentence_does_not_deny_it(
+    tanh_robot, measure, one_clock_base
+):
+    """The second is slower and more sluggish; the base is that of the first."""
+    other = replace(tanh_robot(lag_s=0.15), top_mps=0.9 * tanh_robot().top_mps)
+    runs = [
+        replace(measure(robot, 340 + k, 40.0), log_name=f"run{k}.lcmlog")
+        for k, robot in enumerate((tanh_robot(), other))
+    ]
+    found = diagnose(runs, one_clock_base)
+    assert found.verdict == "outside_catalogue" and found.apart.missed == ("run1.lcmlog",)
+    assert "othing else is missing" not in found.sentence
+    assert "misses run1.lcmlog" in found.sentence and "Within each run nothing" in found.sentence
+
+
+def weaker(tanh_robot, shares):
+    """The robot with so much of the speed of its wheels: front left, front right, rear ones."""
+
+    class Weaker(tanh_robot):
+        def wheels_mps(self, duty):
+            return super().wheels_mps(duty) * shares
+
+    return Weaker()
+
+
+@pytest.mark.parametrize(
+    ("shares", "words"),
+    [
+        ((1, 1, 0.94, 1), "rear left wheel"),
+        ((0.9, 1, 1, 1), "front left wheel"),
+        ((0.94, 1, 0.94, 1), "left wheels"),
+    ],
+)
+def test_the_run_in_which_a_wheel_is_weaker_is_named_with_the_wheel_and_by_how_much(
+    tanh_robot, measure, one_clock_base, shares, words
+):
+    """Common to both runs would be half of it, and is in neither."""
+    runs = [
+        replace(measure(robot, 350 + k, 40.0), log_name=f"run{k}.lcmlog")
+        for k, robot in enumerate((tanh_robot(), weaker(tanh_robot, shares)))
+    ]
+    found = diagnose(runs, one_clock_base)
+    (odd,) = found.runs_off
+    assert odd.log_name == "run1.lcmlog" and odd.effect == "wheel_gain"
+    values = [e.value for e in odd.parameters]
+    assert values == pytest.approx(np.array(shares) - 1, abs=0.015)
+    assert found.sentence.startswith(f"Run run1.lcmlog differs: {words}")
+    assert found.found == [] and found.to_json()["runs_off"][0]["log"] == "run1.lcmlog"
+
+
+def test_what_the_other_run_does_not_show_sets_no_run_apart(tanh_robot, measure, one_clock_base):
+    """It is dragged along whenever it strafes, and the first run never does."""
+
+    class Dragged(tanh_robot):
+        def hindered(self, motion):
+            return motion * (1, 0.75, 1)
+
+    random = np.random.default_rng(358)
+    legs = (
+        random.choice((0, *LEVELS_PCT), 40)[:, None] * np.ones(4) * random.choice((-1, 1), (40, 1))
+    )
+    ahead = np.repeat(legs, 48, axis=0).astype(int)  # a second each
+    runs = [measure(Dragged(), 358, script_pct=ahead), measure(Dragged(), 359, 40.0)]
+    found = diagnose(runs, one_clock_base)
+    assert found.runs_off == () and found.verdict != "model_adequate"
 
 
 def fleet(measure, robots):

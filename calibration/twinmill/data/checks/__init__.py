@@ -7,11 +7,12 @@ or a heading that is a few degrees off are left to the diagnosis.
 """
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 
 import twinmill_native as native
 
-from twinmill.data.checks.clocks import check_lateness
+from twinmill.data.checks.clocks import check_lateness, check_one_clock
 from twinmill.data.checks.commands import (
     body_by_command,
     check_commands,
@@ -38,6 +39,8 @@ __all__ = [
     "check_poses",
     "check_recorded",
     "check_tracks",
+    "of_all_robots",
+    "own_option",
 ]
 
 Tracks = list[tuple[str, Track]]  # name of the log, and one robot in it
@@ -66,22 +69,27 @@ def _wrong(found: list[InputFinding]) -> set[tuple[str, int]]:
 def check_recorded(tracks: Tracks, model: native.Model | None) -> list[InputFinding]:
     """What each track shows by itself: kind of drive, timing, noise, length. Takes no time."""
     found = check_length(tracks)
+    robots = Counter(label for label, _ in tracks)
     for label, track in tracks:
+        own = own_option(track.robot_id, robots[label])
         found += check_drive(track, model, label) if model else []
-        found += check_track(track, label)
-    return found
+        found += check_track(track, label, own)
+    return of_all_robots(found, robots)
 
 
 def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFinding]:
-    """Commands against poses: signs, columns, axes, units, clocks, names. A second a robot."""
+    """Commands against poses: signs, columns, axes, units, clocks, names. A second a robot.
+
+    Without a model also how late a robot is on one clock: nothing else tells it then.
+    """
     found: list[InputFinding] = []
     by_log: dict[str, list] = {}
+    robots = Counter(label for label, _ in tracks)
     for label, track in tracks:
         body = body_by_command(model, track.command_kind)
         if body is None:
             continue
-        others = sum(name == label for name, _ in tracks) > 1
-        checked = CheckedTrack(label, track, body, others)
+        checked = CheckedTrack(label, track, body, own_option(track.robot_id, robots[label]))
         wrong, search, explained = check_commands(checked)
         if explained is None:
             found += wrong
@@ -98,14 +106,26 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
                 continue
             found += check_foreign(checked, search, explained)
             if not wrong:
-                found += check_lateness(checked, search, explained)
-    return _of_all_robots(found, tracks)
+                of_time = check_lateness(checked, search, explained)
+                found += of_time or check_one_clock(
+                    checked, search, explained, delays=model is None
+                )
+    return of_all_robots(found, robots)
 
 
-def _of_all_robots(found: list[InputFinding], tracks: Tracks) -> list[InputFinding]:
-    """Findings, with one remedy for all robots of a log where each of them has the same."""
+def own_option(robot_id: int, robots: int) -> str:
+    """Before what an option says of one robot alone; empty where its log has no other."""
+    return f"R{robot_id:02d}=" if robots > 1 else ""
+
+
+def of_all_robots(found: list[InputFinding], robots: Mapping[str, int]) -> list[InputFinding]:
+    """Findings, with one remedy for all robots of a log where each of them has the same.
+
+    Args:
+        found: of robots.
+        robots: how many each log has, by its name.
+    """
     plain = [of_all(f.remedy, f"R{f.robot_id:02d}=") for f in found]
-    robots = Counter(label for label, _ in tracks)
     alike = Counter((f.log_name, remedy) for f, remedy in zip(found, plain, strict=True))
     return [
         replace(f, remedy=remedy) if alike[f.log_name, remedy] == robots[f.log_name] > 1 else f

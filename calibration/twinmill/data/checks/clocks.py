@@ -15,6 +15,7 @@ from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.lateness import Lateness, lateness_of
 from twinmill.data.checks.motion import BLOCK_S
 from twinmill.data.checks.settings import CHECKS
+from twinmill.data.checks.words import of_robot
 from twinmill.data.clock import place_of_least
 from twinmill.data.lost_commands import beat_s, keeps_beat
 
@@ -131,6 +132,46 @@ def check_lateness(checked: CheckedTrack, search: Search, own: Explained) -> lis
     if not found and late and late.shape != "drift":
         return [_of_lateness(checked, search, own, late)]
     return [_with(late, f) for f in found]
+
+
+def check_one_clock(
+    checked: CheckedTrack, search: Search, own: Explained, *, delays: bool
+) -> list[InputFinding]:
+    """Poses that come before the commands that made them, though one clock is said to stamp both.
+
+    Args:
+        checked: one robot's track.
+        search: of its motion, the columns as they are right.
+        own: how well they explain it.
+        delays: whether it is also told that they come later than any lag makes them.
+    """
+    track = checked.track
+    if not (track.same_clock and track.has_heading) or own.left > CHECKS.drift_left:
+        return []
+    late_s = shift_s(search, own.late_s)
+    least_s = CHECKS.one_clock_s + track.timing.pose_period_s / 2
+    without = "import anew without --same-clock"
+    if late_s < -least_s:
+        told = checked.finding(
+            f"the poses come {-late_s:.2f} s before the commands that they follow, so that one "
+            "clock did not stamp both, as it is declared (--same-clock)",
+            f"the commands explain {1 - own.left:.1%} of the motion with that shift",
+            f"{without}, which estimates the offset, or with "
+            f"{of_robot(f'--pose-shift-s={-late_s:.3f}', checked.own)}; until then it is estimated",
+            fatal=False,
+        )
+        return [replace(told, two_clocks=True)]
+    if not delays or late_s < least_s:
+        return []
+    return [
+        checked.finding(
+            f"the robot follows its commands {late_s:.2f} s after their stamps, beside its lag",
+            f"the commands explain {1 - own.left:.1%} of the motion with that shift",
+            "that is a delay of the robot (input_delay, or what diagnose names), if one clock "
+            f"stamped both as it is declared; else {without}",
+            fatal=False,
+        )
+    ]
 
 
 def _is_no_clock(checked: CheckedTrack, late: Lateness) -> bool:

@@ -18,36 +18,53 @@ from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.settings import CHECKS
-from twinmill.data.checks.words import described
+from twinmill.data.checks.words import described, of_robot
 from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
 OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
 DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
-UNITS = (  # measured over commanded speed, and what it says
-    ((300.0, 3000.0), "the positions are in millimetres", "name the columns x_mm and y_mm"),
-    ((30.0, 300.0), "the positions are in centimetres", "name the columns x_cm and y_cm"),
+UNITS = (  # measured over commanded speed, what it says, and columns under their right names
+    (
+        (300.0, 3000.0),
+        "the positions are in millimetres",
+        {"x_m": "x_mm", "y_m": "y_mm"},
+    ),
+    ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
     (
         (1 / 3000, 1 / 300),
         "the commanded speeds are in millimetres per second",
-        "name the columns vx_mmps and vy_mmps",
+        {"vx_mps": "vx_mmps", "vy_mps": "vy_mmps"},
     ),
     (
         (1 / 300, 1 / 30),
         "the commanded speeds are in centimetres per second",
-        "name the columns vx_cmps and vy_cmps",
+        {"vx_mps": "vx_cmps", "vy_mps": "vy_cmps"},
     ),
 )
 # As above; but a gain of ten may be the robot's own, where shares of its speed are told.
 TENFOLD = ((7.0, 14.0), (1 / 14, 1 / 7))
 TURN_UNITS = (
-    ((25.0, 130.0), "the headings are in degrees", "name the column theta_deg"),
-    ((1 / 130, 1 / 25), "the commanded turns are in degrees per second", "name it omega_degps"),
+    ((25.0, 130.0), "the headings are in degrees", {"theta_rad": "theta_deg"}),
+    (
+        (1 / 130, 1 / 25),
+        "the commanded turns are in degrees per second",
+        {"omega_radps": "omega_degps"},
+    ),
 )
 WHEEL_UNITS = (
-    ((0.08, 0.13), "the wheel speeds are in rounds per minute", "name the columns w1_rpm ..."),
-    ((0.012, 0.025), "the wheel speeds are in degrees per second", "name the columns w1_degps ..."),
+    (
+        (0.08, 0.13),
+        "the wheel speeds are in rounds per minute",
+        {f"w{k}_radps": f"w{k}_rpm" for k in range(1, 5)},
+    ),
+    (
+        (0.012, 0.025),
+        "the wheel speeds are in degrees per second",
+        {f"w{k}_radps": f"w{k}_degps" for k in range(1, 5)},
+    ),
 )
+IN_ROOM = {"vx_mps": "vx_world_mps", "vy_mps": "vy_world_mps"}
 
 
 DUTY, WHEEL_RADPS = 1.0, 5.0  # at which one wheel alone is tried
@@ -161,7 +178,7 @@ def _in_room(
         "the velocities are along the room's axes, not the body's",
         f"the commands explain {1 - own.left:.0%} of the motion as the body's, and "
         f"{1 - room.left:.0%} as the room's",
-        "name the columns vx_world_mps and vy_world_mps and import anew",
+        _anew_with(IN_ROOM, checked),
     )
 
 
@@ -249,8 +266,8 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     if low < turn < high:  # speeds along axes of a wrong heading tell nothing
         speed, tried = 0.0, [(turn, TURN_UNITS[0])]
     told = [
-        checked.finding(what, _pace(ratio), f"{remedy} and import anew")
-        for ratio, ((low, high), what, remedy) in tried
+        checked.finding(what, _pace(ratio), _anew_with(names, checked))
+        for ratio, ((low, high), what, names) in tried
         if low < ratio < high
     ]
     if kind == "twist" and any(low < speed < high for low, high in TENFOLD):
@@ -263,6 +280,12 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
             )
         )
     return told
+
+
+def _anew_with(names: dict[str, str], checked: CheckedTrack) -> str:
+    """What to do about columns that have other units or meanings than their names say."""
+    options = " ".join(f"--rename {old}={new}" for old, new in names.items())
+    return f"correct it where the log is made, or import anew with {of_robot(options, checked.own)}"
 
 
 def _pace(ratio: float) -> str:
@@ -303,6 +326,7 @@ def check_exchange(
 
     left = np.array([[e.left for e in row] for row in table])
     poses, commands = linear_sum_assignment(left)
+    ids = [checked.track.robot_id for checked, _, _ in judged]
     found, who = [], set()
     for p, c in zip(poses, commands, strict=True):
         if p == c or not far_better(table[p][c], table[p][p]):
@@ -313,12 +337,27 @@ def check_exchange(
             checked.finding(
                 f"its name is exchanged with that of robot {other.track.robot_id}",
                 f"the commands of robot {other.track.robot_id} explain {1 - left[p, c]:.0%} of its "
-                f"motion, its own {1 - left[p, p]:.0%}",
-                "give the poses or the commands the other number (column robot_id, or "
-                "--robot NAME=ID)",
+                f"motion, its own {max(0.0, 1 - left[p, p]):.0%}",
+                f"import anew with {_exchanging(ids, list(commands), int(p))}",
             )
         )
     return found, who
+
+
+def _exchanging(ids: list[int], commands: list[int], one: int) -> str:
+    """Options that give each of those robots its poses that are exchanged with this one.
+
+    Args:
+        ids: of all robots.
+        commands: whose commands explain the poses of each; a permutation.
+        one: of them.
+    """
+    around = [one]
+    while (following := int(commands[around[-1]])) != one:
+        around.append(following)
+    begin = around.index(min(around))
+    first, *others = (ids[k] for k in around[begin:] + around[:begin])
+    return " ".join(f"--exchange R{first:02d}=R{other:02d}" for other in others)
 
 
 def _explained(

@@ -23,6 +23,7 @@ class InputFinding:
         steady: one offset of the clocks may hold for the whole log; false where what the commands
             do comes later, or sooner, from some time on.
         lateness: how it changes, where that is known.
+        two_clocks: poses and commands were stamped by two clocks, whatever was declared.
     """
 
     what: str
@@ -34,6 +35,7 @@ class InputFinding:
     cut_s: tuple[tuple[float, float], ...] = ()
     steady: bool = True
     lateness: Lateness | None = None
+    two_clocks: bool = False
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -51,18 +53,13 @@ class CheckedTrack:
 
     Attributes:
         label: name of its log.
-        beside_others: other robots are in it.
+        own: before what an option says of this robot alone; empty where it is the only one.
     """
 
     label: str
     track: Track
     body: np.ndarray
-    beside_others: bool = False
-
-    @property
-    def own(self) -> str:
-        """Before what an option says of this robot alone; empty where it is the only one."""
-        return f"R{self.track.robot_id:02d}=" if self.beside_others else ""
+    own: str = ""
 
     def option(self, name: str) -> str:
         """An option of `twinmill import` up to its number: of this robot, not of all."""

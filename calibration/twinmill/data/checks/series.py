@@ -5,6 +5,7 @@ import numpy as np
 
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.settings import CHECKS
+from twinmill.data.checks.words import of_robot
 from twinmill.data.log import RobotLog
 from twinmill.data.track import Track, command_at
 
@@ -13,6 +14,11 @@ STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0
 # Commands beyond these no robot on wheels follows: twenty times the fastest there are.
 ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
 NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
+# Axes that follow each other as before, with the one that is up as z.
+LAID_DOWN = {
+    "x": "--rename x_m=z_m --rename y_m=x_m --rename z_m=y_m",
+    "y": "--rename y_m=z_m --rename z_m=y_m --flip y_m",
+}
 UNDER_ONE = "give each robot its own robot_id, in its poses and in its commands"
 MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
 # Nothing moves within this much, nor within five times the noise where that is as little as this.
@@ -99,8 +105,14 @@ def _absurd(robot: RobotLog, label: str) -> list[InputFinding]:
     ]
 
 
-def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
-    """Findings of a robot's poses as they were recorded."""
+def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding]:
+    """Findings of a robot's poses as they were recorded.
+
+    Args:
+        robot: as it was read.
+        label: name of its log.
+        own: before what an option says of this robot alone; empty where it is the only one.
+    """
     t_s, pose, z_m = (a[robot.valid] for a in (robot.pose_t_s, robot.pose, robot.z_m))
     if len(t_s) < CHECKS.fewest_poses:
         return []
@@ -135,18 +147,19 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
             finding(
                 f"{axis} is up in these poses, not z",
                 f"z goes over {height_m:.2f} m and {axis} over {min(x_m, y_m) * 1000:.0f} mm",
-                "import with the other --up (y or z), or take a table's columns in another order, "
-                f"as in --rename z_m={axis}_m --rename {axis}_m=z_m",
+                "import anew with the other --up (y or z), or of a table with "
+                f"{of_robot(LAID_DOWN[axis], own)}",
             )
         ]
     if fast_mps > CHECKS.fastest_mps:
-        unit = "mm" if fast_mps > CHECKS.mm_mps else "mm or cm"
+        units = ("mm",) if fast_mps > CHECKS.mm_mps else ("cm", "mm")
+        named = [of_robot(f"--rename x_m=x_{u} --rename y_m=y_{u}", own) for u in units]
         return [
             finding(
-                f"the positions are in {unit}, not in m",
+                f"the positions are in {' or '.join(units)}, not in m",
                 f"the robot drives at {fast_mps:.0f} m/s by them, over {max(x_m, y_m):.0f} m",
-                "name the columns x_mm and y_mm (x_cm and y_cm), or choose metres in the export, "
-                "and import anew",
+                "choose metres in the export, or import a table anew with "
+                f"{', or with '.join(named)}",
             )
         ]
     if robot.has_heading and _heading_is_constant(robot, pose):
@@ -154,14 +167,15 @@ def check_poses(robot: RobotLog, label: str) -> list[InputFinding]:
             finding(
                 "the heading was not measured",
                 f"it is {np.degrees(pose[0, 2]):.1f} degrees in all {len(pose)} poses, to the bit",
-                "record it, or import without that column if the robot holds its heading",
+                "record it, or import anew with --heading-from-path, which takes it from the path "
+                "while the robot drives ahead",
             )
         ]
     return []
 
 
-def check_track(track: Track, label: str) -> list[InputFinding]:
-    """What about a log can be used, and yet is worth a sentence."""
+def check_track(track: Track, label: str, own: str = "") -> list[InputFinding]:
+    """What about a log can be used, and yet is worth a sentence; args as of `check_poses`."""
     found = []
 
     def add(what: str, evidence: str, remedy: str, fatal: bool = False) -> None:
@@ -193,7 +207,8 @@ def check_track(track: Track, label: str) -> list[InputFinding]:
         add(
             "the headings make no sense",
             f"they jump by {np.degrees(noise_rad):.0f} degrees from pose to pose",
-            "check the column and its unit: degrees belong into theta_deg",
+            "check the column; of degrees import anew with "
+            f"{of_robot('--rename theta_rad=theta_deg', own)}",
             fatal=True,
         )
     elif noise_rad > CHECKS.noisy_rad:

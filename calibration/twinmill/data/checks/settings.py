@@ -34,6 +34,9 @@ class CheckSettings(Numbers):
     turns: float = number(0.05, "share of the time with turns, from which a heading is needed")
     fewest_poses: int = number(20, "poses below which nothing is said")
     fewest_blocks: int = number(8, "stretches of 3 s below which nothing is said")
+    one_clock_s: float = number(
+        0.03, "and half a frame: by which poses and commands of one clock are apart, if told"
+    )
     least_jump_s: float = number(0.15, "step of a clock: less may be two delays")
     drift_left: float = number(0.3, "left up to which a drift of clocks is looked for ...")
     drift_span_s: float = number(30.0, "... in logs of this length at least")

@@ -9,8 +9,7 @@ from twinmill.data.checks.alternatives import Alternative
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.log import CommandKind
 
-OF_A_ROBOT = re.compile(r"(--flip|--heading-offset-deg)[ =]")
-OF_ITS_TABLE = ", with this robot alone in its tables"
+OF_A_ROBOT = re.compile(r"(--flip|--rename|--heading-offset-deg|--pose-shift-s)[ =]")
 COLUMNS: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
     "wheel_speed": ("w1_radps", "w2_radps", "w3_radps", "w4_radps"),
@@ -40,7 +39,7 @@ def described(
     """
     if a.of_poses:
         what, options = _of_poses(a, float(np.degrees(turned_rad)))
-        return what, _of_robot(options, own)
+        return what, of_robot(options, own)
     names = COLUMNS[kind]
     what, options = [], []
     if a.place in SIDES and kind != "twist":
@@ -59,22 +58,19 @@ def described(
         wrong = [names[k] for k, s in enumerate(a.sign) if s < 0]
         what += [f"{name} has the wrong sign" for name in wrong]
     options += [f"--flip {names[k]}" for k, s in enumerate(a.sign) if s < 0]
-    return " and ".join(what), _of_robot(" ".join(options), own)
+    return " and ".join(what), of_robot(" ".join(options), own)
 
 
-def _of_robot(options: str, own: str) -> str:
-    """Options that hold for one robot alone, where there are others."""
-    if not own:
-        return options
-    renamed = OF_ITS_TABLE if "--rename" in options else ""
-    return OF_A_ROBOT.sub(rf"\g<1> {own}", options) + renamed
+def of_robot(options: str, own: str) -> str:
+    """Options that hold for one robot alone, where there are others: `R02=`; else empty."""
+    return OF_A_ROBOT.sub(rf"\g<1> {own}", options) if own else options
 
 
 def of_all(remedy: str, own: str) -> str:
     """A remedy of one robot, as it is told where it is that of all."""
-    for option, before in (("--heading-offset-deg", "="), ("", " ")):
+    for option, before in (("--heading-offset-deg", "="), ("--pose-shift-s", "="), ("", " ")):
         remedy = remedy.replace(f"{option} {own}", f"{option}{before}")
-    return remedy.replace(OF_ITS_TABLE, "")
+    return remedy
 
 
 def _of_poses(a: Alternative, turned_deg: float) -> tuple[str, str]:

@@ -10,11 +10,14 @@ import numpy as np
 import tomlkit
 
 from twinmill.data.checks import (
+    InputFinding,
     check_changes,
     check_commanded,
     check_driven,
     check_poses,
     check_recorded,
+    of_all_robots,
+    own_option,
 )
 from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.io_tsv import read_io_tsv
@@ -51,6 +54,7 @@ TIME_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}  # of which a second has so many
 SAME_LENGTH = 0.1  # share by which poses and commands of one run differ in length
 SLOWEST_S, FEWEST_POSES = 2.0, 5  # from pose to pose; which tell it
 MOST_PPM = 1e5  # by which one clock gains on another
+OF_KINDS = ("poses", "commands")  # tables of a mapping file
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
 Flips = Mapping[int | None, frozenset[str]]  # of all robots, by None; or by robot_id
@@ -65,7 +69,10 @@ class ImportOptions:
         robot_id: whose the rows are, for files that do not say.
         robots: robot_id by name: of a rigid body, in a table's column robot_id, as a word in the
             name of a robot's own table or in a bag's topics.
-        rename: column in a plain CSV file to column as we name it, or with another unit.
+        rename: column in a plain CSV file to column as we name it, or with another unit; or one of
+            ours, whatever the file calls it, to another one of ours.
+        own_renames: the same in the rows of single robots, by number.
+        exchange: pairs of robots of which each has the other's poses; one after the other.
         mapping: file that says which column is what, in place of `rename`.
         flips: our columns that are to change their sign.
         up: "y" or "z", the axis that an export of Motive or Vicon calls up; None: its default.
@@ -85,6 +92,8 @@ class ImportOptions:
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
     rename: dict[str, str] = field(default_factory=dict)
+    own_renames: dict[int, dict[str, str]] = field(default_factory=dict)
+    exchange: tuple[tuple[int, int], ...] = ()
     mapping: Path | None = None
     flips: Flips = field(default_factory=dict)
     up: str | None = None
@@ -152,12 +161,7 @@ def import_log(
             f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
             "number several by the names of their files or of their folders."
         )
-    if options.mapping and options.rename and not detections:
-        raise LogError("--rename: does nothing beside --mapping; write it into that file.")
-    tables = [] if options.mapping else [*poses, *commands]
-    check_renames(
-        options.rename, tables + ([detections] if detections else []), KNOWN | OF_DETECTIONS
-    )
+    _check_renames(options, [*poses, *commands], detections)
     paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
     sources = [path for path in paths if path is not None]
     inputs = [*sources, bag, options.mapping]
@@ -183,6 +187,7 @@ def import_log(
             commands, io_tsv, options, of_files=of_files, poses=pose_series
         )
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
+    pose_series = _exchanged(pose_series, options.exchange)
     pose_series = [_moved(series, options) for series in pose_series]
     shift = not bag or options.receive_stamps
     left_out = _of_no_run(pose_series, command_series, shift)
@@ -294,7 +299,39 @@ def _columns(options: ImportOptions, kind: str) -> Columns:
         )
     mapping = read_mapping(options.mapping, kind, KNOWN) if options.mapping else None
     of_all = flips.pop(None, frozenset())
-    return Columns(options.rename, mapping, of_all, flips, options.robot_id, options.robots)
+    return Columns(
+        rename=options.rename,
+        mapping=mapping,
+        flips=of_all,
+        own_renames=options.own_renames,
+        own_flips=flips,
+        robot_id=options.robot_id,
+        robots=options.robots,
+    )
+
+
+def _check_renames(options: ImportOptions, tables: list[Path], detections: Path | None) -> None:
+    """Raises LogError where a new name of a column makes no sense, of all robots or of one."""
+    mapped: set[str] = set()
+    if options.mapping:
+        mapped = {k for kind in OF_KINDS for k in read_mapping(options.mapping, kind, KNOWN)}
+        tables = []
+    for own in (options.rename, *options.own_renames.values()):
+        names = {**options.rename, **own}
+        if options.mapping and not detections and names.keys() - mapped:
+            raise LogError("--rename: does nothing beside --mapping; write it into that file.")
+        files = tables + ([detections] if detections else [])
+        check_renames(names, files, KNOWN | OF_DETECTIONS, mapped)
+
+
+def _exchanged(poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]) -> list[PoseSeries]:
+    """Poses under the numbers of the robots that they are of."""
+    ids = {series.robot_id: series.robot_id for series in poses}
+    for a, b in pairs:
+        if unknown := {a, b} - set(ids):
+            raise _unknown_robot("--exchange", min(unknown), list(ids))
+        ids = {k: {a: b, b: a}.get(number, number) for k, number in ids.items()}
+    return [replace(series, robot_id=ids[series.robot_id]) for series in poses]
 
 
 def explain_columns(
@@ -318,14 +355,19 @@ def _check_names(options: ImportOptions, ids: list[int]) -> None:
         "--pose-clock-ppm": options.pose_clock_ppm,
         "--heading-offset-deg": options.heading_offset_rad,
         "--flip": options.flips,
+        "--rename": options.own_renames,
     }
     for option, given in of_poses.items():
         named = set(given) - {None} if isinstance(given, Mapping) else set()
         if unknown := named - set(ids):
-            raise LogError(
-                f"{option} R{min(unknown):02d}=...: no robot in the files has that number, they "
-                f"are {', '.join(f'R{k:02d}' for k in sorted(set(ids)))}; correct it."
-            )
+            raise _unknown_robot(option, min(unknown), ids)
+
+
+def _unknown_robot(option: str, robot_id: int, ids: Collection[int]) -> LogError:
+    return LogError(
+        f"{option} R{robot_id:02d}=...: no robot in the files has that number, they are "
+        f"{', '.join(f'R{k:02d}' for k in sorted(set(ids)))}; correct it."
+    )
 
 
 def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
@@ -472,7 +514,8 @@ def _check_rate(poses: PoseSeries) -> None:
         unit = next((u for u, times in TIME_UNITS.items() if step_s / times < SLOWEST_S), "ns")
         raise LogError(
             f"robot {poses.robot_id}: its poses are {step_s:g} s apart, too far to tell of a "
-            f"drive; if the times are in {unit}, name that column t_{unit}, in both files."
+            f"drive; if the times are in {unit}, name that column t_{unit} in both files, or "
+            f"import anew with --rename t_s=t_{unit}."
         )
 
 
@@ -499,6 +542,8 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "flips": _flips_in_toml(options.flips),
                 "heading_offset_rad": _in_toml(options.heading_offset_rad),
                 "rename": options.rename,
+                "own_renames": {f"R{k:02d}": own for k, own in options.own_renames.items()},
+                "exchange": [f"R{a:02d}=R{b:02d}" for a, b in options.exchange],
             }
         }
     )
@@ -566,12 +611,20 @@ def _told_of(robots: Sequence[RobotLog]) -> list[str]:
     Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
     model to be judged by.
     """
-    found = {r.robot_id: check_commanded(r, "") or check_poses(r, "") for r in robots}
+    found: dict[int, list[InputFinding]] = {robot.robot_id: [] for robot in robots}
+
+    def add(findings: list[InputFinding]) -> None:
+        for finding in findings:
+            found[finding.robot_id].append(finding)
+
+    of_series = []
+    for robot in robots:
+        own = own_option(robot.robot_id, len(robots))
+        of_series += check_commanded(robot, "") or check_poses(robot, "", own)
+    add(of_all_robots(of_series, {"": len(robots)}))
     cleaned = {r.robot_id: ("", make_track(r)) for r in robots if not found[r.robot_id]}
-    for number, track in cleaned.items():
-        found[number] = [f for f in check_recorded([track], None) if f.fatal]
-    for wrong in check_driven([t for k, t in cleaned.items() if not found[k]], None):
-        found[wrong.robot_id].append(wrong)
+    add([f for f in check_recorded(list(cleaned.values()), None) if f.fatal])
+    add(check_driven([t for k, t in cleaned.items() if not found[k]], None))
     said = []
     for robot in robots:
         number, own, notes = robot.robot_id, found[robot.robot_id], []

@@ -2,6 +2,7 @@
 """Other people's tables under our names and in our units, or what must be asked first."""
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from twinmill.data.importers.columns import (
     LEFT,
     Guess,
     Mapping,
+    by_name,
     explain,
     is_usual,
     lacks,
@@ -29,11 +31,23 @@ def _header(path: Path, known: frozenset[str]) -> list[str]:
     return in_rows(Table(path.name, read_header(path), [], [], known)).header
 
 
-def check_renames(rename: dict[str, str], tables: list[Path], known: frozenset[str]) -> None:
-    """Raises LogError where an old name is in no table, or a new one has no meaning."""
+def check_renames(
+    rename: dict[str, str], tables: list[Path], known: frozenset[str], mapped: Collection[str] = ()
+) -> None:
+    """Raises LogError where an old name is in no table, or a new one has no meaning.
+
+    Args:
+        rename: column in a file, or one of ours as it was read, to ours.
+        tables: the files.
+        known: our columns.
+        mapped: those that a mapping file names.
+    """
     headers = {p.name: _header(p, known) for p in tables} if rename else {}
+    names = {*rename.values(), *(name for header in headers.values() for name in header)}
+    read = {*mapped, *(ours for name in names for ours in (by_name(name, known) or ((),))[0])}
     for old, new in rename.items():
-        if not any(old in header for header in headers.values()):
+        held = any(old in header for header in headers.values())
+        if not held and not (old in read and by_name(new, known)):
             names = "; ".join(f"{name} has {', '.join(h)}" for name, h in headers.items())
             raise LogError(
                 f"--rename {old}={new}: no table has a column '{old}'"
@@ -60,7 +74,8 @@ def read_mapped(
         path: CSV, `.gz` too.
         known: our columns that this kind of table has.
         mapping: what a person decided; None: names that say all, and `rename`.
-        rename: column in the file to ours, which may have another unit (`yaw=theta_deg`).
+        rename: column in the file to ours, which may have another unit (`yaw=theta_deg`); or one
+            of ours, whatever it is called in the file, to another of ours (`x_m=y_m`).
         flips: our columns that are to change their sign.
 
     Raises:
@@ -68,8 +83,9 @@ def read_mapped(
             has no unit, or two hold one quantity.
     """
     table = read_columns(path, known)
+    ours = {k: new for k, new in rename.items() if _is_of_ours(k, new, table.header, known)}
     if mapping is None:
-        guesses = explain(table, known, rename)
+        guesses = explain(table, known, {k: new for k, new in rename.items() if k not in ours})
         for guess in guesses:
             if guess.rival:
                 raise _rivals(table.name, guess)
@@ -83,7 +99,30 @@ def read_mapped(
             f"{table.name}: the mapping names column '{gone[0]}', but the file has "
             f"{', '.join(table.header)}; correct the mapping."
         )
-    return table.under(mapping, flips)
+    return table.under(_renamed(table.name, mapping, ours, known), flips)
+
+
+def _is_of_ours(old: str, new: str, header: Collection[str], known: frozenset[str]) -> bool:
+    """Whether a new name is for one of our columns, and not for one of the file."""
+    in_our_unit = new in known
+    return old in known and (in_our_unit or (old not in header and bool(by_name(new, known))))
+
+
+def _renamed(table: str, mapping: Mapping, ours: dict[str, str], known: frozenset[str]) -> Mapping:
+    """Where each of our columns comes from, once one is taken for another, or of another unit."""
+    named = {target: (target, source) for target, source in mapping.items()}
+    for old, new in ours.items():
+        if old not in mapping:
+            continue
+        (target, *_), factor = by_name(new, known)
+        unit = {} if new in known else {"factor": factor}
+        named[old] = target, replace(mapping[old], **unit)
+        if target in mapping and target not in (old, *ours):
+            raise LogError(
+                f"{table}: --rename {old}={new}: there is a {target} already; say what that one is "
+                f"as well, as in --rename {target}={old}."
+            )
+    return dict(named.values())
 
 
 def _rivals(table: str, guess: Guess) -> LogError:

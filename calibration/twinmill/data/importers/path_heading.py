@@ -21,6 +21,7 @@ SLOWEST_MPS = 0.03  # below it noise is the way
 TOLD_S = 0.3  # of path that tells the heading beside a gap
 STRAIGHT_RAD = 0.1  # change of heading over a gap of a straight line
 FEWEST = 0.2  # share of the poses
+STILL = 1e-6  # by which a quaternion changes at most that nobody measured
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,11 @@ def with_path_heading(poses: PoseSeries, commands: CommandSeries) -> PoseSeries:
     """The poses with headings; those whose heading the path does not show are not valid.
 
     Raises:
-        LogError: the heading was recorded, three wheels tell no axes, or little shows it.
+        LogError: the heading was measured, three wheels tell no axes, or little shows it.
     """
     who = f"robot {poses.robot_id}"
-    if np.isfinite(poses.orientation_wxyz).any():
+    recorded = poses.orientation_wxyz[np.isfinite(poses.orientation_wxyz).all(axis=1)]
+    if len(recorded) and np.ptp(recorded, axis=0).max() > STILL:
         raise LogError(f"--heading-from-path: {who} has headings; leave the option out.")
     t_s = poses.utime_us * 1e-6
     heading_rad, told = np.full(len(t_s), np.nan), _told(commands, t_s[-1], who)

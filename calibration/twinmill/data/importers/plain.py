@@ -51,7 +51,7 @@ class Columns:
 
     Attributes:
         rename, mapping, flips: as there.
-        own_flips: of single robots, by number.
+        own_renames, own_flips: of single robots, by number.
         robot_id: of all rows, for files without that column, or with one name in it.
         robots: robot_id by what stands in that column.
         lacks_robot: what to do about a file without robots, beside adding that column.
@@ -60,6 +60,7 @@ class Columns:
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Mapping | None = None
     flips: frozenset[str] = frozenset()
+    own_renames: dict[int, dict[str, str]] = field(default_factory=dict)
     own_flips: dict[int, frozenset[str]] = field(default_factory=dict)
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
@@ -68,6 +69,11 @@ class Columns:
     def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names."""
         return read_mapped(path, known, mapping=self.mapping, rename=self.rename, flips=self.flips)
+
+    def of_robot(self, robot_id: int | None) -> "Columns":
+        """The same for rows of one robot alone."""
+        own = self.own_renames.get(robot_id, {})
+        return replace(self, rename={**self.rename, **own}, own_renames={})
 
 
 def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
@@ -81,7 +87,7 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    return _of_sound_robots(columns.read(path, OF_POSES), columns, _poses)
+    return _of_file(path, OF_POSES, columns, _poses)
 
 
 def _poses(table: Table, columns: Columns) -> list[PoseSeries]:
@@ -120,7 +126,7 @@ def read_commands(path: Path, columns: Columns) -> list[CommandSeries]:
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    return _of_sound_robots(columns.read(path, OF_COMMANDS), columns, _commands)
+    return _of_file(path, OF_COMMANDS, columns, _commands)
 
 
 def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
@@ -165,7 +171,7 @@ def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
     Raises:
         LogError: as read_table; a wrong value, with its row.
     """
-    return _of_sound_robots(columns.read(path, OF_DETECTIONS), columns, _seen)
+    return _of_file(path, OF_DETECTIONS, columns, _seen)
 
 
 def _seen(table: Table, columns: Columns) -> list[DetectionSeries]:
@@ -199,6 +205,34 @@ def _seen(table: Table, columns: Columns) -> list[DetectionSeries]:
     ]
 
 
+def _of_file(
+    path: Path,
+    known: frozenset[str],
+    columns: Columns,
+    read: Callable[[Table, Columns], list[Series]],
+) -> list[Series]:
+    """Series of all robots of a file, those whose columns are called otherwise by these names.
+
+    Raises:
+        LogError: as read_table; those of no robot can be read.
+    """
+    if columns.robot_id in columns.own_renames:
+        columns = columns.of_robot(columns.robot_id)
+    table = _with_robots(columns.read(path, known))
+    if not columns.own_renames:
+        return _of_sound_robots(table, columns, read)
+    ids, _ = _robot_ids(table, columns)
+    own = [number for number in columns.own_renames if number in ids]
+    rest = table.where(~np.isin(ids, own))
+    found = _of_sound_robots(rest, columns, read) if rest.rows else []
+    for number in own:
+        as_named = columns.of_robot(number)
+        again = _with_robots(as_named.read(path, known)).where(ids == number)
+        unsaid = [note for note in again.notes if not found or note not in table.notes]
+        found += _of_sound_robots(replace(again, notes=unsaid), as_named, read)
+    return found
+
+
 def _of_sound_robots(
     table: Table, columns: Columns, read: Callable[[Table, Columns], list[Series]]
 ) -> list[Series]:
@@ -207,7 +241,7 @@ def _of_sound_robots(
     Raises:
         CellError: those of no robot can.
     """
-    table, left_out = _with_own_flips(_with_robots(table), columns), []
+    table, left_out = _with_own_flips(table, columns), []
     while True:
         try:
             found = read(table, columns)
