@@ -375,7 +375,7 @@ def _concluded(
     few = few_commands_notes(known)
     if few:
         findings = beside_stale(findings)
-    findings = without.doubted(undone(undetermined(findings), last))
+    findings = without.doubted(undone(undetermined(findings), last), last)
     in_doubt = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
     models = zip(whole, last.state.models, strict=True)

@@ -5,6 +5,9 @@ What is not in the catalogue is taken in part by the effect that is most like it
 wrong name. Then a formula of the library takes more on left-out parts than the effect does, each
 with one free factor beside all else that was found. Where it takes little more, and leaves the
 effect nothing, the effect is doubtful.
+
+An effect that is there in another formula leaves a rest, which a second effect takes. Then formulas
+that make up the first one, each with a number of its own, take the rest as well.
 """
 
 from collections.abc import Sequence
@@ -13,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.diagnosis.finding import Finding, doubted
-from twinmill.diagnosis.rest import Formulas, formulas_of
+from twinmill.diagnosis.rest import Formulas, Products, formulas_of
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
@@ -44,13 +47,20 @@ class Without:
     formulas: Formulas | None
     rivals: dict[str, Term]
 
-    def doubted(self, findings: Sequence[Finding]) -> list[Finding]:
-        """Findings, doubtful where a formula takes more."""
+    def doubted(self, findings: Sequence[Finding], last: Trial) -> list[Finding]:
+        """Findings, doubtful where a formula takes more, or another form of a larger one as much.
+
+        Args:
+            findings: of the final state.
+            last: that state.
+        """
 
         def judged(finding: Finding) -> Finding:
             term = self.rivals.get(finding.effect)
             if term is None:
-                return finding
+                larger = self._in_whose_place(finding, findings, last)
+                why = f"{larger} in another form takes what it takes"
+                return doubted(finding, why) if larger else finding
             why = (
                 f"{term.formula} in {term.adds_to} takes more than it and leaves it nothing, so "
                 "that it may have another form"
@@ -58,6 +68,36 @@ class Without:
             return doubted(finding, why)
 
         return [judged(f) for f in findings]
+
+    def _in_whose_place(
+        self, finding: Finding, findings: Sequence[Finding], last: Trial
+    ) -> str | None:
+        """A larger effect of which another form does what this one does; None if there is none."""
+        name = finding.effect
+        if self.formulas is None or finding.certainty == "doubtful" or name not in self.less:
+            return None
+        larger = [f.effect for f in findings if f.share > finding.share and f.effect in self.less]
+        if not larger:
+            return None
+        own, families = self._done_by(name, last), self._families()
+        done = (
+            n
+            for n in larger
+            if in_another_form(own, self._done_by(n, last), families, local=is_local(name))
+        )
+        return next(done, None)
+
+    def _done_by(self, name: str, last: Trial) -> Products:
+        """What an effect does, before all formulas, with what is left without it."""
+        assert self.formulas is not None
+        less = self.less[name].fit
+        return self.formulas.products(less, self.formulas.changed(less, last.fit))
+
+    def _families(self) -> list[np.ndarray]:
+        """(1 + T,) bool each, of formulas that are judged together; the first is an effect."""
+        assert self.formulas is not None
+        of = [None, *((t.group, t.family) for t in self.formulas.terms)]
+        return [np.array([own == kind for own in of]) for kind in dict.fromkeys(of[1:])]
 
 
 def less_each(done: Search, opened: Sequence[Opened]) -> Without:
@@ -109,3 +149,27 @@ def rival_of(formulas: Formulas, name: str, less: Trial, whole: Trial) -> Rival 
         if outdoes or beside < SETTINGS.nothing_beside * own:
             return Rival(formulas.terms[k], bool(outdoes))
     return None
+
+
+def in_another_form(
+    own: Products, larger: Products, families: Sequence[np.ndarray], *, local: bool
+) -> bool:
+    """Whether formulas that make up a larger effect take what a smaller one takes beside it.
+
+    Args:
+        own: what the smaller one does, the first column, with what is left without it.
+        larger: the same of the larger one.
+        families: (T,) bool each, of the formulas among the columns.
+        local: the smaller one is at a place or for a while.
+    """
+    effect = np.arange(len(own.seen)) == 0
+    # One block may hold all of what is local, so that the others tell nothing of its size.
+    taken = max(float(own.taken[0]) if local else own.held_out(effect), 0.0)
+    for family in families:
+        if not larger.holds(family, effect):
+            continue
+        gain = own.held_out(family)
+        beside = own.held_out(family | effect) - gain
+        if gain > SETTINGS.as_good * taken and beside < SETTINGS.kept * taken:
+            return True
+    return False

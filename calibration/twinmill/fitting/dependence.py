@@ -11,7 +11,7 @@ would change in a robot that lacks them.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import twinmill_native as native
@@ -39,6 +39,7 @@ MOVES = 0.1  # the same: from here on something drifts as much as it will
 WOUND = ((0.01, 0.03, 0.1), (0.01, 0.03, 0.1), (0.03, 0.1, 0.3))  # m, m, rad: until it is whole
 HELD = (0.1, 0.2, 0.35, 0.55, 0.8, 1.2)  # least change that is taken, over the usual speed
 INSTANT_S = 1e-3
+LAGS = (0.4, 1.2, 4.0)  # times the usual one
 STRENGTHS = (1.0, 0.35)  # of a known effect, times its usual one
 
 
@@ -319,6 +320,39 @@ def small_changes(
     added = [[body[k] * m for k in range(3)] for (_, body), m in zip(parts, missed, strict=True)]
     for features in [np.sum(added, axis=0)] if wheels else added:
         yield [tuple(f if f.any() else f[:, :0] for f in features)]
+
+
+def lags_that_change(told: np.ndarray, lag_s: float, motion: Motion) -> Iterator[Group]:
+    """Each velocity lags by one time at rest and by another at full speed of the robot.
+
+    Or where it is right and where it is farthest behind, or as it rises and as it falls. Between
+    the two the logarithm of the time is a straight line.
+
+    Args:
+        told: (N, 3) velocity of the body as it is told, m/s and rad/s, without the motors' lag.
+        lag_s: of the motors.
+        motion: of the robot.
+    """
+    base = motion.base
+    speed = np.repeat(motion.speed_mps[:, None], 3, axis=1)
+    sizes = [speed, np.abs(told - base), (np.abs(told) < np.abs(base)).astype(float)]
+    shares = np.stack([s / np.maximum(s.max(axis=0), 1e-9) for s in sizes], axis=1)
+    least, most = np.log(lag_s * np.array(list(product(LAGS, LAGS)))).T
+    times_s = np.exp(least + (most - least) * shares[..., None])  # (N, sizes, 3, pairs)
+    keep = np.exp(-even_step_s(motion.step_s) / times_s)
+    behind = _following(told[:, None, :, None], keep) - base[:, None, :, None]
+    for own in behind.swapaxes(0, 1):
+        forward, left, turning = np.ascontiguousarray(own.swapaxes(0, 1))
+        yield [(forward, left, turning)]
+
+
+def _following(told: np.ndarray, keep: np.ndarray) -> np.ndarray:
+    """(N, ...) what follows told values, and in each step keeps (N, ...) shares of what it had."""
+    out, now = np.empty_like(keep), np.zeros(keep.shape[1:])
+    for own, share, fresh in zip(out, keep, (1 - keep) * told, strict=True):
+        now = now * share + fresh
+        own[:] = now
+    return out
 
 
 def missing(told: np.ndarray, usual: float) -> np.ndarray:

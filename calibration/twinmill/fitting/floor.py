@@ -17,6 +17,7 @@ from twinmill.fitting.dependence import (
     beat,
     dependences,
     known_physics,
+    lags_that_change,
     place_gains,
     small_changes,
     wheel_angles,
@@ -107,8 +108,11 @@ def noise_floor(data: Trajectory, model: native.Model, same_clock: bool) -> Nois
     motion = response.motion
     told, own = told_velocity_at(data, base, points), base.drive != "twist"
     small = small_changes(told, base.get(LAG), motion, response.wheels if own else ())
+    answered = are_answers(data.measured - moved, response.across, data.start_s)
+    # Answers tell of noise, and a lag that changes with the command would take it for motion.
+    lags = () if answered else lags_that_change(told, response.lag_s, motion)
     angles, beats = wheel_angles(motion, response.wheels), beat(motion, response.beat_radps)
-    response.boost([*dependences(motion), *small, *angles, *beats, *known])
+    response.boost([*dependences(motion), *small, *lags, *angles, *beats, *known])
     within, across = (
         np.where(calm[:, None, None], e, np.nan) for e in (response.within, response.across)
     )

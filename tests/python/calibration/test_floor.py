@@ -98,7 +98,26 @@ def blown(motion):
     return motion * (1 + 0.15 * np.cos(course - 0.7)[:, None] * (1, 1, 0))
 
 
-@pytest.mark.parametrize("hidden", [sticks, worn, blown])
+def follows(motion, time_s):
+    """Turning behind the turning that is asked for, by (K,) times."""
+    turn, now = np.empty(len(motion)), 0.0
+    for k, share in enumerate(EULER_S / time_s):
+        now += share * (motion[k, 2] - now)
+        turn[k] = now
+    return np.column_stack([motion[:, :2], turn])
+
+
+def heavy(motion):
+    """The faster it drives the later it turns: by 0.03 s from rest, by 0.5 s at full speed."""
+    return follows(motion, 0.03 + 1.2 * np.hypot(motion[:, 0], motion[:, 1]))
+
+
+def tyred(motion):
+    """It turns once its tyres have rolled 4 cm: at once when fast, late when slow."""
+    return follows(motion, 0.04 / np.maximum(np.hypot(motion[:, 0], motion[:, 1]), 0.08))
+
+
+@pytest.mark.parametrize("hidden", [sticks, worn, blown, heavy, tyred])
 def test_physics_that_no_model_has_is_no_noise(hidden, tanh_robot, measure, model_file):
     """The noise is known from the same drive without it, what is hidden from one without both.
 

@@ -9,7 +9,7 @@ import pytest
 from twinmill.diagnosis import diagnose
 from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.rest import Products
-from twinmill.diagnosis.rivals import Rival, rival_of
+from twinmill.diagnosis.rivals import Rival, in_another_form, rival_of
 
 BLOCKS, LONG = 20, 50
 NAME = "the formula"
@@ -69,6 +69,44 @@ def test_a_formula_that_explains_nothing_outdoes_no_effect(noise):
 def test_a_formula_of_other_physics_does_not_take_the_effects_place(noise):
     effect, formula, rest = noise.T
     assert outdoing(effect, formula, effect + 2 * formula + rest) is None
+
+
+def takes(first: np.ndarray, second: np.ndarray, errors: np.ndarray, family: np.ndarray) -> bool:
+    """Whether (R, k) formulas that make up a first effect take what a second one does."""
+    blocks = np.repeat(np.arange(BLOCKS), LONG)
+    own, larger = (
+        Products(
+            Columns([np.column_stack([effect, family])]),
+            errors,
+            blocks,
+            weight=np.ones(len(errors)),
+            free=known[:, None],
+        )
+        for effect, known in ((second, first), (first, second))
+    )
+    formulas = np.arange(1 + family.shape[1]) > 0
+    return in_another_form(own, larger, [formulas], local=False)
+
+
+def in_parts(values: np.ndarray) -> np.ndarray:
+    """(R, 4) the values where the largest are, where smaller ones are, and so on."""
+    quarter = np.searchsorted(np.quantile(np.abs(values), (0.25, 0.5, 0.75)), np.abs(values))
+    return values[:, None] * (quarter[:, None] == np.arange(4))
+
+
+def test_the_rest_of_a_wrong_form_is_no_second_effect(noise):
+    """The errors go with the square of what the first goes with, and the second resembles that.
+
+    Of normal numbers x the mean of |x|^3 is 1.6, so that x |x| - 1.6 x has nothing of x.
+    """
+    first, other, rest = noise.T
+    square = first * np.abs(first)
+    assert takes(first, square - 1.6 * first + 0.5 * other, square + rest, in_parts(first))
+
+
+def test_a_second_effect_that_is_there_is_no_rest_of_the_first(noise):
+    first, second, rest = noise.T
+    assert not takes(first, second, 3 * first + 0.4 * second + rest, in_parts(first))
 
 
 def test_a_formula_may_stand_in_the_place_of_a_doubtful_effect_beside_a_sure_one(monkeypatch):
