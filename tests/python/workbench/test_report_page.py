@@ -9,7 +9,8 @@ from playwright.sync_api import expect
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
-from twinmill.report import Provenance, comparison_section, write_report
+from twinmill.report import Provenance, write_report
+from twinmill.report.sections import comparison_section
 from twinmill.report.charted import charts
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
