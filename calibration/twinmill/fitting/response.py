@@ -286,7 +286,9 @@ class Response:
         """(M, c) commands held, on an even grid."""
         t_s = self.data.measurement.track.command_t_s
         k = np.searchsorted(t_s, self._grid_s, side="right") - 1
-        return np.where((k >= 0)[:, None], signal[np.maximum(k, 0)], 0.0)
+        held = signal[np.maximum(k, 0)]
+        held[k < 0] = 0.0
+        return held
 
     def _at(self, signal: np.ndarray) -> np.ndarray:
         """(G, c) on the grid to (N, c) at the middles of the steps."""
