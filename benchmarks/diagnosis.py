@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A diagnosis against the whole catalogue, and mujoco.sysid on the same log."""
 
+import resource
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -37,6 +39,8 @@ drive_s = 0.15
 drive_turn_s = 0.15
 """
 DURATION_S, GOAL_S = 150.0, 10.0
+COMMAND_S, TEN_S = 2.0, 20.0  # goals of the whole command, of one robot and of ten
+RUNS = 3  # of which the least counts: other programs take caches, too
 REST_S = 1.2  # shorter than the script's rests, longer than wheels need to stand
 HIDDEN = {
     "nothing": "",
@@ -59,6 +63,11 @@ def measure(build: Path) -> Iterator[Ratio]:
             yield single(f"diagnosis, {hidden} : {GOAL_S:g} s", ours_s, GOAL_S, "s",
                          at_most=1, says=found.sentence)  # fmt: skip
             yield single(f"sysid, {hidden} : diagnosis", theirs_s, ours_s, "s", says=says)
+            yield single(f"command, {hidden} : {COMMAND_S:g} s", _command_s(folder, hidden),
+                         COMMAND_S, "s", at_most=1)  # fmt: skip
+        _drive(build, folder, "ten", HIDDEN["friction"], seed=9, robots=10)
+        yield single(f"command, ten robots : {TEN_S:g} s", _command_s(folder, "ten"), TEN_S, "s",
+                     at_most=1)  # fmt: skip
 
 
 def _timed(work: Callable) -> tuple[float, Any]:
@@ -66,6 +75,19 @@ def _timed(work: Callable) -> tuple[float, Any]:
     started_s = time.process_time()
     result = work()
     return time.process_time() - started_s, result
+
+
+def _command_s(folder: Path, name: str) -> float:
+    """Seconds of processor time, user's and system's, of `diagnose --json` as a user runs it."""
+    log, base = folder / f"{name}.lcmlog", folder / "base.toml"
+    words = [sys.executable, "-P", "-m", "twinmill_cli.main", "diagnose", log, "--model", base]
+    taken_s = []
+    for _ in range(RUNS):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([*words, "--json"], check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        taken_s.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(taken_s)
 
 
 def _base(build: Path, folder: Path) -> ModelFile:
@@ -78,12 +100,14 @@ def _base(build: Path, folder: Path) -> ModelFile:
     return ModelFile.load(str(fitted))
 
 
-def _drive(build: Path, folder: Path, name: str, effect: str, *, seed: int) -> list[Measurement]:
+def _drive(
+    build: Path, folder: Path, name: str, effect: str, *, seed: int, robots: int = 1
+) -> list[Measurement]:
     """Lets the twin drive the script."""
     model, log = folder / f"{name}.toml", folder / f"{name}.lcmlog"
     model.write_text(ROBOT + effect)
-    command = [build / "bin/twin_run", "--plant", "planar", "--model", model, "--n", 1]
-    command += ["--seed", seed, "--script", folder / "script.csv", "--log", log]
+    command = [build / "bin/twin_run", "--plant", "planar", "--model", model]
+    command += ["--n", robots, "--seed", seed, "--script", folder / "script.csv", "--log", log]
     subprocess.run([str(word) for word in command], check=True, capture_output=True)
     return load_measurements([log])
 

@@ -57,7 +57,7 @@ from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
 from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
-from twinmill.report import detections, show
+from twinmill.report import detections, sections, show
 from twinmill.report import diagnosis as diagnosis_report
 from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
@@ -839,7 +839,7 @@ class Fit(Reported):
         return self.model.compare(log)
 
     def _page(self) -> tuple[report.Section, str]:
-        return report.fit_section(self._result), "twinmill.fit"
+        return sections.fit_section(self._result), "twinmill.fit"
 
     def _text(self) -> RenderableType:
         return show.fit(self._result, NOT_WRITTEN)
@@ -900,7 +900,7 @@ class Addition(Reported):
         return errors_drawn([("before", self._result.before), ("after", self._result.after)])
 
     def _page(self) -> tuple[report.Section, str]:
-        return report.added_section(self._result), "twinmill.add"
+        return sections.added_section(self._result), "twinmill.add"
 
     def _text(self) -> RenderableType:
         return show.added(self._result, NOT_WRITTEN)

@@ -18,6 +18,7 @@ from twinmill.report import (
     comparisons,
     error_figures,
     next_run_figures,
+    sections,
     show,
     steady,
     swarm_comparison,
@@ -79,7 +80,7 @@ class Comparison(Reported):
         return errors_drawn([("this model", self._result)])
 
     def _page(self) -> tuple[report.Section, str]:
-        return report.comparison_section(self._result), "twinmill.compare"
+        return sections.comparison_section(self._result), "twinmill.compare"
 
     def _text(self) -> RenderableType:
         return show.comparison(self._result)

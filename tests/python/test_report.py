@@ -10,14 +10,8 @@ from rich.console import Console
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import Comparison, compare
 from twinmill.model.model_file import ModelFile
-from twinmill.report import (
-    Provenance,
-    Section,
-    comparison_section,
-    show,
-    steps_section,
-    write_report,
-)
+from twinmill.report import Provenance, Section, show, write_report
+from twinmill.report.sections import comparison_section, steps_section
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 

@@ -20,12 +20,8 @@ if working():  # not for --help
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import FitResult, fit
     from twinmill.model.parameters import find_effect
-    from twinmill.report import (
-        added_section,
-        comparison_section,
-        fit_section,
-        show,
-    )
+    from twinmill.report import show
+    from twinmill.report.sections import added_section, comparison_section, fit_section
     from twinmill_cli.frame import (
         command_line,
         finish,
@@ -33,14 +29,10 @@ if working():  # not for --help
         load,
         of_robot,
         open_model,
+        option,
         provenance,
         told,
     )
-
-
-def option(name: str) -> str:
-    """Of the command line, for a text of an effect."""
-    return f"--{name.replace('_', '-')}"
 
 
 def register(app: typer.Typer) -> None:

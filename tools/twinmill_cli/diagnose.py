@@ -8,8 +8,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated
 
 import typer
@@ -33,15 +33,13 @@ if working():  # not for --help
     from twinmill.files import check_new_file
     from twinmill.model.model_file import ModelFile
     from twinmill.report import Provenance
-    from twinmill.report import diagnosis as present
     from twinmill.swarm.metrics import swarm_metrics
-    from twinmill.terminal import progress_bar
-    from twinmill_cli.calibrate import option
     from twinmill_cli.frame import (
         command_line,
         finish,
         load,
         open_model,
+        option,
         provenance,
         told,
     )
@@ -81,9 +79,22 @@ def _diagnose(
         data["next_experiment"]["command"] = then[-1][1]
     if data["rest"]["proven"]:
         data["rest"]["proven"]["command"] = next(c for why, c in then if "the formula" in why)
-    section = partial(present.section, result, then)
-    finish(data, present.terminal(result, then), source, section=section, as_json=as_json, out=out)
+    finish(
+        data,
+        None if as_json else _shown().terminal(result, then),
+        source,
+        section=lambda: _shown().section(result, then),
+        as_json=as_json,
+        out=out,
+    )
     return result
+
+
+def _shown() -> ModuleType:
+    """Tables and pictures of a diagnosis: slow to import, and JSON needs none."""
+    from twinmill.report import diagnosis
+
+    return diagnosis
 
 
 @contextmanager
@@ -191,6 +202,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     # Slow to import, and `make demo` does without what it needs.
     from twinmill.report.swarm_comparison import LOOK
     from twinmill.swarm.compare import compare_swarm
+    from twinmill.terminal import progress_bar
 
     try:
         series = swarm_metrics(log, model.get("sensor.range_m"), model.get("robot.body_radius_m"))
@@ -258,15 +270,14 @@ def _explain(
     kept = result.formula and result.formula.kept
     then = [*(() if kept else adding), *settling]
     not_written = "" if result.path else f"Not written: {output}; nothing was found for it."
-    section = partial(present.explanation_section, result, then, not_written)
     data = {**result.to_json(), **told(measurements)}
     if settling:
         data["next_experiment"]["command"] = settling[-1][1]
     finish(
         data,
-        present.terminal_explanation(result, then, not_written),
+        None if as_json else _shown().terminal_explanation(result, then, not_written),
         source,
-        section=section,
+        section=lambda: _shown().explanation_section(result, then, not_written),
         as_json=as_json,
         out=out,
     )

@@ -7,9 +7,9 @@ import shlex
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
-from rich.console import RenderableType
 
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.files import check_report
@@ -18,11 +18,19 @@ from twinmill.report import Provenance, Section, write_report
 from twinmill.report.html import SCORE_NOTE
 from twinmill_cli.output import STOPPED, deliver
 
+if TYPE_CHECKING:  # slow to import, and JSON needs none of it
+    from rich.console import RenderableType
+
 
 def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
     """The command line that does this again, without what only changes where and how it is told."""
     words = ["twinmill", *shlex.split(verb), *map(str, logs), "--model", model]
     return shlex.join(words + (["-o", str(output)] if output else []))
+
+
+def option(name: str) -> str:
+    """Of the command line, for a text of an effect."""
+    return f"--{name.replace('_', '-')}"
 
 
 def holding(names: list[str]) -> list[str]:
@@ -67,7 +75,7 @@ def told(measurements: Measurements) -> dict:
 
 def finish(
     data: dict,
-    text: RenderableType,
+    text: RenderableType | None,
     source: Provenance,
     *,
     section: Callable[[], Section],
@@ -76,6 +84,8 @@ def finish(
     note: str = SCORE_NOTE,
 ) -> None:
     """Report, then JSON or text; the section's pictures are drawn for a report alone.
+
+    Of JSON no text need be made.
 
     What was found is told though the report cannot be written, or Ctrl-C stops its drawing; of work
     that was stopped before (`stopped` in data) none is drawn.

@@ -9,17 +9,16 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
 from twinmill_cli.lazy import working
 
 if working():  # not for --help
-    from rich.console import Console, RenderableType
-
     from twinmill.files import plain
-    from twinmill.terminal import progress_words
+if TYPE_CHECKING:
+    from rich.console import RenderableType
 
 AsJson = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on stdout, nothing else.")
@@ -61,12 +60,14 @@ def print_object(data: dict) -> None:
     _told_on[:] = [sys.stdout]
 
 
-def deliver(data: dict, text: RenderableType, as_json: bool) -> None:
+def deliver(data: dict, text: RenderableType | None, as_json: bool) -> None:
     """Prints the one or the other on stdout; text that must not wrap is not cut either."""
     with unstopped():
         if as_json:
             print_object(data)
         else:
+            from rich.console import Console  # slow to import, and JSON needs none
+
             Console().print(text, crop=False)
 
 
@@ -80,6 +81,11 @@ def busy(what: str) -> Iterator[None]:
 @contextmanager
 def telling(what: str) -> Iterator[Callable[[str], None]]:
     """The same, with a function that tells in words where the work has got to."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from twinmill.terminal import progress_words  # slow to import
+
     progress = progress_words()
     task = progress.add_task(what, total=None)
     progress.start()

@@ -6,6 +6,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,14 @@ inline Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t>
     nb::capsule owner(owned,
                       [](void *p) noexcept { delete static_cast<std::vector<double> *>(p); });
     return Array(owned->data(), shape, owner);
+}
+
+// The same of an array that was written as a whole: a vector would be cleared before.
+inline Array ToNumpy(std::unique_ptr<double[]> &&values, std::initializer_list<size_t> shape)
+{
+    double *owned = values.release();
+    nb::capsule owner(owned, [](void *p) noexcept { delete[] static_cast<double *>(p); });
+    return Array(owned, shape, owner);
 }
 
 // Adds the container of logs.

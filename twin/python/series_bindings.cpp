@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums and filters over time of many columns at once, row by row and not value by value.
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 
 #include "arrays.h"
 
@@ -29,83 +32,95 @@ std::vector<size_t> Wanted(size_t count, std::initializer_list<std::span<const i
     return place;
 }
 
+// Columns (N, m k): each of the second's m signals times each of the first's k gains.
+using Product = std::pair<Matrix, Matrix>;
+
+size_t WidthOf(const Product &product)
+{
+    return product.first.shape(1) * product.second.shape(1);
+}
+
 // Of all columns side by side.
-size_t WidthOf(const std::vector<Matrix> &arrays, size_t count)
+size_t WidthOf(const std::vector<Product> &products, size_t count)
 {
     size_t width = 0;
-    for (const Matrix &values : arrays)
+    for (const Product &product : products)
     {
-        if (values.shape(0) != count)
-            throw std::invalid_argument("weights must be as many as rows of values");
-        width += values.shape(1);
+        if (product.first.shape(0) != count || product.second.shape(0) != count)
+            throw std::invalid_argument("steps must be as many as rows of gains and of signals");
+        width += WidthOf(product);
     }
     return width;
 }
 
-// Adds a row of several arrays to sums with the weight c, and to those behind them with s.
-double *AddRow(const std::vector<Matrix> &arrays, size_t n, double c, double s, double *sum)
+// Adds a row of several products to sums, one after the other for each share.
+double *AddRow(const std::vector<Product> &products, size_t n, std::span<const double> shares,
+               double *sum)
 {
-    for (const Matrix &values : arrays)
+    for (const auto &[gains, signals] : products)
     {
-        const size_t width = values.shape(1);
-        const double *value = values.data() + n * width;
-        for (size_t f = 0; f < width; ++f)
-        {
-            const double v = value[f];
-            sum[f] += c * v;
-            sum[width + f] += s * v;
-        }
-        sum += 2 * width;
+        const size_t width = gains.shape(1), count = signals.shape(1);
+        const double *gain = gains.data() + n * width, *signal = signals.data() + n * count;
+        for (const double share : shares)
+            for (size_t k = 0; k < count; ++k, sum += width)
+                for (size_t f = 0; f < width; ++f)
+                    sum[f] += share * (gain[f] * signal[k]);
     }
     return sum;
 }
 
-// Writes along * (sum of c v) + aside * (sum of s v) of what lies between two sums.
-double *WriteBetween(const std::vector<Matrix> &arrays, const double *&from, const double *&to,
-                     double along, double aside, double *out)
+// Writes what lies between two sums, along a direction.
+double *WriteBetween(const std::vector<Product> &products, const double *&from, const double *&to,
+                     std::span<const double> direction, double *out)
 {
-    for (const Matrix &values : arrays)
+    for (const Product &product : products)
     {
-        const size_t width = values.shape(1);
+        const size_t width = WidthOf(product);
         for (size_t f = 0; f < width; ++f)
-            out[f] = along * (to[f] - from[f]) + aside * (to[width + f] - from[width + f]);
-        from += 2 * width;
-        to += 2 * width;
+            out[f] = direction[0] * (to[f] - from[f]);
+        for (size_t k = 1; k < direction.size(); ++k)
+            for (size_t f = 0; f < width; ++f)
+                out[f] += direction[k] * (to[k * width + f] - from[k * width + f]);
+        from += direction.size() * width;
+        to += direction.size() * width;
         out += width;
     }
     return out;
 }
 
-// How far velocities lead a robot along a direction of the plane, from each start to its end.
-Array LedBetween(const std::vector<Matrix> &forward, const std::vector<Matrix> &left, Matrix steps,
-                 Indices starts, Indices ends, Matrix direction)
+// How far velocities lead a robot along a direction of the plane, from each start to its end; or
+// by turning rates how far it turns.
+Array LedBetween(const std::vector<Product> &forward, const std::vector<Product> &left,
+                 Matrix steps, Indices starts, Indices ends, Matrix direction)
 {
-    const size_t count = steps.shape(0), rows = starts.size();
-    if (steps.shape(1) != 2 || direction.shape(1) != 2)
-        throw std::invalid_argument("steps and directions must have two columns");
-    if (ends.size() != rows || direction.shape(0) != rows)
-        throw std::invalid_argument("ends and directions must be as many as starts");
+    const size_t count = steps.shape(0), ways = steps.shape(1), rows = starts.size();
+    if ((ways != 1 || !left.empty()) && ways != 2)
+        throw std::invalid_argument("steps must have two columns, or for turning one");
+    if (ends.size() != rows || direction.shape(0) != rows || direction.shape(1) != ways)
+        throw std::invalid_argument("ends and directions must be as many as starts, and as steps");
     const size_t width = WidthOf(forward, count) + WidthOf(left, count);
     std::vector<size_t> place = Wanted(count, {Span(starts), Span(ends)});
-    std::vector<double> sums, row(2 * width);
+    std::vector<double> sums, row(ways * width);
     sums.reserve(row.size() * static_cast<size_t>(std::ranges::count(place, 0U)));
     for (size_t n = 0; n < count; ++n)
     {
-        const double c = steps.data()[2 * n], s = steps.data()[2 * n + 1];
-        AddRow(left, n, -s, c, AddRow(forward, n, c, s, row.data()));
+        const std::span<const double> ahead(steps.data() + ways * n, ways);
+        double *aside = AddRow(forward, n, ahead, row.data());
+        if (!left.empty())
+            AddRow(left, n, std::array{-ahead[1], ahead[0]}, aside);
         if (place[n] == kNoPlace)
             continue;
         place[n] = sums.size();
         sums.insert(sums.end(), row.begin(), row.end());
     }
-    std::vector<double> led(rows * width);
+    auto led = std::make_unique_for_overwrite<double[]>(rows * width);
     for (size_t r = 0; r < rows; ++r)
     {
         const double *from = sums.data() + place[static_cast<size_t>(starts.data()[r])];
         const double *to = sums.data() + place[static_cast<size_t>(ends.data()[r])];
-        const double along = direction.data()[2 * r], aside = direction.data()[2 * r + 1];
-        WriteBetween(left, from, to, along, aside,
-                     WriteBetween(forward, from, to, along, aside, led.data() + r * width));
+        const std::span<const double> along(direction.data() + ways * r, ways);
+        WriteBetween(left, from, to, along,
+                     WriteBetween(forward, from, to, along, led.get() + r * width));
     }
     return ToNumpy(std::move(led), {rows, width});
 }
@@ -147,20 +162,23 @@ private:
 // Calls write(from, to, cos, sin, out) for each window: sums at its start and end, its first
 // direction, and room for (3, T) displacements.
 template <class Write>
-std::vector<double> ForEachWindow(const Seen &seen, const Places &places, size_t width, Write write)
+std::unique_ptr<double[]> ForEachWindow(const Seen &seen, const Places &places, size_t width,
+                                        Write write)
 {
-    std::vector<double> displaced(3 * seen.ends.size() * width);
-    for (size_t i = 0; i < seen.ends.size(); ++i)
+    auto displaced = std::make_unique_for_overwrite<double[]>(3 * seen.ends.size() * width);
+    double *out = displaced.get();
+    for (size_t w = 0; w < seen.starts.size(); ++w)
     {
-        const size_t w = i / seen.Horizons();
-        write(places.At(seen.starts[w]), places.At(seen.ends[i]), std::cos(seen.at_rad[w]),
-              std::sin(seen.at_rad[w]), displaced.data() + 3 * i * width);
+        const double *from = places.At(seen.starts[w]);
+        const double c = std::cos(seen.at_rad[w]), s = std::sin(seen.at_rad[w]);
+        for (size_t h = 0; h < seen.Horizons(); ++h, out += 3 * width)
+            write(from, places.At(seen.ends[w * seen.Horizons() + h]), c, s, out);
     }
     return displaced;
 }
 
 // By speeds (N, T) forward, or to the left.
-std::vector<double> DisplacedByDriving(Matrix values, const Seen &seen, bool left)
+std::unique_ptr<double[]> DisplacedByDriving(Matrix values, const Seen &seen, bool left)
 {
     const size_t count = values.shape(0), width = values.shape(1);
     std::vector<double> sums(2 * width);
@@ -186,12 +204,13 @@ std::vector<double> DisplacedByDriving(Matrix values, const Seen &seen, bool lef
                 const double y = to[width + t] - from[width + t];
                 out[t] = c * x + s * y;
                 out[width + t] = c * y - s * x;
+                out[2 * width + t] = 0;
             }
         });
 }
 
 // By turning rates (N, T), to first order, of a robot that moves at `velocity` (N, 3).
-std::vector<double> DisplacedByTurning(Matrix values, Matrix velocity, const Seen &seen)
+std::unique_ptr<double[]> DisplacedByTurning(Matrix values, Matrix velocity, const Seen &seen)
 {
     const size_t count = values.shape(0), width = values.shape(1);
     std::vector<double> sums(3 * width + 2);  // angle, x, y; x and y of the robot turned left
@@ -408,9 +427,11 @@ void BindSeries(nb::module_ &m)
           "push.");
     m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
           "direction"_a,
-          "(R, F) how far each forward and left velocity, (N, f) side by side, leads along a "
-          "`direction` (R, 2) from after row `starts` (R,) up to row `ends` (R,): `steps` (N, 2) "
-          "are the length of each step times the direction in which the robot heads.");
+          "(R, F) how far each forward and left velocity leads along a `direction` (R, 2) from "
+          "after row `starts` (R,) up to row `ends` (R,): `steps` (N, 2) are the length of each "
+          "step times the direction in which the robot heads. Or with `steps` (N, 1) of no "
+          "direction, `direction` (R, 1) and no left velocities: how far each forward one leads. "
+          "Velocities are pairs side by side: gains (N, k), each times each of signals (N, m).");
 }
 
 }  // namespace twin

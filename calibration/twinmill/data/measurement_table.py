@@ -18,7 +18,6 @@ import numpy as np
 
 from twinmill.data.log import LogError
 from twinmill.data.units import UNITS, split_unit
-from twinmill.terminal import progress_bar
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
@@ -45,6 +44,8 @@ def open_text(path: Path) -> Iterator[TextIO]:
     Raises:
         LogError: it cannot be read, is no text, or ends in `.gz` and is not gzip.
     """
+    from twinmill.terminal import progress_bar  # slow to import, and logs need none
+
     try:
         with (
             progress_bar(counted=False) as progress,

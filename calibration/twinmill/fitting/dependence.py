@@ -65,6 +65,17 @@ class Motion:
     step_s: np.ndarray
     moved: np.ndarray
 
+    @cached_property
+    def each(self) -> tuple[np.ndarray, ...]:
+        """(N, 1) velocities: forward, left, turning."""
+        return tuple(own[:, None].copy() for own in self.velocity.T)
+
+    @cached_property
+    def room(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 2) forward and left parts of a way along each of the room's axes."""
+        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)
+        return np.column_stack([c, s]), np.column_stack([-s, c])
+
     @property
     def speed_mps(self) -> np.ndarray:
         """(N,) of the model, whatever the direction."""
@@ -90,7 +101,32 @@ class Motion:
         return np.clip(relative.max(axis=1) / MOVES, 0.0, 1.0)
 
 
-Features = Sequence[np.ndarray]  # (N, f) forward, left, turning
+@dataclass(frozen=True, eq=False)
+class Product:
+    """(N, m k) columns: each of m signals times each of k gains.
+
+    They are made where they are wanted: the features of all groups would be a hundred megabytes,
+    and few are chosen.
+
+    Attributes:
+        gains: (N, k).
+        signals: (N, m).
+    """
+
+    gains: np.ndarray
+    signals: np.ndarray
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Of the columns."""
+        return len(self.gains), self.gains.shape[1] * self.signals.shape[1]
+
+    def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
+        """The columns themselves."""
+        return (self.signals[:, :, None] * self.gains[:, None]).reshape(self.shape)
+
+
+Features = Sequence[np.ndarray | Product]  # (N, f) forward, left, turning
 Group = Sequence[Features]  # fitted together; groups may share features
 
 
@@ -188,14 +224,13 @@ def _way_m(motion: Motion) -> np.ndarray:
 
 def _scaled(motion: Motion, gain: np.ndarray) -> Features:
     """Each velocity times (N, k) gains."""
-    forward, left, turning = (gain * own[:, None] for own in motion.velocity.T)
-    return forward, left, turning
+    return tuple(Product(gain, own) for own in motion.each)
 
 
 def _crossed(motion: Motion, gain: np.ndarray) -> Features:
     """Turning added to driving and driving to turning, times (N, k) gains."""
-    forward, left, turning = _scaled(motion, gain)
-    return turning, turning, np.hstack([forward, left])
+    turning = Product(gain, motion.each[2])
+    return turning, turning, Product(gain, motion.velocity[:, :2].copy())
 
 
 def _courses(motion: Motion) -> Iterator[Features]:
@@ -225,18 +260,15 @@ def beat(motion: Motion, rate_radps: float) -> Iterator[Group]:
 
 def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
     """Motion along the room's axes, and turning, while the robot moves, times (N, k) gains."""
-    along, aside, _ = _pushes(motion, gain)
-    yield along, aside, gain * motion.moves[:, None]
-    none = np.zeros((len(gain), 0))
-    yield none, none, gain * motion.speed_mps[:, None]
+    along, aside, none = _pushes(motion, gain)
+    yield along, aside, along.gains
+    yield none, none, Product(gain, motion.speed_mps[:, None])
 
 
 def _pushes(motion: Motion, gain: np.ndarray) -> Features:
     """Motion along the room's axes while the robot moves, times (N, k) gains."""
-    drift = gain * motion.moves[:, None]
-    c, s = np.cos(motion.heading_rad)[:, None], np.sin(motion.heading_rad)[:, None]
-    none = np.zeros((len(gain), 0))
-    return np.hstack([drift * c, drift * s]), np.hstack([-drift * s, drift * c]), none
+    drift, (along, aside) = gain * motion.moves[:, None], motion.room
+    return Product(drift, along), Product(drift, aside), np.zeros((len(gain), 0))
 
 
 def _curves(motion: Motion) -> Iterator[Features]:
@@ -244,8 +276,8 @@ def _curves(motion: Motion) -> Iterator[Features]:
     base = motion.base
     yield tuple(_levels(np.abs(own)) * np.sign(own)[:, None] for own in base.T)
     spin, speed = _levels(np.abs(base[:, 2])), _levels(motion.speed_mps)
-    forward, left, turning = motion.velocity.T[..., None]
-    yield spin * forward, spin * left, speed * turning
+    forward, left, turning = motion.each
+    yield Product(spin, forward), Product(spin, left), Product(speed, turning)
     yield spin, spin, np.hstack([speed, speed * np.sign(base[:, :1])])
 
 
@@ -395,7 +427,7 @@ def _events(motion: Motion) -> Iterator[Features]:
     begun = last >= 0
     since_s[begun] = motion.t_s[begun] - motion.t_s[starts[last[begun]]]
     lately = np.exp(-since_s[:, None] / FADES_S)
-    slow = np.hstack([own[:, None] * base for own in lately.T])
+    slow = Product(base, lately)
     yield slow, slow, slow
     yield lately, lately, lately  # a kick, whatever the robot is told
 

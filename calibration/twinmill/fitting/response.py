@@ -26,7 +26,7 @@ from twinmill.fitting import wheel_angles
 from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
 from twinmill.fitting.boosting import Learners, Parts, boosted, squares
-from twinmill.fitting.dependence import Features, Group, Motion, even_step_s
+from twinmill.fitting.dependence import Features, Group, Motion, Product, even_step_s
 from twinmill.fitting.independence import independent_shares
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
@@ -66,7 +66,8 @@ class Rows:
     Attributes:
         at: (3, R) window, horizon and channel of each.
         starts, ends: (R,) points.
-        direction: (R, 2) in the room along which it is measured, times its weight.
+        direction: (R, 2) in the room along which it is measured, times its weight; of turning that
+            alone (R, 1).
         weight: (R,) one over its error.
         wanted: (R,) value, weighted.
         parts: which rows lie in each left-out part.
@@ -285,7 +286,9 @@ class Response:
         """(M, c) commands held, on an even grid."""
         t_s = self.data.measurement.track.command_t_s
         k = np.searchsorted(t_s, self._grid_s, side="right") - 1
-        return np.where((k >= 0)[:, None], signal[np.maximum(k, 0)], 0.0)
+        held = signal[np.maximum(k, 0)]
+        held[k < 0] = 0.0
+        return held
 
     def _at(self, signal: np.ndarray) -> np.ndarray:
         """(G, c) on the grid to (N, c) at the middles of the steps."""
@@ -370,12 +373,12 @@ class Response:
         weight = weight[order]
         heading = np.nan_to_num(self.data.measurement.track.heading_smooth)
         along = heading[self.data.windows.starts[window]] + np.where(channel == 1, np.pi / 2, 0.0)
-        direction = np.stack([np.cos(along), np.sin(along)], axis=-1) if part == 0 else (1.0, 0.0)
+        ways = (np.cos(along), np.sin(along)) if part == 0 else (np.ones(len(along)),)
         return Rows(
             at=at,
             starts=self.starts[window],
             ends=self.ends[window, horizon],
-            direction=direction * weight[:, None],
+            direction=np.stack(ways, axis=-1) * weight[:, None],
             weight=weight,
             wanted=wanted[window, horizon, channel] * weight,
             parts=parts.at(order),
@@ -383,14 +386,17 @@ class Response:
 
     def _led(self, part: int, rows: Rows, features: Sequence[Features]) -> np.ndarray:
         """(R, F) of features side by side, forward ones before left; or of turning."""
-        none = np.zeros_like(self.step_s)
+        alone = np.ones((len(self.step_s), 1))
+
+        def factors(of: np.ndarray | Product) -> tuple[np.ndarray, np.ndarray]:
+            return (of.gains, of.signals) if isinstance(of, Product) else (of, alone)
+
+        columns, steps = [[factors(f[axis]) for f in features] for axis in AXES[part]], alone
         if part == 0:
-            heading = (np.cos(self.heading_rad), np.sin(self.heading_rad))
-            columns, steps = [[f[axis] for f in features] for axis in (0, 1)], heading
-        else:
-            columns, steps = [[f[2] for f in features], []], (none + 1.0, none)
-        steps = np.stack(steps, axis=-1) * self.step_s[:, None]
-        return native.led_between(*columns, steps, rows.starts, rows.ends, rows.direction)
+            steps = np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+        forward, left = columns if part == 0 else (*columns, [])
+        steps = steps * self.step_s[:, None]
+        return native.led_between(forward, left, steps, rows.starts, rows.ends, rows.direction)
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
         return np.floor(t_s / self.block_s).astype(int) % self.folds
@@ -606,7 +612,7 @@ def _swings(errors: np.ndarray, made: np.ndarray, heading_rad: np.ndarray) -> li
 
 def _only(axes: Sequence[int], group: Group) -> Features:
     """A group's features of some axes, side by side."""
-    none = [np.zeros((len(group[0][0]), 0))]
+    none = [np.zeros((group[0][0].shape[0], 0))]
     return tuple(np.hstack([f[k] for f in group] if k in axes else none) for k in range(3))
 
 

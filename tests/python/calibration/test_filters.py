@@ -115,18 +115,30 @@ def test_velocities_lead_along_a_direction_as_far_as_the_steps_add_up_to(drive):
     velocity, heading_rad, step_s = drive
     steps = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)]) * step_s[:, None]
     direction = np.array([[1.0, 0.0], [0.0, 2.0], [0.6, 0.8]])
+    gains, whole = np.column_stack([np.ones(50), np.arange(50.0)]), np.ones((50, 1))
+    signals = np.column_stack([velocity[:, 0], 3 * velocity[:, 0]])
     found = native.led_between(
-        [velocity[:, :1].copy()], [velocity[:, 1:2].copy()], steps, STARTS, ENDS[:, 1], direction
+        *([(gains, signals)], [(velocity[:, 1:2].copy(), whole)]),
+        *(steps, STARTS, ENDS[:, 1], direction),
     )
+    forward = [g * s for s in (velocity[:, 0], 3 * velocity[:, 0]) for g in gains.T]
     none = np.zeros(50)
-    for column, kept in enumerate(([1, 0, 0], [0, 1, 0])):
+    moves = [np.column_stack([v, none, none]) for v in forward]
+    moves.append(np.column_stack([none, velocity[:, 1], none]))
+    for column, moved in enumerate(moves):
         for row, (start, end) in enumerate(zip(STARTS, ENDS[:, 1], strict=True)):
-            way = integrated(velocity * kept, heading_rad, step_s, start, end, 0.0)[:2]
-            assert found[row, column] == pytest.approx(direction[row] @ way, abs=1e-12)
-    assert native.led_between([none[:, None]], [], steps, STARTS, ENDS[:, 1], direction).shape == (
-        3,
-        1,
-    )
+            way = integrated(moved, heading_rad, step_s, start, end, 0.0)[:2]
+            assert found[row, column] == pytest.approx(direction[row] @ way, abs=1e-10)
+
+
+def test_turning_rates_turn_as_far_as_the_steps_add_up_to(drive):
+    velocity, _, step_s = drive
+    rates = [(velocity[:, 2:].copy(), np.ones((50, 1)))]
+    weight = np.array([[1.0], [2.0], [-0.5]])
+    found = native.led_between(rates, [], step_s[:, None], STARTS, ENDS[:, 1], weight)
+    turned_rad = np.cumsum(velocity[:, 2] * step_s)
+    expected = weight[:, 0] * (turned_rad[ENDS[:, 1]] - turned_rad[STARTS])
+    assert found[:, 0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
@@ -148,7 +160,8 @@ def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
 def test_sums_refuse_rows_that_are_not_there():
     with pytest.raises(ValueError, match="rows of values"):
         native.led_between(
-            [np.ones((5, 1))], [], np.ones((5, 2)), np.array([0]), np.array([5]), np.ones((1, 2))
+            *([(np.ones((5, 1)), np.ones((5, 1)))], []),
+            *(np.ones((5, 2)), np.array([0]), np.array([5]), np.ones((1, 2))),
         )
 
 

@@ -9,8 +9,9 @@ from playwright.sync_api import expect
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
-from twinmill.report import Provenance, comparison_section, write_report
+from twinmill.report import Provenance, write_report
 from twinmill.report.charted import charts
+from twinmill.report.sections import comparison_section
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 LARGEST_BYTES, ROBOTS, LONG_S = 10e6, 20, 150.0  # what a report must bear
