@@ -285,14 +285,17 @@ def promising(screened: list[Screened], settings: Settings) -> list[Screened]:
 def likely_pairs(
     before: Trial, screened: list[Screened], settings: Settings
 ) -> list[tuple[str, str]]:
-    """Pairs by what they explain together beyond the better one alone."""
-    top = sorted(screened, key=lambda s: -s.gain)[:10]
+    """Pairs by what they explain together beyond the better one alone.
+
+    Of two that hide each other, as a lag of the drive and one of turning the other way, either
+    alone takes next to nothing: so of all.
+    """
     if before.held_score < 1.0 or before.state.of_cameras:
         return []
     fit = _on_few(before.fit)
     left, *_ = fit.whitened(range(len(fit.datasets)))
     worth = {}
-    for a, b in combinations(top, 2):
+    for a, b in combinations(screened, 2):
         both = np.hstack([a.columns, b.columns])[: len(left)]
         gram = both.T @ both + 0.25 * np.eye(both.shape[1])
         moment = both.T @ left
