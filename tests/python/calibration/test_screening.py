@@ -9,6 +9,7 @@ from twinmill.diagnosis.screening import Screened, _on_few, likely_pairs, screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import cross_validate, fitted
 from twinmill.fitting.opening import judged, open_measurements, with_own_gains
+from twinmill.model.model_file import ModelFile
 
 DUTIES, GAP_RAD = 1, 0.9
 HIDES = 10.0  # times what is missing, by which two signatures agree that part in it alone
@@ -27,6 +28,25 @@ def test_much_play_promises_what_it_takes(worn_gears):
     """A strong play is no multiple of a weak one, which alone promises a tenth of it."""
     (promised,) = screen(worn_gears, names=["backlash"])
     takes = cross_validate(worn_gears, ("backlash",)).evidence
+    assert promised.gain > takes / 4
+
+
+@pytest.fixture(scope="module")
+def turns_at_once(tanh_robot, measure, true_model, tmp_path_factory):
+    """The first state for a robot that turns as it drives; its model says that it turns at once."""
+    path = tmp_path_factory.mktemp("at_once") / "base.toml"
+    sooner = f'[[effect]]\nname = "yaw_lag"\nextra_s = {-tanh_robot().lag_s}\n'
+    path.write_text(f"{true_model.text}\n{sooner}")
+    base = ModelFile.load(str(path))
+    opened = with_own_gains(judged(open_measurements([measure(tanh_robot(), 3, 40.0)], base)))
+    return fitted(first_state(opened, base, ()))
+
+
+def test_a_turn_that_cannot_come_sooner_promises_what_it_takes_by_coming_later(turns_at_once):
+    """Its usual size is sooner, which is no sooner than at once: there it does next to nothing."""
+    (promised,) = screen(turns_at_once, names=["yaw_lag"])
+    takes = cross_validate(turns_at_once, ("yaw_lag",)).evidence
+    assert takes > SETTINGS.evidence
     assert promised.gain > takes / 4
 
 
