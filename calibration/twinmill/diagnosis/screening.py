@@ -30,7 +30,8 @@ from twinmill.model.parameters import (
 from twinmill.predict.datasets import thinning
 
 SMALL = 0.05
-STRONGER = (3.0, 6.0)  # usual strengths, where a stronger effect is not the same made larger ...
+# Usual strengths, where a stronger effect, or one the other way, is not the same made larger ...
+STRONGER = (3.0, 6.0, -3.0, -6.0)
 BENT = 0.9  # ... as it is below this cosine of a small part of it and of the usual strength
 MOST_APART = 8  # data sets with columns of their own: those of more would fill the memory
 STALE = 0.3  # of the prior's width: a usual error of the base's numbers
@@ -157,8 +158,9 @@ def _screened(
 ) -> Screened:
     """Slopes at neutral, or the way to the usual strength where these say nothing of it.
 
-    Where a stronger effect is no multiple of a weak one, as of play in a gear, it is the way to the
-    strength that takes most.
+    Where a stronger effect is no multiple of a weak one, as of play in a gear, or the usual way is
+    barred, as to a turn that comes sooner where it comes at once, it is the way to the strength
+    that takes most.
     """
     parameters, small, whole = _signatures(name, state, rows=rows, weights=weights, start=start)
 
@@ -193,7 +195,7 @@ def _screened(
 def _stronger(
     name: str, state: State, rows: list[np.ndarray], weights: list[np.ndarray]
 ) -> np.ndarray:
-    """(R, 2) change of the rows by an effect of one number at STRONGER strengths."""
+    """(R, k) change of the rows by an effect of one number at STRONGER strengths."""
     columns = []
     for dataset, given, row, weight in zip(
         state.datasets, state.models, rows, weights, strict=True
@@ -285,14 +287,17 @@ def promising(screened: list[Screened], settings: Settings) -> list[Screened]:
 def likely_pairs(
     before: Trial, screened: list[Screened], settings: Settings
 ) -> list[tuple[str, str]]:
-    """Pairs by what they explain together beyond the better one alone."""
-    top = sorted(screened, key=lambda s: -s.gain)[:10]
+    """Pairs by what they explain together beyond the better one alone.
+
+    Of two that hide each other, as a lag of the drive and one of turning the other way, either
+    alone takes next to nothing: so of all.
+    """
     if before.held_score < 1.0 or before.state.of_cameras:
         return []
     fit = _on_few(before.fit)
     left, *_ = fit.whitened(range(len(fit.datasets)))
     worth = {}
-    for a, b in combinations(top, 2):
+    for a, b in combinations(screened, 2):
         both = np.hstack([a.columns, b.columns])[: len(left)]
         gram = both.T @ both + 0.25 * np.eye(both.shape[1])
         moment = both.T @ left

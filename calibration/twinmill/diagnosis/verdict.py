@@ -190,7 +190,7 @@ class VerdictInputs:
         """No effect is beyond doubt, none takes nearly all, and much is left that is no noise."""
         if not all(f.certainty == "doubtful" for f in self.effects):
             return False
-        if any(f.share >= SETTINGS.nearly_all and not f.wrong_form for f in self.effects):
+        if self._one_takes_all:
             return False
         if self._continuous and self.rest.share > SETTINGS.much:
             return True
@@ -201,15 +201,21 @@ class VerdictInputs:
     def _proven_instead(self) -> Formula | None:
         """A formula that was proven in place of all effects that were found, all of them doubtful.
 
-        It takes more than they do, on stretches that neither chose nor fitted it.
+        It takes more than they do, on stretches that neither chose nor fitted it. Where one of them
+        takes nearly all, the formula is another form of it.
         """
         proven = self.rest.proven
-        if not (proven and self.effects):
+        if not (proven and self.effects) or self._one_takes_all:
             return None
         instead = all(
             f.certainty == "doubtful" and f.effect in proven.instead_of for f in self.effects
         )
         return proven if instead else None
+
+    @property
+    def _one_takes_all(self) -> bool:
+        """One effect alone takes nearly all, and none of another form stands behind it."""
+        return any(f.share >= SETTINGS.nearly_all and not f.wrong_form for f in self.effects)
 
     @property
     def _taken(self) -> float:

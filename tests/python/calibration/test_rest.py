@@ -566,6 +566,27 @@ def test_a_formula_in_place_of_all_that_is_doubtful_is_told_first(certainty, ins
 
 
 @pytest.mark.parametrize(
+    ("takes", "wrong_form", "verdict"),
+    [
+        (0.99, False, "effect_missing"),
+        (0.99, True, "outside_catalogue"),
+        (0.6, False, "outside_catalogue"),
+    ],
+)
+def test_a_formula_for_nearly_all_that_one_effect_takes_is_a_form_of_it(takes, wrong_form, verdict):
+    """A compass that errs by an odd wave of its heading: once a turn takes most of it."""
+    why = "it changes with heading"
+    found = [Finding("compass_deviation", None, [], takes, "doubtful", why, wrong_form=wrong_form)]
+    proven = SimpleNamespace(
+        equals="theta_rad += 0.03*cos(theta)", instead_of=("compass_deviation",)
+    )
+    rest = Rest(1 - takes, False, ["heading"], proven=proven)
+    weighed = VerdictInputs(1.5, 1.5, 1.5, 1.01, found, rest, [], [], [], 1.0)
+    assert weighed.verdict == verdict
+    assert "compass_deviation" in weighed.sentence
+
+
+@pytest.mark.parametrize(
     ("of_base", "of_effect", "verdict"),
     [
         (0.55, 0.43, "effect_missing"),  # together they take all that was above the noise
