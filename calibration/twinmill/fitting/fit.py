@@ -10,6 +10,7 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.floor import acting_gains
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
     Opened,
@@ -32,6 +33,7 @@ from twinmill.model.parameters import (
     base_lag_is_identifiable,
     base_parameters,
     duty_table,
+    gains_of,
 )
 from twinmill.predict.steady_states import SteadyStates
 
@@ -98,7 +100,8 @@ def base_names(
         told: names of what other logs told; of these only the gains are free, since batteries and
             floors change. Without any, the speeds of the duty table stand for the forward gain.
     """
-    gains = [n for n in BASE_GAINS if any(_moves(o, n) for o in opened)]
+    acting = {n for o in opened for n in _gains(o, model)}
+    gains = [n for n in BASE_GAINS if n in acting]
     table = [] if told else duty_table(model)
     if len(table) > 1:
         gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
@@ -113,12 +116,10 @@ def effects_free(model: native.Model, opened: Sequence[Opened]) -> list[Paramete
     return [p for p in free if p.role != "lateness"] if lateness_changes(opened) else free
 
 
-def _moves(own: Opened, gain: str) -> bool:
-    """Whether the commands move the robot along what a gain scales."""
-    if isinstance(own.data, SteadyStates):
-        return True
-    track = own.measurement.track
-    return track.command_kind != "twist" or bool(track.command[:, BASE_GAINS.index(gain)].any())
+def _gains(own: Opened, model: native.Model) -> list[str]:
+    """Gains of the base that this measurement moves."""
+    steady = isinstance(own.data, SteadyStates)
+    return gains_of(model) if steady else acting_gains(own.data, model)
 
 
 def fitted(

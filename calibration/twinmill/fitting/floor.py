@@ -35,6 +35,7 @@ from twinmill.model.parameters import (
     base_parameters,
     duty_table,
     effect_parameters,
+    gains_of,
 )
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.windows import HORIZONS_S, rms
@@ -141,7 +142,7 @@ def base_response(
     for name in [HEADING] if same_clock else ALIGNMENT:
         base.set(name, 0.0)
     scale_speeds(data, base)
-    names = [n for n in BASE_GAINS if _acts(data, n)] + [LAG]
+    names = [*acting_gains(data, base), LAG]
     table = duty_table(base)
     if len(table) > 1:
         names = [n for n in names if n != "base.forward_gain"] + table
@@ -228,12 +229,12 @@ def coarse_heading_rad(data: Trajectory, base: native.Model) -> float:
     return float(grid[np.argmin(squares)])
 
 
-def _acts(data: Trajectory, name: str) -> bool:
-    """Whether the log's commands move the robot along what this gain scales."""
-    track = data.measurement.track
+def acting_gains(data: Trajectory, model: native.Model) -> list[str]:
+    """Gains of the base along which its wheels and the log's commands move the robot."""
+    gains, track = gains_of(model), data.measurement.track
     if track.command_kind != "twist":
-        return True
-    return bool(track.command[:, BASE_GAINS.index(name)].any())
+        return gains
+    return [n for n in gains if track.command[:, BASE_GAINS.index(n)].any()]
 
 
 def _calm(

@@ -264,6 +264,11 @@ def drives_sideways(model: native.Model) -> bool:
     return model.wheel_kind not in ("differential", "ackermann")
 
 
+def gains_of(model: native.Model) -> list[str]:
+    """Gains of the base that a robot on such wheels has."""
+    return [n for n in BASE_GAINS if drives_sideways(model) or n != BASE_GAINS[1]]
+
+
 def with_role(effect: str, role: str) -> list[str]:
     """Parameters of an effect that have this role on its card; none of what is no effect."""
     card = catalogue().get(effect, {"parameters": ()})

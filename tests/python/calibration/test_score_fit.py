@@ -259,6 +259,15 @@ def test_what_a_log_tells_of_wheels_together_is_kept_though_none_is_told_alone(
     assert np.sqrt(side @ covariance.values @ side) < 0.3 * wheels[0].std
 
 
+def test_plain_wheels_have_no_gain_sideways(straight, model_file):
+    """They cannot roll sideways, whatever they are told."""
+    for wheels, moves in (("mecanum", True), ("differential", False)):
+        guess = model_file(('wheels = "mecanum"', f'wheels = "{wheels}"'))
+        names = base_names(guess.model, open_measurements([straight], guess), ())
+        assert ("base.sideways_gain" in names) == moves
+        assert "base.yaw_gain" in names
+
+
 def test_a_narrow_prior_holds_and_a_wide_one_does_not(straight, model_file, truth):
     held, let_go = (
         score_fit([straight], model_file(), base__motor_lag_s={"std": width}).shared_estimates()[-1]
