@@ -24,6 +24,7 @@ from twinmill.predict.windows import EVERY_S, HORIZONS_S, rms
 HORIZON = HORIZONS_S.index(0.5)
 LATER_S = np.arange(HORIZONS_S[HORIZON] + EVERY_S, 8.01, EVERY_S)
 DURATIONS_S = np.geomspace(0.5, 20.0, 51)
+ONCE = 0.9  # share of the squared errors: they are of one stretch
 MOVES = 0.1  # of the usual way: it moves
 ALONG, ACROSS, TURN, WITH_TURN = range(4)  # of `along_the_way`
 
@@ -61,14 +62,17 @@ def _in_s(time_s: float) -> str:
 def wandering(logs: Sequence[tuple[Trajectory, np.ndarray]]) -> Wander | None:
     """What wanders in logs; None where errors do not tell the next ones by more than chance.
 
+    What wanders by itself does so all the time: what happens once lies in a quarter of the logs.
+
     Args:
         logs: each with its (W, H, 3) errors; NaN where not judged.
     """
     start_s = _one_after_the_other([data.start_s for data, _ in logs])
     errors = np.concatenate([own for _, own in logs])
     moved = np.concatenate([data.measured for data, _ in logs])
-    again = told_before(along_the_way(errors[:, LONGEST], moved[:, LONGEST]), start_s)
-    wanders = again > by_chance(sum(data.covered_s for data, _ in logs))
+    ways = along_the_way(errors[:, LONGEST], moved[:, LONGEST])
+    span_s = sum(data.covered_s for data, _ in logs)
+    wanders = (told_before(ways, start_s) > by_chance(span_s)) & _all_the_time(ways)
     if not wanders.any():
         return None
     off = along_the_way(errors[:, HORIZON], moved[:, HORIZON])
@@ -79,6 +83,14 @@ def wandering(logs: Sequence[tuple[Trajectory, np.ndarray]]) -> Wander | None:
         for k, full in ((ALONG, way_m), (turning, moves_s))
     )
     return Wander(*along, *turn)
+
+
+def _all_the_time(errors: np.ndarray) -> np.ndarray:
+    """(C,) whether no quarter of the logs has nearly all of the squares of (W, C) errors."""
+    summed = np.concatenate([np.zeros_like(errors[:1]), np.nancumsum(errors**2, axis=0)])
+    quarter = len(errors) // 4
+    most = (summed[quarter:] - summed[: len(summed) - quarter]).max(axis=0)
+    return most < ONCE * summed[-1]
 
 
 def _one_after_the_other(starts_s: Sequence[np.ndarray]) -> np.ndarray:

@@ -26,8 +26,8 @@ def held(random, values):
     return np.repeat(random.choice(values, COUNT), round(1.5 / STEP_S))[:COUNT]
 
 
-def log(seed, *, gain=0.0, gain_s=1.0, turn_radps=0.0, turn_s=1.0):
-    """A log of a robot that drives on and back and turns, and the errors of a right model."""
+def log(seed, *, gain=0.0, gain_s=1.0, turn_radps=0.0, turn_s=1.0, shown_s=SPAN_S):
+    """The first of a robot that drives on and back and turns, and the errors of a right model."""
     random = np.random.default_rng(seed)
     speed_mps = held(random, [-0.3, 0.0, 0.15, 0.3])
     turning_radps = held(random, [-1.0, 0.0, 1.0])
@@ -36,7 +36,8 @@ def log(seed, *, gain=0.0, gain_s=1.0, turn_radps=0.0, turn_s=1.0):
     seen = random.normal(size=(COUNT, 3)) * (SENSOR_M, SENSOR_M, SENSOR_RAD)
     off = seen + np.column_stack([more_m, np.zeros(COUNT), more_rad])
     way = STEP_S * np.column_stack([speed_mps, np.zeros(COUNT), turning_radps]).cumsum(axis=0)
-    starts = np.arange(0, COUNT - round(HORIZONS_S[-1] / STEP_S) - 1, round(EVERY_S / STEP_S))
+    last = round((shown_s - HORIZONS_S[-1]) / STEP_S) - 1
+    starts = np.arange(0, last, round(EVERY_S / STEP_S))
     ends = starts[:, None] + np.rint(np.array(HORIZONS_S) / STEP_S).astype(int)
     errors, measured = (v[ends] - v[starts][:, None] for v in (off, way + off))
     start_s = starts * STEP_S
@@ -69,6 +70,19 @@ def test_logs_together_tell_one_wander():
 def test_the_noise_of_a_sensor_does_not_wander():
     """Of four correlations each is beyond two standard errors on one side by 2.3 %."""
     assert sum(wandering([log(seed)]) is not None for seed in range(20)) <= 6
+
+
+@pytest.mark.parametrize("from_s", [0, 30, 75])
+def test_what_lasts_for_a_while_and_ends_does_not_wander(from_s):
+    """For 20 s of 100 the robot turns by 0.1 rad/s more, once."""
+    for seed in range(6):
+        data, errors = log(seed, shown_s=100.0)
+        begins_s = data.start_s[:, None]
+        ends_s = begins_s + HORIZONS_S
+        lasts_s = np.minimum(ends_s, from_s + 20) - np.maximum(begins_s, from_s)
+        errors[:, :, 2] += 0.1 * np.maximum(lasts_s, 0)
+        found = wandering([(data, errors)])
+        assert found is None or not found.turn_radps
 
 
 def test_what_wanders_across_alone_has_no_size_in_words():
