@@ -41,7 +41,7 @@ FLIPS = 299  # random signs of blocks that make the null distribution
 MOMENTS = "single moments"
 STEADY = ("speed", "turning rate", COUPLING, "direction of rotation")
 FIRM, FEW, NOISE = "firm", "in too few stretches", "may be noise"
-WANDERS = "wanders by itself"
+WANDERS, MAY_WANDER = "wanders by itself", "may wander by itself"
 NOT_LOOKED_AT = "not looked at"
 SLOW = (TIME, WAY, PLACE)  # groups that change slowly along any drive
 FOLLOWS = 4  # numbers over time beyond which a group follows a wander: one formula has no more
@@ -180,13 +180,14 @@ class Rest:
         """On what it depends all the time, as `on X and Y`; empty if that is not known."""
         names = [name for name in self.depends_on if name != MOMENTS]
         if self.likely and names:
-            by_itself = ", or wanders by itself" if self.wanders else ""
+            size = f", {self.by_itself.words}" if self.by_itself and self.by_itself.words else ""
+            by_itself = f", or wanders by itself{size}" if self.wanders else ""
             return f"most likely on {' or '.join(names)}{by_itself}"
         return f"on {' and '.join(names)}" if names else ""
 
     @property
     def certainty(self) -> str:
-        """In words: FIRM, FEW, NOISE, WANDERS or NOT_LOOKED_AT."""
+        """In words: FIRM, FEW, NOISE, WANDERS, MAY_WANDER or NOT_LOOKED_AT."""
         if not self.looked_at:
             return NOT_LOOKED_AT
         known = self.depends_on and not self.likely
@@ -195,7 +196,7 @@ class Rest:
         if known or (self.firm and not self.little):
             return FIRM
         if self.by_itself and not self.little:
-            return WANDERS
+            return MAY_WANDER if self.depends_on else WANDERS
         return FEW if self.far else NOISE
 
     @property

@@ -271,8 +271,9 @@ class VerdictInputs:
         if verdict == "cannot_tell" and self.random:
             return self._at_random
         if verdict == "cannot_tell" and self.noises:
+            random = self.rest.by_itself and not self.rest.depends_on
             by_itself = f": it wanders by itself{self._size}."
-            why = by_itself if self.rest.by_itself else ", and these logs do not tell why."
+            why = by_itself if random else ", and these logs do not tell why."
             return (
                 "Nothing was found that follows from the commands, but the motion is far less "
                 f"regular than the model file says{why}"
@@ -324,9 +325,15 @@ class VerdictInputs:
 
     @property
     def _by_itself(self) -> str:
-        """The model leaves more than the noise, and that is random."""
+        """The model leaves more than the noise, and that is random, or may be."""
         maybe = " or ".join(_plain(f) for f in self.findings)
         part = f" Part of it may be {maybe}." if maybe else ""
+        if self.rest.depends_on:
+            return (
+                f"The model misses by more than the noise (score {self.last:.2f}), and what is "
+                f"left depends {self.rest.on}. By the same commands once more only what wanders "
+                f"would be otherwise.{part}"
+            )
         return (
             f"The model misses by more than the noise (score {self.last:.2f}), and what is left is "
             f"random: it wanders by itself{self._size}. No formula of the commands, place or time "
@@ -339,7 +346,8 @@ class VerdictInputs:
         if self.last <= GOOD:
             return ""
         if self.rest.by_itself:
-            return f" What is left (score {self.last:.2f}) wanders by itself{self._size}."
+            may = "may wander" if self.rest.depends_on else "wanders"
+            return f" What is left (score {self.last:.2f}) {may} by itself{self._size}."
         if self.last > SETTINGS.news * self.known:
             return (
                 f" The model misses by a little more than the noise (score {self.last:.2f}): more "

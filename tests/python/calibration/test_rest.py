@@ -268,6 +268,18 @@ def test_what_wanders_by_itself_is_random_and_told_by_its_size(score, doubtful, 
     assert left.certainty != FIRM
 
 
+@pytest.mark.parametrize(("depends_on", "certain"), [([], True), (["way driven"], False)])
+def test_a_wander_is_certain_where_nothing_else_stands_out(depends_on, certain):
+    """A texture of the floor wanders along the way, too: a second drive would tell."""
+    likely = bool(depends_on)
+    left = Rest(1.0, False, depends_on, likely=likely, wanders=True, by_itself=Wander(0.04, 3.0))
+    told = VerdictInputs(*[2.0] * 4, [], left, [], [], [], 1.0)
+    assert told.verdict == "cannot_tell"
+    assert ("is random" in told.sentence) == certain
+    assert ("By the same commands once more" in told.sentence) != certain
+    assert all(name in told.sentence for name in depends_on)
+
+
 def test_a_wander_that_hardly_shows_is_told_where_nothing_is_missing():
     left = Rest(1.0, False, [], by_itself=Wander(0.02, 3.0))
     told = VerdictInputs(*[1.2] * 4, [], left, [], [], [], 1.08)
