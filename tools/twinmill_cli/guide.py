@@ -102,8 +102,8 @@ SEEN = {
 ANSWERS = (
     (
         "score near 1",
-        "the model predicts as well as this log can tell",
-        "stop, or drive something new",
+        "on average it predicts as well as this log can tell; something small may be left",
+        "read the verdict",
     ),
     ("`model_adequate`", "nothing is missing that this log would show", "use the model"),
     ("`refit_enough`", "the numbers are stale, no effect is missing", "`fit`"),
