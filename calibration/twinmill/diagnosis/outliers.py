@@ -199,13 +199,11 @@ def odd_of_two(
         good: score up to which the model predicts a robot.
         progress: told in words what is being done.
     """
-    ids = _ids(opened)
-    if len(ids) != 2:
+    if len(_ids(opened)) != 2:
         return []
-    score = {i: fitted(_alone_state(opened, first, i)).held_score for i in ids}
-    if not min(score.values()) <= good < max(score.values()):
+    alone = _each_where_some_follow(opened, first, good, progress)
+    if not alone:
         return []
-    alone = _each_alone(opened, first, progress)
     off = _judged(max(alone, key=lambda a: a.before.held_score), alone)
     return [off] if off and off.effect else []
 
@@ -229,12 +227,9 @@ def odd_runs(
     if len(opened) < 2 or len(_ids(opened)) != 1 or not all(o.floor for o in opened):
         return []
     runs = [_as_robot(o, k) for k, o in enumerate(opened)]
-    score = [fitted(_alone_state(runs, first, k)).held_score for k in range(len(runs))]
-    if not min(score) <= good < max(score):
-        return []
-    alone = _each_alone(runs, first, progress)
-    usual = [a for a in alone if score[a.robot_id] <= good]
-    missed = [_simplest(a) for a in alone if score[a.robot_id] > good]
+    alone = _each_where_some_follow(runs, first, good, progress)
+    usual = [a for a in alone if a.as_all.held_score <= good]
+    missed = [_simplest(a) for a in alone if a.as_all.held_score > good]
     found = []
     for a in missed:
         off = _judged(a, [a, *usual])
@@ -315,6 +310,14 @@ def _begun_at(off: Outlier, common: native.Model, effect: str) -> list[Parameter
 
 def _ids(opened: Sequence[Opened]) -> list[int]:
     return sorted({o.measurement.track.robot_id for o in opened if o.floor})
+
+
+def _each_where_some_follow(
+    opened: Sequence[Opened], first: State, good: float, progress: Callable[[str], None]
+) -> list[Alone]:
+    """Each robot as `_each_alone` has it, if the first state predicts one and misses another."""
+    scores = [fitted(_alone_state(opened, first, i)).held_score for i in _ids(opened)]
+    return _each_alone(opened, first, progress) if min(scores) <= good < max(scores) else []
 
 
 def _each_alone(
