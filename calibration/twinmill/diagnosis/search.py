@@ -14,7 +14,15 @@ from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.screening import Screened, candidates, likely_pairs, promising, screen
 from twinmill.diagnosis.settings import SETTINGS, Settings
 from twinmill.diagnosis.ties import ties_of
-from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, fitted, without_effect
+from twinmill.diagnosis.trials import (
+    REFIT,
+    State,
+    Trial,
+    cross_validate,
+    fitted,
+    nearer,
+    without_effect,
+)
 from twinmill.fitting.starts import Starts
 from twinmill.model.parameters import lasts_for_a_while, with_role
 
@@ -40,7 +48,7 @@ def search(
             evidence must be stronger where the score is no worse than that.
         begun: told the search as it begins; it grows, and is whole at any moment.
     """
-    first = fitted(state)
+    first = fitted(nearer(state))
     if first.held_score < settings.news * known:
         settings = settings.stricter(settings.usual * known)
     done = Search([], first, [], settings)

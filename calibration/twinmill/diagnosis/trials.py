@@ -3,6 +3,7 @@
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 import twinmill_native as native
@@ -137,6 +138,21 @@ def fitted(state: State) -> Trial:
     return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
 
 
+def nearer(state: State) -> State:
+    """The state with gains of the base that are far off nearer, where a fit of it finds the rest.
+
+    What their priors said was of another robot: these are centred anew.
+    """
+    if state.of_cameras:
+        return state
+    near = state.fit_of(state.begun()).nearer()
+    models = [m.copy() for m in state.models] if near else state.models
+    for model, (name, value) in product(models, near.items()):
+        model.set(name, value)
+    free = tuple(replace(p, usual=near.get(p.name, p.usual)) for p in state.free)
+    return replace(state, models=models, free=free)
+
+
 def with_effects(
     state: State, names: Sequence[str], start: dict[str, float] | None = None
 ) -> State:
@@ -167,7 +183,9 @@ def cross_validate(
 ) -> Trial:
     """A fit of the state before with something added, judged on held-out parts."""
     state = with_effects(before.state, names, start)
-    fit = state.fit_of(state.free)
+    if REFIT in names:
+        state = nearer(state)
+    fit = state.fit_of(state.begun())
     fit.begin_at_best(state.free[len(before.state.free) :])
     fit.fit()
     after = replace(state, models=fit.models)

@@ -20,6 +20,7 @@ from twinmill.fitting.gaps import gaps_s, known_to_gap
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
+    BASE_GAINS,
     NO_SIZE,
     NORMAL_95,
     PHASE,
@@ -28,6 +29,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     acting_by_wheel_angle,
     catalogue_name,
+    duty_table,
     instance_of,
     is_local,
     lasts_for_a_while,
@@ -46,6 +48,8 @@ LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # fa
 ANGLES_RAD = np.radians(np.arange(-180.0, 180.0, 30.0))  # of wheels, where a fit may begin
 PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 15.0))  # of what recurs, likewise ...
 NEAR_RAD = np.radians(np.arange(-12.0, 13.0, 3.0))  # ... and around the best of these
+FAR = 5.0  # score from which on a fit of gains may begin elsewhere ...
+FACTORS = (1.0, 0.5, 2.0, 0.25, 4.0)  # ... namely at so many times what they are
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
 CHANCE = 0.05  # at which data sets disagree more than their blocks tell
@@ -309,6 +313,29 @@ class ScoreFit:
             points = [self._with_best_phases(point) for point in points]
         self._begin_at(points)
 
+    def nearer(self) -> dict[str, float]:
+        """Values of the base's gains, by name, at the best of a few multiples, where far off.
+
+        Far from all poses the cost hardly falls (it is their logarithm), and priors hold a fit.
+        Speeds of duties are one, and each gain alone.
+        """
+        forward, *others = BASE_GAINS
+        kinds = [{forward, *duty_table(self.models[0])}, *({gain} for gain in others)]
+        own = [np.array([u.parameter.name in kind for u in self.unknowns], bool) for kind in kinds]
+        own = [columns for columns in own if columns.any()]
+        if not own or self._score_at(self.x) < FAR:
+            return {}
+        x = self.x
+        for columns in own:
+            x = self._best_of([np.where(columns, f * x, x) for f in FACTORS])[0]
+        moved = np.flatnonzero(x != self.x)
+        return {self.unknowns[c].parameter.name: float(x[c]) for c in moved}
+
+    def _score_at(self, x: np.ndarray) -> float:
+        """Of all data sets together, at (P,) values."""
+        square = [rows @ rows for rows in self.rows(x)]
+        return float(np.sqrt(np.average(square, weights=self.sizes)))
+
     @property
     def _angles(self) -> list[int]:
         """Columns of wheels' starting angles."""
@@ -363,13 +390,17 @@ class ScoreFit:
 
     def _begin_at(self, points: Sequence[np.ndarray]) -> None:
         """Begins at the one of some points (P,) that misses least."""
+        self.x, rows = self._best_of(points)
+        self._known = self.x, rows
+        self.usual[self._phases] = self.x[self._phases]
+
+    def _best_of(self, points: Sequence[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The one of some points (P,) that misses least, and (R,) rows of each data set there."""
         within = np.clip(np.array(points), self.low, self.high)
         rows = [self.batch(i, within) for i in range(len(self.datasets))]
         cost = [sum(self._misfit(i, r[k]) for i, r in enumerate(rows)) for k in range(len(within))]
         best = int(np.argmin(cost))
-        self.x = within[best]
-        self._known = self.x, [r[best] for r in rows]
-        self.usual[self._phases] = self.x[self._phases]
+        return within[best], [r[best] for r in rows]
 
     def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
         """Minimises the cost and leaves the values in the models."""
