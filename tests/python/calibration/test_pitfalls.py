@@ -104,6 +104,22 @@ def test_stale_gains_are_no_missing_effect(tanh_robot, measure, fitted):
     assert found.score_refit < 0.8 * found.before.score
 
 
+@pytest.mark.parametrize("times", [0.45, 2.2])
+def test_quite_another_speed_is_no_missing_effect(tanh_robot, measure, fitted, model_file, times):
+    """So far off that poses 2 s ahead say little of which way is nearer.
+
+    Nothing is new to a fitted model; the lag of the data sheet is not the robot's either.
+    """
+    robot = tanh_robot()
+    run = measure(replace(robot, top_mps=times * robot.top_mps), 8, 40.0)
+    found = diagnose([run], fitted)
+    assert "numbers were stale" in found.sentence and found.found == []
+    assert found.score_refit < 0.05 * found.before.score
+    stale, *others = diagnose([run], model_file()).findings
+    assert stale.effect == REFIT and stale.share > 0.99
+    assert {f.effect for f in others} <= {"motor_lag"}
+
+
 def test_wheels_that_stand_at_small_duties_and_go_as_usual_above(tanh_robot, measure, fitted):
     """Duties are 25, 50, 75 and 100 %: the edge is told to lie between 50 and 75 %."""
 
