@@ -284,9 +284,9 @@ def promising(screened: list[Screened], settings: Settings) -> list[Screened]:
     Numbers of the base that nobody told may be so far off that no linear gain tells of them.
     """
     best = sorted(screened, key=lambda s: -s.gain)
-    least = max(settings.evidence / 2, 0.02 * best[0].gain)
     stale = [s for s in best if s.name == REFIT]
-    return [*stale, *(s for s in best if s.gain > least and s.name != REFIT)]
+    worth = [s for s in best if s.gain > settings.evidence / 2 and s.gain > 0.02 * best[0].gain]
+    return [*stale, *(s for s in worth if s.name != REFIT)]
 
 
 def likely_pairs(
