@@ -5,6 +5,7 @@ import numpy as np
 
 from twinmill.diagnosis.settings import Settings
 from twinmill.diagnosis.trials import REFIT, Trial
+from twinmill.fitting.score_fit import FAR
 from twinmill.fitting.starts import MARGIN
 from twinmill.model.parameters import (
     GAINS,
@@ -17,6 +18,8 @@ from twinmill.model.parameters import (
     with_role,
 )
 from twinmill.predict.datasets import Trajectory
+
+NEARLY_NONE = 0.05  # of the excess of a squared score
 
 
 def best_of(
@@ -36,14 +39,22 @@ def best_of(
         at_nothing = all(_is_neutral(trial, n) or began_before(trial, n) for n in trial.names)
         if not at_nothing and proven(trial, before.held_score, settings):
             good.append(trial)
-    best = min(good, key=lambda t: rank(t, settings), default=None)
+    if not good:
+        return None
+    best = min(good, key=lambda t: rank(t, settings))
+
+    def first(refit: Trial) -> bool:
+        as_good = refit.fit.held_cost - best.fit.held_cost < settings.tie
+        return as_good or _was_far(before, refit)
+
     # Stale numbers of the base are more likely than an effect that does the same.
-    stale = [
-        t
-        for t in good
-        if t.names == (REFIT,) and t.fit.held_cost - best.fit.held_cost < settings.tie
-    ]
-    return stale[0] if stale else best
+    return next((t for t in good if t.names == (REFIT,) and first(t)), best)
+
+
+def _was_far(before: Trial, refit: Trial) -> bool:
+    """Whether the base was far off, so that whatever moves all speeds takes nearly all."""
+    left, first = (t.held_score**2 - 1 for t in (refit, before))
+    return before.held_score > FAR and left < NEARLY_NONE * first
 
 
 def began_before(trial: Trial, name: str) -> bool:
