@@ -18,7 +18,7 @@ from twinmill.diagnosis.term import TIME
 
 BINS = 96
 POINTS = 4  # of each bin, at which it is looked up whether a form is there
-LONGEST = 1 / 1.5  # share of the time of all logs: what is seen but once does not recur
+LONGEST = 1 / 2.5  # share of the time of all logs: what came but once more may be chance
 PHASES = 24
 PARTS = (0.2, 0.3, 0.4, 0.5)  # of a period; of a longer one the rest is that part
 STEPS = 4  # a finer grid has so many to each side of the best, of the last one's step
