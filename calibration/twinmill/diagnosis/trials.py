@@ -141,7 +141,7 @@ def fitted(state: State) -> Trial:
 def nearer(state: State) -> State:
     """The state with gains of the base that are far off nearer, where a fit of it finds the rest.
 
-    What their priors said was of another robot: these are centred anew.
+    What their priors said was of another robot.
     """
     if state.of_cameras:
         return state
@@ -149,7 +149,7 @@ def nearer(state: State) -> State:
     models = [m.copy() for m in state.models] if near else state.models
     for model, (name, value) in product(models, near.items()):
         model.set(name, value)
-    free = tuple(replace(p, usual=near.get(p.name, p.usual)) for p in state.free)
+    free = tuple(p.about(near[p.name]) if p.name in near else p for p in state.free)
     return replace(state, models=models, free=free)
 
 

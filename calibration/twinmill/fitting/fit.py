@@ -131,7 +131,10 @@ def fitted(
     strengths of what is `fresh`.
     """
     known = judged(opened)
-    fit = ScoreFit([o.data for o in known], [o.model for o in known], free)
+    data, models = [o.data for o in known], [o.model for o in known]
+    near = ScoreFit(data, models, free).nearer()
+    free = [p.about(near[p.name]) if p.name in near else p for p in free]
+    fit = ScoreFit(data, models, free)
     if fresh:
         fit.begin_at_best(fresh)
     fit.fit()

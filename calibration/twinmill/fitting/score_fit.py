@@ -317,10 +317,11 @@ class ScoreFit:
         """Values of the base's gains, by name, at the best of a few multiples, where far off.
 
         Far from all poses the cost hardly falls (it is their logarithm), and priors hold a fit.
-        Speeds of duties are one, and each gain alone.
+        All are tried together, then each alone; speeds of duties are one.
         """
         forward, *others = BASE_GAINS
-        kinds = [{forward, *duty_table(self.models[0])}, *({gain} for gain in others)]
+        speeds = {forward, *duty_table(self.models[0])}
+        kinds = [{*speeds, *others}, speeds, *({gain} for gain in others)]
         own = [np.array([u.parameter.name in kind for u in self.unknowns], bool) for kind in kinds]
         own = [columns for columns in own if columns.any()]
         if not own or self._score_at(self.x) < FAR:

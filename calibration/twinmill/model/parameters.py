@@ -34,6 +34,7 @@ USUAL_STD = {
     **dict.fromkeys(WHEEL_ANGLES, ANY_ANGLE_RAD),
 }
 GAIN_STD = 0.15
+ROUGH = 0.3  # standard deviation of what is known to a factor of the root of two, share
 BASE_STEP = {
     LAG: 0.004,
     CLOCK: 0.006,
@@ -87,6 +88,10 @@ class Parameter:
     def at(self, value: float) -> "Parameter":
         """The same, begun elsewhere; no place or moment is usual: the prior of one goes with it."""
         return replace(self, value=value, usual=value if self.role in NO_SIZE else self.usual)
+
+    def about(self, value: float) -> "Parameter":
+        """The same, begun at a rough value, with a prior as wide as that is rough."""
+        return replace(self, value=value, usual=value, std=max(self.std, ROUGH * abs(value)))
 
 
 @dataclass(frozen=True)
