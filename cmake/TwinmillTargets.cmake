@@ -14,6 +14,8 @@ endif()
 
 # Same bits on every machine: no fused multiply-add that one compiler makes and another does not.
 add_compile_options(-ffp-contract=off)
+# Calls within a file may be inlined, although the code may go into a shared library.
+add_compile_options(-fno-semantic-interposition)
 # A finding ends the program, so that its test fails.
 if(TWINMILL_SANITIZE OR TWINMILL_FUZZ)
     add_compile_options(

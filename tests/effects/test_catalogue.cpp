@@ -467,5 +467,41 @@ TEST_P(EveryEffect, HalfTheStepGivesTheSameAnswerOnStraightDrives)
     EXPECT_NEAR(coarse.Seen().x_m, fine.Seen().x_m, tolerance);
 }
 
+// The plant asks those that show in steady speeds, on duties and on wheels, once per command.
+TEST_P(EveryEffect, OfSteadySpeedsAsksTheSameOfWheelsWheneverAndHoweverTheyTurn)
+{
+    const EffectSpec &spec = *GetParam();
+    if (spec.card.needs != Needs::kSteadySpeed || spec.card.family == Family::kFormula)
+        return;
+    const BoundEffect effect(spec, Defaults(spec));
+    const RobotFacts robot{.wheel_radius_m = 0.03, .battery_nominal_V = 7.4};
+    const Wheels told{0.4, -0.1, 0.7, 0}, rest{}, turning{0.2, -0.3, 0.1, 0.5};
+    ASSERT_EQ(effect.StateSize(), 0);
+    if (const auto *on = std::get_if<OnDuty>(&effect.act()))
+    {
+        DutySignals early{robot, 0, 7.4, 0, told}, late{robot, 60, 6, 0.05, told};
+        on->step(early, effect.numbers(), nullptr);
+        on->step(late, effect.numbers(), nullptr);
+        EXPECT_EQ(early.duty, late.duty);
+        EXPECT_EQ(late.dt_s, 0.05);
+    }
+    if (const auto *on = std::get_if<OnWheels>(&effect.act()))
+    {
+        WheelSignals early{robot, 0, 0, 7.4, told, rest, rest, told};
+        WheelSignals late{robot, 60, 0.05, 6, told, turning, turning, told};
+        early.tau_s.fill(0.06);
+        late.tau_s.fill(0.06);
+        const Wheels tau_s = early.tau_s, max_decel_mps2 = early.max_decel_mps2;
+        on->step(early, effect.numbers(), nullptr);
+        on->step(late, effect.numbers(), nullptr);
+        EXPECT_EQ(early.target_mps, late.target_mps);
+        for (const WheelSignals &s : {early, late})
+        {
+            EXPECT_EQ(s.tau_s, tau_s);
+            EXPECT_EQ(s.max_decel_mps2, max_decel_mps2);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace twin::test

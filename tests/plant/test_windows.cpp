@@ -261,19 +261,28 @@ TEST(Windows, OfAPartAreThoseOfItsRow)
 TEST(Windows, AreTheSameWhateverWasPredictedBefore)
 {
     const RandomDrive run;
-    LastPlan last;
+    Recordings recordings;
     Track track = run.track();
-    track.last_plan = &last;
+    track.recordings = &recordings;
     const std::vector<int64_t> starts{3, 11}, ends{30, 50};
     for (int again = 0; again < 2; ++again)
     {
-        for (const double offset_s : {0.03, 0.05})
+        std::vector<Model> models(3, Base());
+        models[0].clock.offset_s = 0.03;
+        models[1].clock.offset_s = 0.05;
+        models[2].base.motor_lag_s *= 2;
+        for (const double size : {0.1, 0.2})
+            for (const char *effect : {"dead_zone", "transient_loss", "turn_asymmetry"})
+                models.push_back(With(effect, {size}, Base()));
+        for (const char *formula : {"p0 * u", "p0 * u * abs(u)"})
         {
-            Model model = Base();
-            model.clock.offset_s = offset_s;
+            models.push_back(Base());
+            models.back().AddEffect("equation", {{"adds_to", "duty"}, {"formula", formula}});
+            models.back().effects.back().parameters[0].value = 0.2;
+        }
+        for (const Model &model : models)
             ExpectNear(PredictWindows(model, track, run.starts, run.ends),
                        PredictWindows(model, run.track(), run.starts, run.ends), 0);
-        }
         ExpectNear(PredictWindows(Base(), track, starts, ends),
                    PredictWindows(Base(), run.track(), starts, ends), 0);
     }

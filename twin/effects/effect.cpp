@@ -16,14 +16,13 @@ const char *StageName(const Act &act)
 
 BoundEffect::BoundEffect(const EffectSpec &spec, std::vector<double> values,
                          std::span<const std::string> texts)
-    : spec_(&spec), values_(std::move(values)), act_(spec.act)
+    : spec_(&spec), values_(std::move(values)), texts_(texts.begin(), texts.end()), act_(spec.act)
 {
     if (!spec.compile)
         return;
-    std::vector<std::string> own(texts.begin(), texts.end());
-    for (size_t i = own.size(); i < spec.texts.size(); ++i)
-        own.emplace_back(spec.texts[i].default_value);
-    EffectSpec::Compiled compiled = spec.compile(values_, own);
+    for (size_t i = texts_.size(); i < spec.texts.size(); ++i)
+        texts_.emplace_back(spec.texts[i].default_value);
+    EffectSpec::Compiled compiled = spec.compile(values_, texts_);
     act_ = compiled.act;
     formula_ = std::move(compiled.formula);
 }
@@ -44,7 +43,9 @@ void BoundEffect::Set(Body &body) const
 
 double Begun(double since_s)
 {
-    constexpr double kEdge_s = 0.1;
+    constexpr double kEdge_s = 0.1, kOver_s = 4;  // then it is 0 or 1 but for less than 1e-17
+    if (std::abs(since_s) > kOver_s)
+        return since_s > 0;
     return 1 / (1 + std::exp(-since_s / kEdge_s));
 }
 

@@ -122,10 +122,19 @@ double Model::Get(const std::string &name) const
     return Find(name).value;
 }
 
+double &Model::At(const std::string &name)
+{
+    double *found = nullptr;
+    ForEach(*this, name, [&](const Parameter &, double &own) { found = &own; });
+    if (!found || name.empty())
+        throw std::invalid_argument("model has no quantity '" + name + "'");
+    return *found;
+}
+
 void Model::Set(const std::string &name, double value)
 {
     Find(name).CheckBounds(value, name);
-    ForEach(*this, name, [&](const Parameter &, double &own) { own = value; });
+    At(name) = value;
     stated.insert(name);
 }
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
+#include <tuple>
 #include <type_traits>
 
 namespace twin
@@ -10,27 +12,32 @@ namespace twin
 namespace
 {
 
-// A first-order approach to rest never ends: below this rim speed a wheel counts as standing.
-constexpr double kStandstill_mps = 1e-3;
-
 // Piecewise-linear table, odd in a duty (-1..1), held beyond its end; of so many wheels.
 Wheels RimSpeeds(const Base &base, const Wheels &duty, int wheels)
 {
-    Wheels pct, rim_mps{};
-    std::array<int64_t, kMaxWheels> place{};  // counted without a branch: duties come in no order
+    Wheels pct, place{};  // counted without a branch: duties come in no order
     for (size_t w = 0; w < kMaxWheels; ++w)
         pct[w] = std::min(100 * std::abs(duty[w]), base.duty_pct.back());
     for (size_t k = 1; k + 1 < base.duty_pct.size(); ++k)
         for (size_t w = 0; w < kMaxWheels; ++w)
-            place[w] += pct[w] > base.duty_pct[k];
-    for (size_t w = 0; w < static_cast<size_t>(wheels); ++w)
+            place[w] += pct[w] > base.duty_pct[k] ? 1.0 : 0.0;
+    Wheels from_pct, to_pct, from_mps, to_mps, rim_mps;
+    for (size_t w = 0; w < kMaxWheels; ++w)
     {
-        const double *from_pct = &base.duty_pct[static_cast<size_t>(place[w])];
-        const double *mps = &base.wheel_speed_mps[static_cast<size_t>(place[w])];
-        const double part = (pct[w] - from_pct[0]) / (from_pct[1] - from_pct[0]);
-        const double size_mps = mps[0] + part * (mps[1] - mps[0]);
+        const auto at = static_cast<size_t>(static_cast<int>(place[w]));
+        from_pct[w] = base.duty_pct[at];
+        to_pct[w] = base.duty_pct[at + 1];
+        from_mps[w] = base.wheel_speed_mps[at];
+        to_mps[w] = base.wheel_speed_mps[at + 1];
+    }
+    for (size_t w = 0; w < kMaxWheels; ++w)
+    {
+        const double part = (pct[w] - from_pct[w]) / (to_pct[w] - from_pct[w]);
+        const double size_mps = from_mps[w] + part * (to_mps[w] - from_mps[w]);
         rim_mps[w] = duty[w] < 0 ? -size_mps : size_mps;
     }
+    for (size_t w = static_cast<size_t>(wheels); w < kMaxWheels; ++w)
+        rim_mps[w] = 0;
     return rim_mps;
 }
 
@@ -126,6 +133,14 @@ bool IsSameEverywhere(const BoundEffect &effect)
     return card.needs != Needs::kRoom && card.family != Family::kFormula && effect.StateSize() == 0;
 }
 
+// A command's effect on duties or on what wheels tend to, and nothing but the command decides it.
+bool AsksByCommandAlone(const BoundEffect &effect)
+{
+    const Card &card = effect.spec().card;
+    return card.needs == Needs::kSteadySpeed && card.family != Family::kFormula &&
+           effect.StateSize() == 0;
+}
+
 }  // namespace
 
 DriveChain::DriveChain(const Model &model)
@@ -167,11 +182,44 @@ void DriveChain::Bind(const EffectInstance &instance)
                 put(observe_);
         },
         effect.act());
+    if (std::holds_alternative<OnDuty>(effect.act()) ||
+        std::holds_alternative<OnWheels>(effect.act()))
+        prompt_ = prompt_ && AsksByCommandAlone(effect);
     if (std::holds_alternative<OnGround>(effect.act()))
     {
         homogeneous_ = homogeneous_ && IsSameEverywhere(effect);
         remembers_on_ground_ = remembers_on_ground_ || effect.StateSize() > 0;
     }
+}
+
+// The effects of these stages are the same in both.
+template <class... On>
+bool DriveChain::HasSame(const DriveChain &other) const
+{
+    const auto acts = [](const auto &effect) {
+        return (std::holds_alternative<On>(effect->act()) || ...);
+    };
+    const auto same = [](const auto &a, const auto &b) { return *a == *b; };
+    return std::ranges::equal(effects_ | std::views::filter(acts),
+                              other.effects_ | std::views::filter(acts), same);
+}
+
+bool DriveChain::DrivesAs(const DriveChain &other) const
+{
+    const auto has = [](const DriveChain &chain) {
+        return std::tie(chain.base_.drive, chain.base_.duty_pct, chain.base_.wheel_speed_mps,
+                        chain.base_.motor_lag_s, chain.base_.steering_lag_s, chain.frame_.wheel_rad,
+                        chain.robot_, chain.kinematics_);
+    };
+    return has(*this) == has(other) && HasSame<OnDuty, OnWheels, OnRolling>(other);
+}
+
+bool DriveChain::IsSeenAs(const DriveChain &other) const
+{
+    const auto has = [](const DriveChain &chain) {
+        return std::tie(chain.clock_.offset_s, chain.clock_.rate_ppm, chain.frame_.heading_rad);
+    };
+    return has(*this) == has(other) && HasSame<OnObservation>(other);
 }
 
 bool DriveChain::IsSilent() const
@@ -213,9 +261,30 @@ WheelMotion DriveChain::Target(const Wheels &command) const
     return target;
 }
 
+// What a command asks of the wheels, where that depends on the command alone.
+void DriveChain::Ask(const Command &command, RobotState &state) const
+{
+    DutySignals duty{robot_, 0, command.battery_V, 0, command.value};
+    Run(duty_, duty, state);
+    const WheelMotion target = Target(duty.duty);
+    WheelSignals wheels{
+        robot_, 0, 0, command.battery_V, duty.duty, state.rim_mps, state.wheel_rad, target.rim_mps};
+    Run(wheel_, wheels, state);
+    state.told = command.value;
+    state.duty = duty.duty;
+    state.asked_mps = wheels.target_mps;
+    state.asked_steering_rad = target.steering_rad;
+}
+
 WheelMotion DriveChain::DriveWheels(const Command &command, double t_s, double dt_s,
                                     RobotState &state) const
 {
+    if (prompt_)
+    {
+        if (state.told != command.value)
+            Ask(command, state);
+        return Approached(state.decays.Over(dt_s, base_.motor_lag_s), t_s, state);
+    }
     if (duty_.empty())
         return DrivePart({robot_, t_s, command.battery_V, dt_s, command.value}, state);
     WheelMotion mean;
@@ -233,46 +302,78 @@ WheelMotion DriveChain::DriveWheels(const Command &command, double t_s, double d
     return mean;
 }
 
+// Wheels that all lag alike on their way to what they are asked for.
+WheelMotion DriveChain::Approached(const Decay &decay, double t_s, RobotState &state) const
+{
+    Wheels mean_mps, end_mps;
+    ApproachAlike(state.rim_mps, state.asked_mps, decay, mean_mps, end_mps);
+    return Turned(t_s, decay.dt_s, mean_mps, end_mps, state);
+}
+
+std::vector<Rolling> DriveChain::RollThrough(std::span<const DriveStep> steps,
+                                             std::span<const Decay> decays) const
+{
+    std::vector<Rolling> rolled;
+    rolled.reserve(steps.size());
+    RobotState state = Start({});
+    if (!prompt_)
+    {
+        for (const auto &[command, t_s, dt_s] : steps)
+            RollBy(DriveWheels(command, t_s, dt_s, state), rolled.emplace_back());
+        return rolled;
+    }
+    for (size_t i = 0; i < steps.size(); ++i)
+    {
+        if (state.told != steps[i].command.value)
+            Ask(steps[i].command, state);
+        RollBy(Approached(decays[i], steps[i].t_s, state), rolled.emplace_back());
+    }
+    return rolled;
+}
+
 // The same over a part of a step in which the duties stay the same.
 WheelMotion DriveChain::DrivePart(const DutySignals &duty, RobotState &state) const
 {
-    if (state.told != duty.duty)
+    if (state.duty != duty.duty)
     {
         const WheelMotion target = Target(duty.duty);
-        state.told = duty.duty;
+        state.duty = duty.duty;
         state.asked_mps = target.rim_mps;
         state.asked_steering_rad = target.steering_rad;
     }
-    WheelMotion mean;
-    Wheels &mean_mps = mean.rim_mps, end_mps{};
     if (wheel_.empty())
-        ApproachAlike(state.rim_mps, state.asked_mps,
-                      state.decays.Over(duty.dt_s, base_.motor_lag_s), mean_mps, end_mps);
-    else
-        TurnWheels(duty, state, mean_mps, end_mps);
-    Wheels ratio{1, 1, 1, 1};
+        return Approached(state.decays.Over(duty.dt_s, base_.motor_lag_s), duty.t_s, state);
+    Wheels mean_mps{}, end_mps{};
+    TurnWheels(duty, state, mean_mps, end_mps);
+    return Turned(duty.t_s, duty.dt_s, mean_mps, end_mps, state);
+}
+
+// The motion of wheels with these speeds over a part of a step, and at its end.
+WheelMotion DriveChain::Turned(double t_s, double dt_s, const Wheels &mean_mps,
+                               const Wheels &end_mps, RobotState &state) const
+{
+    WheelMotion motion{mean_mps, 0};
     if (!rolling_.empty())
     {
-        RollSignals roll{robot_,   duty.t_s, duty.dt_s,      duty.duty,
-                         mean_mps, end_mps,  state.wheel_rad};
+        RollSignals roll{robot_, t_s, dt_s, state.duty, mean_mps, end_mps, state.wheel_rad};
         Run(rolling_, roll, state);
-        ratio = roll.radius_ratio;
+        for (size_t k = 0; k < kMaxWheels; ++k)
+            motion.rim_mps[k] *= roll.radius_ratio[k];
     }
-    const double rad_per_mps = duty.dt_s / robot_.wheel_radius_m;
+    const double rad_per_mps = dt_s / robot_.wheel_radius_m;
     for (size_t k = 0; k < kMaxWheels; ++k)
     {
         state.rim_mps[k] = end_mps[k];
         state.wheel_rad[k] += mean_mps[k] * rad_per_mps;
-        mean_mps[k] *= ratio[k];
     }
     if (kinematics_.steers())
     {
         const Relaxed steering = Approach(state.steering_rad, state.asked_steering_rad,
-                                          base_.steering_lag_s, duty.dt_s, state.decays);
+                                          base_.steering_lag_s, dt_s, state.decays);
         state.steering_rad = steering.end;
-        mean.steering_rad = steering.mean;
+        motion.steering_rad = steering.mean;
     }
-    return mean;
+    return motion;
 }
 
 // Rim speeds over that part with the effects on wheels.
@@ -315,14 +416,9 @@ Twist DriveChain::BodyTwist(const WheelMotion &motion, double t_s, double dt_s, 
                             Random *random) const
 {
     const Direction ahead = ground_.empty() ? Direction{} : Direction::Of(state.pose.theta_rad);
-    return OnFloor(Roll(motion), ahead, t_s, dt_s, state, random);
-}
-
-Rolling DriveChain::Roll(const WheelMotion &motion) const
-{
-    return {kinematics_.Forward(motion),
-            std::any_of(motion.rim_mps.begin(), motion.rim_mps.end(),
-                        [](double v) { return std::abs(v) > kStandstill_mps; })};
+    Rolling rolling;
+    RollBy(motion, rolling);
+    return OnFloor(rolling, ahead, t_s, dt_s, state, random);
 }
 
 Twist DriveChain::OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,

@@ -46,14 +46,6 @@ Kinematics::Kinematics(const std::vector<Wheel> &wheels) : inverse_(InverseOf(wh
     forward_ = normal.inverse() * inverse_.transpose();
 }
 
-Twist Kinematics::Forward(const WheelMotion &motion) const
-{
-    const Eigen::Vector3d v = forward_ * Eigen::Map<const Eigen::Vector4d>(motion.rim_mps.data());
-    if (steers_)
-        return {v.x(), 0, v.x() * std::tan(motion.steering_rad) / wheelbase_m_};
-    return {v.x(), v.y(), v.z()};
-}
-
 WheelMotion Kinematics::Inverse(const Twist &twist) const
 {
     if (steers_)

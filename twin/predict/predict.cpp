@@ -30,11 +30,8 @@ void Walk(const DriveChain &chain, const Track &track, Random *random, Visit vis
     }
 }
 
-}  // namespace
-
-std::vector<double> PredictOneStep(const Model &model, const Track &track)
+std::vector<double> OneStep(const DriveChain &chain, const Track &track)
 {
-    const DriveChain chain(model);
     std::vector<double> predicted(track.pose.size(), kNaN);
     int64_t segment = -1;
     Walk(chain, track, nullptr, [&](size_t k, const Sample &sample, RobotState &state) {
@@ -44,6 +41,13 @@ std::vector<double> PredictOneStep(const Model &model, const Track &track)
         state.pose = sample.pose;
     });
     return predicted;
+}
+
+}  // namespace
+
+std::vector<double> PredictOneStep(const Model &model, const Track &track)
+{
+    return OneStep(DriveChain(model), track);
 }
 
 std::vector<double> SimulateReplica(const Model &model, const Track &track, uint64_t seed)
@@ -69,10 +73,10 @@ std::vector<double> PredictOneStepBatch(const Model &model, const Track &track,
                                         const std::vector<std::string> &names,
                                         std::span<const double> values)
 {
-    const std::vector<Model> models = ModelsOf(model, names, values);
-    std::vector<double> predicted(models.size() * track.pose.size());
-    InParallel(models.size(), [&](size_t b) {
-        const std::vector<double> one = PredictOneStep(models[b], track);
+    const auto chains = ChainsOf(model, names, values);
+    std::vector<double> predicted(chains.size() * track.pose.size());
+    InParallel(chains.size(), [&](size_t b) {
+        const std::vector<double> one = OneStep(*chains[b], track);
         std::copy(one.begin(), one.end(),
                   predicted.begin() + static_cast<std::ptrdiff_t>(b * one.size()));
     });

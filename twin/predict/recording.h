@@ -18,16 +18,13 @@ namespace twin
 // models that know the robot's clock alike.
 struct Plan
 {
-    struct Step
-    {
-        Command command;
-        double t_s, dt_s;
-    };
     std::vector<double> event_t_s;
-    std::vector<Step> steps;
+    std::vector<DriveStep> steps;
     std::vector<size_t> reached;  // by event: steps made when its time is reached
+    double lag_s;                 // of the model that it was made for
+    std::vector<Decay> decays;    // of this lag, by step
 
-    Plan(const Track &track, const std::vector<Sample> &measured)
+    Plan(const Track &track, const std::vector<Sample> &measured, double lag) : lag_s(lag)
     {
         steps.reserve(track.command_t_s.size() + 2 * measured.size());
         Playback playback(track);
@@ -39,51 +36,86 @@ struct Plan
             event_t_s.push_back(sample.t_s);
             reached.push_back(steps.size());
         }
+        decays = DecaysOf(lag);
     }
 
     bool IsAt(const std::vector<Sample> &measured) const
     {
         return std::ranges::equal(event_t_s, measured, {}, {}, &Sample::t_s);
     }
+
+    std::vector<Decay> DecaysOf(double of_lag_s) const
+    {
+        std::vector<Decay> found;
+        found.reserve(steps.size());
+        for (const DriveStep &step : steps)
+            found.push_back(Decay::Over(step.dt_s, of_lag_s));
+        return found;
+    }
 };
 
-// The plan of these samples: a known one, or the track's last one, if it is theirs.
-inline std::shared_ptr<const Plan> PlanOf(const Track &track, const std::vector<Sample> &measured,
-                                          const std::shared_ptr<const Plan> &known)
+// How the wheels of a robot rolled in each step.
+struct Recording
+{
+    std::shared_ptr<const DriveChain> chain;
+    std::shared_ptr<const Plan> plan;
+    std::vector<Rolling> rolled;
+};
+
+// The plan of these samples: a known one, or one of late.
+inline std::shared_ptr<const Plan> PlanOf(const Track &track, const DriveChain &chain,
+                                          const std::vector<Sample> &measured,
+                                          const std::shared_ptr<const Plan> &known,
+                                          Recordings &recordings)
 {
     if (known && known->IsAt(measured))
         return known;
-    if (!track.last_plan)
-        return std::make_shared<const Plan>(track, measured);
-    const std::scoped_lock lock(track.last_plan->held);
-    std::shared_ptr<const Plan> &last = track.last_plan->plan;
+    const std::scoped_lock lock(recordings.held);
+    for (const auto &recording : recordings.of_late)
+        if (recording->plan->IsAt(measured))
+            return recording->plan;
+    std::shared_ptr<const Plan> &last = recordings.last_plan;
     if (!last || !last->IsAt(measured))
-        last = std::make_shared<const Plan>(track, measured);
+        last = std::make_shared<const Plan>(track, measured, chain.LagS());
     return last;
 }
 
-struct Recording
+// One of late with wheels that move alike, or a new one, which stays there if it is `kept`.
+inline std::shared_ptr<const Recording> RecordingOf(const std::shared_ptr<const DriveChain> &chain,
+                                                    const std::shared_ptr<const Plan> &plan,
+                                                    bool kept, Recordings &recordings)
 {
-    std::shared_ptr<const Plan> plan;
-    std::vector<Rolling> rolled;  // in each step
-};
-
-inline Recording Record(const DriveChain &chain, const std::shared_ptr<const Plan> &plan)
-{
-    Recording recording{plan, {}};
-    recording.rolled.reserve(plan->steps.size());
-    RobotState state = chain.Start({});
-    for (const Plan::Step &step : plan->steps)
-        recording.rolled.push_back(
-            chain.Roll(chain.DriveWheels(step.command, step.t_s, step.dt_s, state)));
-    return recording;
+    constexpr size_t kMost = 4;
+    auto &late = recordings.of_late;
+    {
+        const std::scoped_lock lock(recordings.held);
+        const auto found = std::ranges::find_if(late, [&](const auto &known) {
+            return known->plan == plan && known->chain->DrivesAs(*chain);
+        });
+        if (found != late.end())
+        {
+            std::rotate(late.begin(), found, found + 1);
+            return late.front();
+        }
+    }
+    const bool own_lag = chain->IsPrompt() && chain->LagS() != plan->lag_s;
+    const auto made = std::make_shared<const Recording>(
+        chain, plan,
+        chain->RollThrough(plan->steps, own_lag ? plan->DecaysOf(chain->LagS()) : plan->decays));
+    if (kept)
+    {
+        const std::scoped_lock lock(recordings.held);
+        late.insert(late.begin(), made);
+        late.resize(std::min(late.size(), kMost));
+    }
+    return made;
 }
 
 // The robot moved along its course over steps [from, to) of the recording.
 inline void Move(const DriveChain &chain, const Recording &recording, size_t from, size_t to,
                  Course &course, RobotState &state)
 {
-    const std::vector<Plan::Step> &steps = recording.plan->steps;
+    const std::vector<DriveStep> &steps = recording.plan->steps;
     const auto on_floor = [&](size_t i, const Direction &ahead) {
         return chain.OnFloor(recording.rolled[i], ahead, steps[i].t_s, steps[i].dt_s, state,
                              nullptr);

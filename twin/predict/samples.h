@@ -6,6 +6,7 @@
 #include <atomic>
 #include <exception>
 #include <limits>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -70,15 +71,30 @@ void InParallel(size_t count, Work work)
         std::rethrow_exception(failed);
 }
 
-// One model per row of `values` (B, P), which sets the quantities `names` of `model`.
-inline std::vector<Model> ModelsOf(const Model &model, const std::vector<std::string> &names,
-                                   std::span<const double> values)
+// One robot per row of `values` (B, P), which sets the quantities `names` of `model`.
+inline std::vector<std::shared_ptr<const DriveChain>> ChainsOf(
+    Model model, const std::vector<std::string> &names, std::span<const double> values)
 {
-    std::vector<Model> models(names.empty() ? 0 : values.size() / names.size(), model);
-    for (size_t b = 0; b < models.size(); ++b)
+    std::vector<Parameter> bounds;
+    std::vector<double *> places;
+    for (const std::string &name : names)
+    {
+        bounds.push_back(model.Find(name));
+        places.push_back(&model.At(name));
+    }
+    std::vector<std::shared_ptr<const DriveChain>> chains(
+        names.empty() ? 0 : values.size() / names.size());
+    for (auto &chain : chains)
+    {
         for (size_t p = 0; p < names.size(); ++p)
-            models[b].Set(names[p], values[b * names.size() + p]);
-    return models;
+        {
+            bounds[p].CheckBounds(values[p], names[p]);
+            *places[p] = values[p];
+        }
+        values = values.subspan(names.size());
+        chain = std::make_shared<const DriveChain>(model);
+    }
+    return chains;
 }
 
 }  // namespace twin

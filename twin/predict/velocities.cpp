@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <string_view>
 
 #include "recording.h"
 #include "samples.h"
@@ -12,32 +11,6 @@ namespace twin
 {
 namespace
 {
-
-bool IsOfFloor(std::string_view stage)
-{
-    return stage == "ground" || stage == "observe";
-}
-
-// Whether the wheels of both move alike, but for the times of poses.
-bool DriveAlike(const Model &a, const Model &b)
-{
-    const auto driving = [](const Model &model) {
-        std::vector<Parameter> parameters = model.Parameters();
-        std::erase_if(parameters, [](const Parameter &p) { return IsOfFloor(p.stage); });
-        return parameters;
-    };
-    const auto texts = [](const Model &model) {
-        std::vector<std::string> all;
-        for (const EffectInstance &effect : model.effects)
-            if (!IsOfFloor(effect.stage))
-                all.insert(all.end(), effect.texts.begin(), effect.texts.end());
-        return all;
-    };
-    return texts(a) == texts(b) &&
-           std::ranges::equal(driving(a), driving(b), [](const Parameter &p, const Parameter &q) {
-               return p.name == q.name && p.value == q.value;
-           });
-}
 
 std::vector<size_t> Usable(const Track &track)
 {
@@ -126,20 +99,21 @@ std::vector<double> PredictVelocities(const std::vector<Model> &models, const Tr
     const std::vector<size_t> before = BeforeEach(track, usable);
     const Headings headings(track, usable);
     std::vector<double> velocities(3 * models.size() * poses.size(), 0.0);
-    const auto predict = [&](size_t b, const Recording *known, bool alike) {
-        const DriveChain chain(models[b]);
+    Recordings own;
+    Recordings &recordings = track.recordings ? *track.recordings : own;
+    const auto predict = [&](size_t b) {
+        const auto robot = std::make_shared<const DriveChain>(models[b]);
+        const DriveChain &chain = *robot;
         std::vector<Sample> measured;
         measured.reserve(usable.size());
         for (const size_t k : usable)
             measured.push_back(Measured(chain, track, k));
-        const auto plan = PlanOf(track, measured, known ? known->plan : nullptr);
-        const bool shared = alike && plan == known->plan;
-        Recording own = shared ? Recording{} : Record(chain, plan);
-        const Recording &recording = shared ? *known : own;
+        const auto plan = PlanOf(track, chain, measured, nullptr, recordings);
+        const auto recording = RecordingOf(robot, plan, b == 0, recordings);
         RobotState state = chain.Start({});
         const auto go = [&](size_t event, Course course) {
-            const std::vector<size_t> &reached = recording.plan->reached;
-            Move(chain, recording, event > 0 ? reached[event - 1] : 0, reached[event], course,
+            const std::vector<size_t> &reached = recording->plan->reached;
+            Move(chain, *recording, event > 0 ? reached[event - 1] : 0, reached[event], course,
                  state);
             return course.pose();
         };
@@ -160,13 +134,11 @@ std::vector<double> PredictVelocities(const std::vector<Model> &models, const Tr
                           track.pose_t_s[pose] - track.pose_t_s[usable[from]],
                           &velocities[3 * (b * poses.size() + i)]);
         }
-        return own;
     };
     if (models.empty())
         return velocities;
-    const Recording first = predict(0, nullptr, false);
-    InParallel(models.size() - 1,
-               [&](size_t b) { predict(b + 1, &first, DriveAlike(models[b + 1], models[0])); });
+    predict(0);
+    InParallel(models.size() - 1, [&](size_t b) { predict(b + 1); });
     return velocities;
 }
 

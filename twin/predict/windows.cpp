@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 
 #include "recording.h"
@@ -56,37 +57,44 @@ private:
     std::vector<size_t> number_, poses_;
 };
 
-std::vector<Sample> MeasuredAt(const DriveChain &chain, const Track &track, const Events &events)
+// What was measured at all events, as the robot's own, and the directions in which it heads where
+// windows start.
+struct Measurements
 {
     std::vector<Sample> samples;
-    samples.reserve(events.Poses().size());
-    for (const size_t pose : events.Poses())
-        samples.push_back(Measured(chain, track, pose));
-    return samples;
-}
+    std::vector<Direction> ahead;
 
-// Where a robot that starts at `start` gets to while another that starts at `from` goes its way.
+    Measurements(const DriveChain &chain, const Windows &windows, const Events &events)
+    {
+        samples.reserve(events.Poses().size());
+        for (const size_t pose : events.Poses())
+            samples.push_back(Measured(chain, windows.track, pose));
+        ahead.reserve(windows.starts.size());
+        for (const int64_t start : windows.starts)
+            ahead.push_back(Direction::Of(samples[events.At(start)].pose.theta_rad));
+    }
+};
+
+// Where a robot that starts on one course gets to while another goes on from its own.
 class Shifted
 {
 public:
-    Shifted(const Pose2 &start, const Pose2 &from)
-        : start_(start),
-          from_(from),
-          c_(std::cos(start.theta_rad - from.theta_rad)),
-          s_(std::sin(start.theta_rad - from.theta_rad))
+    Shifted(const Course &start, const Course &from)
+        : start_(start.pose()), from_(from.pose()), turn_(start.ahead().Turned(from.ahead().Back()))
     {
     }
 
     Pose2 At(const Pose2 &to) const
     {
+        const auto [c, s] = turn_;
         const double x_m = to.x_m - from_.x_m, y_m = to.y_m - from_.y_m;
-        return {start_.x_m + c_ * x_m - s_ * y_m, start_.y_m + s_ * x_m + c_ * y_m,
+        return {start_.x_m + c * x_m - s * y_m, start_.y_m + s * x_m + c * y_m,
                 start_.theta_rad + to.theta_rad - from_.theta_rad};
     }
 
 private:
     Pose2 start_, from_;
-    double c_, s_;
+    Direction turn_;
 };
 
 // By event: what effects on the ground remember there, moved from measured pose to measured pose;
@@ -116,7 +124,7 @@ struct Prediction
     const DriveChain &chain;
     const Windows &windows;
     const Events &events;
-    const std::vector<Sample> &measured;
+    const Measurements &measured;
     const Recording &recording;
     double *out;
     size_t row = 0;
@@ -124,7 +132,14 @@ struct Prediction
     void Write() const { chain.IsHomogeneous() ? AlongOnePath() : EachFromItsStart(); }
 
 private:
-    // Calls start(event) at each window's begin, then visit(event, out) at each of its ends.
+    Course StartOf(size_t window) const
+    {
+        const size_t event = events.At(windows.starts[window]);
+        return {measured.samples[event].pose, measured.ahead[window]};
+    }
+
+    // Calls start(window, event) at each window's begin, then visit(event, out) at each of its
+    // ends.
     template <class Start, class Visit>
     void ForEach(Start start, Visit visit) const
     {
@@ -133,7 +148,7 @@ private:
         {
             if (!windows.AreOf(row, w))
                 continue;
-            start(events.At(windows.starts[w]));
+            start(w, events.At(windows.starts[w]));
             for (size_t h = w * horizons; h < (w + 1) * horizons && windows.ends[h] >= 0; ++h)
                 visit(events.At(windows.ends[h]), out + 3 * h);
         }
@@ -141,19 +156,22 @@ private:
 
     void AlongOnePath() const
     {
-        std::vector<Pose2> path;  // by event
+        std::vector<Course> path;  // by event
+        path.reserve(recording.plan->reached.size());
         RobotState state = chain.Start({});
         Course course({});
         size_t done = 0;
         for (const size_t reached : recording.plan->reached)
         {
             Move(chain, recording, done, reached, course, state);
-            path.push_back(course.pose());
+            path.push_back(course);
             done = reached;
         }
-        Shifted shifted({}, {});
-        ForEach([&](size_t from) { shifted = Shifted(measured[from].pose, path[from]); },
-                [&](size_t to, double *seen) { WriteSeen(chain, shifted.At(path[to]), seen); });
+        const Course nowhere({});
+        Shifted shifted(nowhere, nowhere);
+        ForEach(
+            [&](size_t window, size_t from) { shifted = Shifted(StartOf(window), path[from]); },
+            [&](size_t to, double *seen) { WriteSeen(chain, shifted.At(path[to].pose()), seen); });
     }
 
     // A window under way: which of its ends come next, and what effects remember of its robot.
@@ -193,12 +211,12 @@ private:
     // All windows that are under way make a step together.
     void EachFromItsStart() const
     {
-        const auto remembered = Remembered(chain, measured, recording);
+        const auto remembered = Remembered(chain, measured.samples, recording);
         const size_t horizons = windows.Horizons();
         const std::vector<double> nothing = chain.Start({}).effect_state;
         UnderWay all;
         size_t window = 0, step = 0;
-        for (size_t event = 0; event < measured.size(); ++event)
+        for (size_t event = 0; event < measured.samples.size(); ++event)
         {
             for (; step < recording.plan->reached[event]; ++step)
                 MoveAll(recording.plan->steps[step], recording.rolled[step], all);
@@ -207,14 +225,14 @@ private:
                 if (windows.AreOf(row, window))
                     all.Begin({window * horizons, (window + 1) * horizons,
                                remembered.empty() ? nothing : remembered[event]},
-                              Course(measured[event].pose));
+                              StartOf(window));
             for (size_t i = all.walkers.size(); i-- > 0;)
                 if (IsThrough(all.walkers[i], all.CourseOf(i).pose(), event))
                     all.End(i);
         }
     }
 
-    void MoveAll(const Plan::Step &step, const Rolling &rolling, UnderWay &all) const
+    void MoveAll(const DriveStep &step, const Rolling &rolling, UnderWay &all) const
     {
         for (size_t first = 0; first < all.walkers.size(); first += kTogether)
         {
@@ -272,30 +290,54 @@ void MakeErrors(const Displaced &displaced, std::vector<double> &poses)
     }
 }
 
-// By row of values (B, P): the first row with which the wheels move alike, but for the times of
-// poses: numbers of the ground and of what is observed leave that as it is.
-std::vector<size_t> FirstsAlike(const Model &model, const std::vector<std::string> &names,
-                                std::span<const double> values)
+using Chains = std::vector<std::shared_ptr<const DriveChain>>;
+
+// By robot: the first one whose wheels move alike, but for the times of poses.
+std::vector<size_t> FirstsAlike(const Chains &chains)
 {
-    std::vector<size_t> driving;
-    for (size_t p = 0; p < names.size(); ++p)
-    {
-        const std::string_view stage = model.Find(names[p]).stage;
-        if (stage != "ground" && stage != "observe")
-            driving.push_back(p);
-    }
-    std::vector<size_t> firsts(names.empty() ? 0 : values.size() / names.size());
-    for (size_t b = 0; b < firsts.size(); ++b)
-    {
-        const auto alike = [&](size_t a) {
-            return std::ranges::all_of(driving, [&](size_t p) {
-                return values[a * names.size() + p] == values[b * names.size() + p];
-            });
-        };
-        while (!alike(firsts[b]))
+    std::vector<size_t> firsts(chains.size());
+    for (size_t b = 0; b < chains.size(); ++b)
+        while (!chains[firsts[b]]->DrivesAs(*chains[b]))
             ++firsts[b];
-    }
     return firsts;
+}
+
+// Of each robot (B) all windows, (B, W, H, 3), or with parts (1, W, H, 3).
+std::vector<double> PredictEach(const Chains &chains, const Windows &windows)
+{
+    const Events events(windows);
+    const size_t size = 3 * windows.ends.size(), apart = windows.part.empty() ? size : 0;
+    std::vector<double> predicted(windows.part.empty() ? chains.size() * size : size, kNaN);
+    if (chains.empty())
+        return predicted;
+    Recordings own;
+    Recordings &recordings = windows.track.recordings ? *windows.track.recordings : own;
+    const Measurements usual(*chains[0], windows, events);
+    const auto plan = PlanOf(windows.track, *chains[0], usual.samples, nullptr, recordings);
+    const std::vector<size_t> firsts = FirstsAlike(chains);
+    const auto predict = [&](size_t b, bool kept) {
+        std::optional<Measurements> other;
+        if (!chains[b]->IsSeenAs(*chains[0]))
+            other.emplace(*chains[b], windows, events);
+        const Measurements &measured = other ? *other : usual;
+        const auto recording = RecordingOf(
+            chains[b], PlanOf(windows.track, *chains[b], measured.samples, plan, recordings), kept,
+            recordings);
+        Prediction{*chains[b], windows, events, measured, *recording, predicted.data() + b * apart,
+                   b}
+            .Write();
+    };
+    // Those whose recordings others wait for come first, and what is alone may be asked for anew.
+    std::vector<size_t> first, others;
+    std::vector<char> awaited(chains.size(), chains.size() == 1);
+    for (size_t b = 0; b < chains.size(); ++b)
+    {
+        (firsts[b] == b ? first : others).push_back(b);
+        awaited[firsts[b]] |= firsts[b] != b;
+    }
+    for (const auto &rows : {first, others})
+        InParallel(rows.size(), [&](size_t i) { predict(rows[i], awaited[rows[i]]); });
+    return predicted;
 }
 
 }  // namespace
@@ -303,14 +345,7 @@ std::vector<size_t> FirstsAlike(const Model &model, const std::vector<std::strin
 std::vector<double> PredictWindows(const Model &model, const Track &track,
                                    std::span<const int64_t> starts, std::span<const int64_t> ends)
 {
-    const Windows windows{track, starts, ends};
-    const Events events(windows);
-    const DriveChain chain(model);
-    const auto measured = MeasuredAt(chain, track, events);
-    const Recording recording = Record(chain, PlanOf(track, measured, nullptr));
-    std::vector<double> predicted(3 * ends.size(), kNaN);
-    Prediction{chain, windows, events, measured, recording, predicted.data()}.Write();
-    return predicted;
+    return PredictEach({std::make_shared<const DriveChain>(model)}, {track, starts, ends});
 }
 
 std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
@@ -320,43 +355,7 @@ std::vector<double> PredictWindowsBatch(const Model &model, const Track &track,
                                         std::span<const double> values,
                                         std::span<const int64_t> part)
 {
-    const Windows windows{track, starts, ends, part};
-    const Events events(windows);
-    const std::vector<Model> models = ModelsOf(model, names, values);
-    const std::vector<size_t> firsts = FirstsAlike(model, names, values);
-    std::vector<size_t> own, others;
-    std::vector<char> awaited(models.size(), false);
-    for (size_t b = 0; b < models.size(); ++b)
-    {
-        (firsts[b] == b ? own : others).push_back(b);
-        awaited[firsts[b]] |= firsts[b] != b;
-    }
-    std::vector<Recording> recordings(models.size());
-    std::shared_ptr<const Plan> plan;
-    if (!models.empty())
-        plan = PlanOf(track, MeasuredAt(DriveChain(models[0]), track, events), nullptr);
-    const size_t size = 3 * ends.size(), apart = part.empty() ? size : 0;
-    std::vector<double> predicted(part.empty() ? models.size() * size : size, kNaN);
-    const auto predict = [&](size_t b) {
-        const DriveChain chain(models[b]);
-        const auto measured = MeasuredAt(chain, track, events);
-        const Recording &first = recordings[firsts[b]];
-        const bool shared = first.plan && first.plan->IsAt(measured);
-        Recording recording = shared ? Recording{} : Record(chain, PlanOf(track, measured, plan));
-        Prediction{chain,
-                   windows,
-                   events,
-                   measured,
-                   shared ? first : recording,
-                   predicted.data() + b * apart,
-                   b}
-            .Write();
-        if (awaited[b])
-            recordings[b] = std::move(recording);
-    };
-    for (const auto &rows : {own, others})
-        InParallel(rows.size(), [&](size_t i) { predict(rows[i]); });
-    return predicted;
+    return PredictEach(ChainsOf(model, names, values), {track, starts, ends, part});
 }
 
 std::vector<double> WindowErrorsBatch(const Model &model, const Track &track,

@@ -49,12 +49,12 @@ struct PyTrack
     Track View() const
     {
         return {Span(command_t_s), Span(command), Span(battery_V), Span(pose_t_s),
-                Span(pose),        Span(segment), &last_plan};
+                Span(pose),        Span(segment), &recordings};
     }
     Vector command_t_s, battery_V, pose_t_s;
     Matrix command, pose;
     Indices segment;
-    mutable LastPlan last_plan;
+    mutable Recordings recordings;
 };
 
 nb::list Words(const std::vector<const char *> &words)

@@ -41,6 +41,9 @@ struct Direction
 
     static Direction Of(double rad) { return {Cos(rad), rad * SinOver(rad)}; }
 
+    // Of the angle the other way.
+    Direction Back() const { return {c, -s}; }
+
     Direction Turned(const Direction &by) const
     {
         return {c * by.c - s * by.s, s * by.c + c * by.s};

@@ -145,6 +145,11 @@ public:
     Numbers numbers() const { return {values_, formula_.get()}; }
     int StateSize() const { return spec_->state_size ? spec_->state_size(numbers()) : 0; }
     bool IsSilent() const { return formula_ && twin::IsSilent(*formula_); }
+    // The same effect with the same numbers and texts.
+    bool operator==(const BoundEffect &other) const
+    {
+        return spec_ == other.spec_ && values_ == other.values_ && texts_ == other.texts_;
+    }
     // What it does to a camera or a body; nothing if it acts elsewhere.
     void Set(DetectionModel &detection) const;
     void Set(Body &body) const;
@@ -152,6 +157,7 @@ public:
 private:
     const EffectSpec *spec_;
     std::vector<double> values_;
+    std::vector<std::string> texts_;
     std::shared_ptr<Formula> formula_;
     Act act_;
 };

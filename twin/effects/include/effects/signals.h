@@ -29,6 +29,8 @@ struct RobotFacts
     Wheels spin{-0.5, 0.5, -0.5, 0.5};
     double wheel_radius_m = 0;     // of the base model
     double battery_nominal_V = 0;  // pack voltage at which the base model's speeds hold
+
+    bool operator==(const RobotFacts &) const = default;
 };
 
 // The command, before it becomes a wheel speed.

@@ -119,6 +119,8 @@ public:
     // One of them. Throws std::invalid_argument if there is none of that name; so does Get().
     Parameter Find(const std::string &name) const;
     double Get(const std::string &name) const;
+    // Where it is: for who sets it often.
+    double &At(const std::string &name);
     // Throws std::invalid_argument if the name is unknown or the value out of bounds.
     void Set(const std::string &name, double value);
     // Appends an effect at its neutral values, with these texts in place of its default ones.

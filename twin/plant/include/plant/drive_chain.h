@@ -4,6 +4,8 @@
 #ifndef PLANT_DRIVE_CHAIN_H
 #define PLANT_DRIVE_CHAIN_H
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <span>
 #include <vector>
@@ -17,11 +19,21 @@
 namespace twin
 {
 
+// A first-order approach to rest never ends: below this rim speed a wheel counts as standing.
+constexpr double kStandstill_mps = 1e-3;
+
 // What the wheels alone make of the body, before gains and effects of the floor.
 struct Rolling
 {
     Twist twist;
-    bool moves;  // some wheel turns
+    bool moves = false;  // some wheel turns
+};
+
+// What a robot is told from `t_s` on for `dt_s`.
+struct DriveStep
+{
+    Command command;
+    double t_s, dt_s;
 };
 
 class DriveChain
@@ -35,13 +47,24 @@ public:
     // mean motion with which they roll meanwhile.
     WheelMotion DriveWheels(const Command &command, double t_s, double dt_s,
                             RobotState &state) const;
+    // The wheels from rest through these steps; `decays`: of each step with LagS(), where it is
+    // prompt.
+    std::vector<Rolling> RollThrough(std::span<const DriveStep> steps,
+                                     std::span<const Decay> decays) const;
+    // Time constant of the wheels, before any effect.
+    double LagS() const { return base_.motor_lag_s; }
     // Ground stage: the body velocity that this motion gives, gains, effects and, if `random` is
     // not null, drive noise included. Stores it in `state`.
     Twist BodyTwist(const WheelMotion &motion, double t_s, double dt_s, RobotState &state,
                     Random *random) const;
-    // The same in two parts. The first depends on nothing but the motion; the second is told where
-    // the robot heads.
-    Rolling Roll(const WheelMotion &motion) const;
+    // The same in two parts. The first depends on nothing but the motion, and is written where it
+    // stays; the second is told where the robot heads.
+    void RollBy(const WheelMotion &motion, Rolling &rolling) const
+    {
+        rolling.twist = kinematics_.Forward(motion);
+        rolling.moves = std::ranges::any_of(motion.rim_mps,
+                                            [](double v) { return std::abs(v) > kStandstill_mps; });
+    }
     Twist OnFloor(const Rolling &rolling, const Direction &ahead, double t_s, double dt_s,
                   RobotState &state, Random *random) const;
     // With the base's gains: the velocity that effects of the ground find.
@@ -87,6 +110,13 @@ public:
     void Observe(Pose2 &pose, double &t_s) const;
     void Invert(Pose2 &pose, double &t_s) const;
 
+    // What its wheels are asked for depends on its command alone.
+    bool IsPrompt() const { return prompt_; }
+    // Its wheels roll as the other's do, whatever the floor makes of it.
+    bool DrivesAs(const DriveChain &other) const;
+    // It is seen as the other is.
+    bool IsSeenAs(const DriveChain &other) const;
+
     const Kinematics &kinematics() const { return kinematics_; }
     int WheelCount() const { return robot_.wheels; }
     // No effect of the ground reads where the robot is or heads, nor remembers anything: its
@@ -111,10 +141,16 @@ private:
     void Bind(const EffectInstance &instance);
     template <class On, class S>
     static void Run(const std::vector<Bound<On>> &stage, S &signals, RobotState &state);
+    template <class... On>
+    bool HasSame(const DriveChain &other) const;
     WheelMotion Target(const Wheels &command) const;
+    void Ask(const Command &command, RobotState &state) const;
     WheelMotion DrivePart(const DutySignals &duty, RobotState &state) const;
     void TurnWheels(const DutySignals &duty, RobotState &state, Wheels &mean_mps,
                     Wheels &end_mps) const;
+    WheelMotion Approached(const Decay &decay, double t_s, RobotState &state) const;
+    WheelMotion Turned(double t_s, double dt_s, const Wheels &mean_mps, const Wheels &end_mps,
+                       RobotState &state) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;
@@ -132,6 +168,7 @@ private:
     std::vector<Bound<OnObservation>> observe_;
     int state_size_ = 0;
     bool homogeneous_ = true;
+    bool prompt_ = true;
     bool remembers_on_ground_ = false;
 };
 

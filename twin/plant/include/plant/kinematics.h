@@ -4,6 +4,7 @@
 #define PLANT_KINEMATICS_H
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "model_file/model.h"
 
@@ -33,13 +34,21 @@ public:
     Kinematics(const Robot &robot, WheelKind kind);
     // Of wheels at these places, none of them steered.
     explicit Kinematics(const std::vector<Wheel> &wheels);
-    Twist Forward(const WheelMotion &motion) const;
+    Twist Forward(const WheelMotion &motion) const
+    {
+        const Eigen::Vector3d v =
+            forward_ * Eigen::Map<const Eigen::Vector4d>(motion.rim_mps.data());
+        if (steers_)
+            return {v.x(), 0, v.x() * std::tan(motion.steering_rad) / wheelbase_m_};
+        return {v.x(), v.y(), v.z()};
+    }
     // The motion nearest to `twist` that the wheels can make. A steered robot cannot turn on the
     // spot; its steering stays within its limit.
     WheelMotion Inverse(const Twist &twist) const;
     // Of a robot that is steered at this speed and angle.
     WheelMotion Steered(double vx_mps, double steering_rad) const;
     bool steers() const { return steers_; }
+    bool operator==(const Kinematics &) const = default;
     // Sideways speed at the robot's middle that comes from turning about the rear axle.
     double SidewaysOfTurning(double omega_radps) const { return rear_m_ * omega_radps; }
 

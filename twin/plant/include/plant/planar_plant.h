@@ -35,7 +35,7 @@ public:
         pose_.x_m += chord_s * (middle.c * v.vx_mps - middle.s * v.vy_mps);
         pose_.y_m += chord_s * (middle.s * v.vx_mps + middle.c * v.vy_mps);
         pose_.theta_rad += 2 * half_rad;
-        ahead_ = middle.Turned(turn);
+        ahead_ = ahead_.Turned(turn.Turned(turn));  // waits for no more than the last heading
     }
 
     const Pose2 &pose() const { return pose_; }

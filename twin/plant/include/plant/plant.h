@@ -40,6 +40,14 @@ constexpr double kUntold = std::numeric_limits<double>::quiet_NaN();
 struct Decay
 {
     double dt_s = 0, tau_s = 0, end = 1, mean = 1;
+
+    static Decay Over(double dt_s, double tau_s)
+    {
+        if (tau_s <= 0)
+            return {dt_s, tau_s, 0, 0};
+        const double end = std::exp(-dt_s / tau_s);
+        return {dt_s, tau_s, end, (1 - end) * tau_s / dt_s};
+    }
 };
 
 // Decays of late: commands that come evenly ask for the same few again and again.
@@ -51,11 +59,7 @@ public:
         const uint64_t mixed = std::bit_cast<uint64_t>(dt_s) * 0x9E3779B97F4A7C15;
         Decay &decay = known_[mixed >> (64 - kBits)];
         if (dt_s != decay.dt_s || tau_s != decay.tau_s)
-        {
-            const bool lags = tau_s > 0;
-            const double end = lags ? std::exp(-dt_s / tau_s) : 0;
-            decay = {dt_s, tau_s, end, lags ? (1 - end) * tau_s / dt_s : 0};
-        }
+            decay = Decay::Over(dt_s, tau_s);
         return decay;
     }
 
@@ -71,9 +75,9 @@ struct RobotState
     Wheels rim_mps{};
     Wheels wheel_rad{};       // angle at the start and what was turned since
     double steering_rad = 0;  // Ackermann
-    // Commands as the stage of duty left them, and the rim speeds and steering that they ask for:
-    // most often the next step has the same.
-    Wheels told{kUntold, kUntold, kUntold, kUntold}, asked_mps{};
+    // The command, or that command as the stage of duty left it, and the rim speeds and steering
+    // that it asks for: most often the next step has the same.
+    Wheels told{kUntold, kUntold, kUntold, kUntold}, duty = told, asked_mps{};
     double asked_steering_rad = 0;
     std::array<double, 3> drive_noise{};  // velocity disturbance: forward, left, turn
     Decays decays;

@@ -16,12 +16,14 @@
 namespace twin
 {
 
-// The steps of a track between some of its poses.
+// How wheels moved along a track in calls of late, which most often serves the next call, too.
 struct Plan;
-struct LastPlan
+struct Recording;
+struct Recordings
 {
     std::mutex held;
-    std::shared_ptr<const Plan> plan;
+    std::shared_ptr<const Plan> last_plan;
+    std::vector<std::shared_ptr<const Recording>> of_late;  // the latest used first
 };
 
 // A measured run of one robot; the arrays belong to the caller. Times ascend.
@@ -33,8 +35,7 @@ struct Track
     std::span<const double> pose_t_s;     // (N), capture's clock
     std::span<const double> pose;         // (N, 3): x_m, y_m, theta_rad of the marker body
     std::span<const int64_t> segment;  // (N), -1 = unusable; poses of one segment belong together
-    // Where the plan of one call is kept for the next one, which most often needs the same.
-    LastPlan *last_plan = nullptr;
+    Recordings *recordings = nullptr;  // kept from call to call; nullptr: none are
 };
 
 // For each pose the one predicted from the pose before it: (N, 3), NaN at the start of a segment.
