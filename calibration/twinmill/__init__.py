@@ -42,7 +42,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.results import NextRun as NextRun
     from twinmill.results import SwarmComparison as SwarmComparison
 
-    __version__: str
+__version__ = "0.1.0"
 
 # Where each public name is; imported when it is first used.
 _HOME = {
@@ -68,8 +68,6 @@ use_own_libraries()
 if not TYPE_CHECKING:  # who checks types knows all names from above
 
     def __getattr__(name: str) -> Any:
-        if name == "__version__":
-            return import_module("importlib.metadata").version("twinmill")
         if name not in _HOME:
             raise AttributeError(f"module 'twinmill' has no attribute '{name}'")
         return getattr(import_module(_HOME[name]), name)

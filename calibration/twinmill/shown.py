@@ -5,7 +5,6 @@ import html
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +13,7 @@ from typing import Any, Self
 import pandas as pd
 from rich.console import Console, RenderableType
 
-from twinmill import report
+from twinmill import __version__, report
 from twinmill.arguments import checked, in_python
 from twinmill.files import check_report, plain, replacing
 
@@ -106,7 +105,7 @@ class Reported(Shown):
         place = path_of("folder", folder, "the path of a folder")
         check_report(place)
         section, call = self._page()
-        source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
+        source = report.Provenance(call, f"twinmill {__version__}", "")
         return report.write_report(place, section.title, source, [section])
 
 

@@ -22,13 +22,13 @@ if working():  # not for --help
     import multiprocessing
     import shutil
     from concurrent.futures import ProcessPoolExecutor, as_completed
-    from importlib.metadata import version
 
     import numpy as np
     from rich.console import Console, Group
     from rich.text import Text
 
     import twinmill as tm
+    from twinmill import __version__
     from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
     from twinmill.challenge.intervals import coverage, draw_known, errors
     from twinmill.challenge.robots import Robot
@@ -210,7 +210,7 @@ def _intervals(
 def _fitted(folder: Path, number: int, seed: int, duration_s: float) -> tuple[int, list[dict]]:
     """A drive's errors, or what a run that was stopped found for it."""
     known = draw_known(number, seed, duration_s)
-    asked = [version("twinmill"), known.sheet, known.plan.seed, duration_s]
+    asked = [__version__, known.sheet, known.plan.seed, duration_s]
     name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
     kept = folder / DONE / f"{name}.json"
     if kept.exists():
@@ -254,7 +254,7 @@ def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
 
 def _one(folder: Path, base: Path, case: Case) -> tuple[int, dict, float]:
     """A case, or what a challenge that was stopped found for the same case and base model."""
-    asked = [version("twinmill"), case.to_json(), case.plan.seed, base.read_text()]
+    asked = [__version__, case.to_json(), case.plan.seed, base.read_text()]
     name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
     kept = folder / DONE / f"{name}.json"
     if kept.exists():

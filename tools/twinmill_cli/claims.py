@@ -16,12 +16,12 @@ from twinmill_cli.output import AsJson, deliver, telling
 if working():  # not for --help
     import hashlib
     import shlex
-    from importlib.metadata import version
 
     import numpy as np
     from rich.console import Group
     from rich.text import Text
 
+    from twinmill import __version__
     from twinmill.claims.actuation import actuation
     from twinmill.claims.bodies import bodies, layers
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
@@ -119,7 +119,7 @@ def _claims(
     more += [f"--actuation {shlex.quote(str(actuation_table))}"] if actuation_table else []
     source = Provenance(
         " ".join([_command_line(only, seeds, odd_turn), *more]),
-        f"twinmill {version('twinmill')}",
+        f"twinmill {__version__}",
         hashlib.sha256(ModelFile.load("paper.toml").text.encode()).hexdigest(),
     )
     agree = all(claim.agrees for claim in found)

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+from twinmill import __version__
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
@@ -52,7 +52,7 @@ def open_model(model: str, out: Path | None) -> ModelFile:
 
 def provenance(command: str, model: ModelFile) -> Provenance:
     """What every output carries."""
-    return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
+    return Provenance(command, f"twinmill {__version__}", model.hash)
 
 
 def load(logs: list[Path], model_file: ModelFile) -> Measurements:

@@ -13,11 +13,10 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
-    from importlib.metadata import version
-
     import matplotlib
     from matplotlib.figure import Figure as Canvas
 
+    from twinmill import __version__
     from twinmill.data.log import LogError
     from twinmill.data.multi_log import MultiLog, read_multi_log
     from twinmill.files import replacing
@@ -58,7 +57,7 @@ def _plot(
         multi_log = read_multi_log(log)
         panels = _panels(multi_log, log)
         command = shlex.join(["twinmill", "plot", str(log), "-o", str(out)])
-        source = Provenance(command, f"twinmill {version('twinmill')}", "")
+        source = Provenance(command, f"twinmill {__version__}", "")
         if out.suffix == ".html":
             temporary.write_text(_page(log, multi_log, panels, source))
         else:

@@ -4,12 +4,12 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import pyarrow as pa
 import twinmill_native as native
 
+from twinmill import __version__
 from twinmill.defaults import LogFormat
 from twinmill.export.mcap_file import write_mcap
 from twinmill.export.recording import Recording, read_recording
@@ -75,7 +75,7 @@ def export_log(
     recording = read_recording(log)
     provenance = {
         "command": command,
-        "version": f"twinmill {version('twinmill')}",
+        "version": f"twinmill {__version__}",
         "log_sha256": recording.sha256,
         "t0_utime_us": recording.t0_utime_us,
     }

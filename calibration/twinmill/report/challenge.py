@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The outcome of a challenge for people: terminal and HTML."""
 
-from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from rich.console import Group, RenderableType
 
+from twinmill import __version__
 from twinmill.challenge.intervals import GOAL
 from twinmill.challenge.scoring import BARS, BINS, LARGEST_GROUP
 from twinmill.report import Figure, Provenance, Section, show, write_report
@@ -57,7 +57,7 @@ def write(folder: Path, found: dict, times_s: list[float]) -> Path:
         figures=[_power(found)],
         tables=[_rates(found, times_s), *_lost(found), _confusion(found)],
     )
-    source = Provenance(found["command"], f"twinmill {version('twinmill')}", "")
+    source = Provenance(found["command"], f"twinmill {__version__}", "")
     return write_report(folder, "Blind test of diagnosis", source, [section], note="")
 
 

@@ -4,11 +4,11 @@
 import time
 from collections import Counter
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 
 import twinmill_native as native
 
+from twinmill import __version__
 from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, words
@@ -42,7 +42,7 @@ def make_request(
         behavior=behavior,
         model_name=model_file.path.name,
         model_text=model_file.text,
-        version=version("twinmill"),
+        version=__version__,
         axes=parsed,
         tables=own,
         **rest,
