@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from twinmill.programs import use_own_libraries, use_own_models
+from twinmill.version import __version__ as __version__
 
 if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Addition as Addition
@@ -41,8 +42,6 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.results import Effect as Effect
     from twinmill.results import NextRun as NextRun
     from twinmill.results import SwarmComparison as SwarmComparison
-
-__version__ = "0.1.0"
 
 # Where each public name is; imported when it is first used.
 _HOME = {

@@ -13,9 +13,10 @@ from typing import Any, Self
 import pandas as pd
 from rich.console import Console, RenderableType
 
-from twinmill import __version__, report
+from twinmill import report
 from twinmill.arguments import checked, in_python
 from twinmill.files import check_report, plain, replacing
+from twinmill.version import __version__
 
 WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
 A_PATH = "the path of a file"

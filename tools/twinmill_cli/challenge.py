@@ -28,7 +28,6 @@ if working():  # not for --help
     from rich.text import Text
 
     import twinmill as tm
-    from twinmill import __version__
     from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
     from twinmill.challenge.intervals import coverage, draw_known, errors
     from twinmill.challenge.robots import Robot
@@ -38,6 +37,7 @@ if working():  # not for --help
     from twinmill.model.model_file import write_whole
     from twinmill.report import challenge as page
     from twinmill.terminal import progress_bar
+    from twinmill.version import __version__
     from twinmill_cli.main import run
 
 DONE = "done"  # folder of the cases that are done, while others are not

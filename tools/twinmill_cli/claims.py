@@ -21,7 +21,6 @@ if working():  # not for --help
     from rich.console import Group
     from rich.text import Text
 
-    from twinmill import __version__
     from twinmill.claims.actuation import actuation
     from twinmill.claims.bodies import bodies, layers
     from twinmill.claims.claims import CLAIMS, ODD_TURNS
@@ -36,6 +35,7 @@ if working():  # not for --help
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
     from twinmill.terminal import progress_bar
+    from twinmill.version import __version__
     from twinmill_cli.process import process
 
     CHECKED = {**CLAIMS, "process": process}

@@ -14,9 +14,9 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    from twinmill import __version__
     from twinmill.export.carried import open_robot
     from twinmill.export.model_files import ExportedModel, default_name, export_model
+    from twinmill.version import __version__
     from twinmill_cli.frame import open_model
 
 

@@ -203,7 +203,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from twinmill import __version__
+        from twinmill.version import __version__
 
         typer.echo(f"twinmill {__version__}")
         raise typer.Exit

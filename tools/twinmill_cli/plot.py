@@ -16,13 +16,13 @@ if working():  # not for --help
     import matplotlib
     from matplotlib.figure import Figure as Canvas
 
-    from twinmill import __version__
     from twinmill.data.log import LogError
     from twinmill.data.multi_log import MultiLog, read_multi_log
     from twinmill.files import replacing
     from twinmill.report import Figure, Provenance, Section, render_page
     from twinmill.report.canvas import STYLE, draw
     from twinmill.report.log_figures import Drawing
+    from twinmill.version import __version__
 
 SUFFIXES = (".png", ".svg", ".html")
 WIDTH_IN, DPI = 8.0, 150

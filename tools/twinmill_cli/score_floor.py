@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from twinmill import __version__
+from twinmill.version import __version__
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Out
 from twinmill_cli.output import AsJson, deliver

@@ -22,11 +22,11 @@ if working():  # not for --help
     from rich.console import Console
     from rich.progress import track
 
-    from twinmill import __version__
     from twinmill.data.multi_log import PREFIXES
     from twinmill.data.stream import from_bus, from_log
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
+    from twinmill.version import __version__
     from twinmill.watch.live_score import WINDOW_S
     from twinmill_cli.frame import open_model
 

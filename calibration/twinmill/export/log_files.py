@@ -9,7 +9,6 @@ from pathlib import Path
 import pyarrow as pa
 import twinmill_native as native
 
-from twinmill import __version__
 from twinmill.defaults import LogFormat
 from twinmill.export.mcap_file import write_mcap
 from twinmill.export.recording import Recording, read_recording
@@ -18,6 +17,7 @@ from twinmill.export.script import BAG_FILES
 from twinmill.export.tables import tables_of, write_csv, write_parquet
 from twinmill.files import check_absent, folder_beside, put_in_place, replacing, replacing_folder
 from twinmill.model.outlines import Body
+from twinmill.version import __version__
 
 
 @dataclass(frozen=True)

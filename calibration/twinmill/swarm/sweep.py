@@ -8,7 +8,6 @@ from pathlib import Path
 
 import twinmill_native as native
 
-from twinmill import __version__
 from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, words
@@ -17,6 +16,7 @@ from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
 from twinmill.terminal import progress_bar
+from twinmill.version import __version__
 
 MOST_WORLDS = 10_000_000  # a row of each is in memory at the end
 MOST_SEEDS = 2**63 - 1  # of 64 bits with a sign

@@ -6,9 +6,9 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 import twinmill_native as native
 
-from twinmill import __version__
 from twinmill.programs import available_cores
 from twinmill.swarm.request import Request, run_part
+from twinmill.version import __version__
 
 Done = tuple[int, dict[str, list]]
 CONNECT_S = 15

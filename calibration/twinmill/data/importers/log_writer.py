@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import turbopi
 
-from twinmill import __version__
 from twinmill.data.importers.series import CommandSeries, DetectionSeries, PoseSeries
 from twinmill.data.lcm_log import log_file
 from twinmill.data.log import KINDS
+from twinmill.version import __version__
 
 CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
 
