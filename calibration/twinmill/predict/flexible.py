@@ -6,6 +6,7 @@ through a few first-order lags, with terms for stopping, for coupling between th
 room. It is never shown as a model; it only tells noise from what some model could explain.
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -63,7 +64,7 @@ def _fitted(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> tuple[np.ndarray,
 
 def _terms(
     measurement: Measurement, grid: StepGrid, offset_s: float, heading_rad: np.ndarray
-) -> list[np.ndarray]:
+) -> Iterator[np.ndarray]:
     """For each axis the (S, P) regressors of its velocity."""
     command = _command(measurement, grid, offset_s)
     odd = np.stack([np.sign(command) * _hat(np.abs(command), i) for i in range(len(LEVELS))], -1)
@@ -71,7 +72,7 @@ def _terms(
     slow = _lagged(odd, grid)
     stopped = np.all(command == 0, axis=1)[:, None, None]
     coast = np.concatenate([_lag(odd, tau_s, grid) for tau_s in COAST_S], -1) * stopped
-    linear = slow.sum(-1).reshape(len(command), -1, 3)  # lags as columns, axes last
+    linear = sum(np.moveaxis(slow, -1, 0))  # (S, lags, axes)
     even = _lagged(np.abs(command) @ AXES.T, grid)
     voltage = command_at(
         grid.t_s - offset_s,
@@ -81,26 +82,22 @@ def _terms(
     voltage = voltage - voltage.mean()
     moving = (np.abs(command).max(1) > 0)[:, None] * 1.0
     c, s = np.cos(heading_rad)[:, None] * moving, np.sin(heading_rad)[:, None] * moving
-    per_axis = []
     for axis in range(3):
         own = linear[:, 2, axis : axis + 1]
         room = {0: [c, s], 1: [-s, c], 2: [moving]}[axis]
-        per_axis.append(
-            np.concatenate(
-                [
-                    slow[:, :, axis].reshape(len(command), -1),
-                    coast[:, axis],
-                    linear.reshape(len(command), -1),
-                    even.reshape(len(command), -1),
-                    own * voltage,
-                    linear[:, 2] * linear[:, 2, [1, 2, 0]],
-                    np.abs(linear[:, 2]),
-                    *room,
-                ],
-                axis=1,
-            )
+        yield np.concatenate(
+            [
+                slow[:, :, axis].reshape(len(command), -1),
+                coast[:, axis],
+                linear.reshape(len(command), -1),
+                even.reshape(len(command), -1),
+                own * voltage,
+                linear[:, 2] * linear[:, 2, [1, 2, 0]],
+                np.abs(linear[:, 2]),
+                *room,
+            ],
+            axis=1,
         )
-    return per_axis
 
 
 def _command(measurement: Measurement, grid: StepGrid, offset_s: float) -> np.ndarray:
