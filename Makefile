@@ -8,11 +8,11 @@ CTEST := ctest --test-dir build --output-on-failure --no-tests=error \
 
 .PHONY: bench build check check-long demo docs format lint clean paper rivals wheel
 
-# The native module into the environment; and our Python compiled: where Python is told to write no
-# bytecode, it would compile a hundred modules at each start.
-INSTALL = cmake --install build --component python --prefix "$$($(PYTHON) -c \
-	    'import sysconfig; print(sysconfig.get_path("platlib"))')" >/dev/null && \
-	    $(PYTHON) -m compileall -q calibration tools
+# The native module and the messages into the environment; and our Python compiled: where Python is
+# told to write no bytecode, it would compile a hundred modules at each start.
+PACKAGES = $$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
+INSTALL = cmake --install build --component python --prefix "$(PACKAGES)" >/dev/null && \
+	    $(PYTHON) -m compileall -q calibration tools "$(PACKAGES)/turbopi"
 
 build:
 	@scripts/setup

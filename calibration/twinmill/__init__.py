@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from twinmill.programs import use_own_libraries, use_own_models
+from twinmill.version import __version__ as __version__
 
 if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Addition as Addition
@@ -42,8 +43,6 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.results import NextRun as NextRun
     from twinmill.results import SwarmComparison as SwarmComparison
 
-    __version__: str
-
 # Where each public name is; imported when it is first used.
 _HOME = {
     "LogError": "twinmill.data.log",
@@ -68,8 +67,6 @@ use_own_libraries()
 if not TYPE_CHECKING:  # who checks types knows all names from above
 
     def __getattr__(name: str) -> Any:
-        if name == "__version__":
-            return import_module("importlib.metadata").version("twinmill")
         if name not in _HOME:
             raise AttributeError(f"module 'twinmill' has no attribute '{name}'")
         return getattr(import_module(_HOME[name]), name)

@@ -4,7 +4,6 @@
 import ctypes
 import os
 import shutil
-import sysconfig
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
@@ -17,6 +16,8 @@ def find_program(name: str) -> Path:
     Raises:
         ValueError: there is none.
     """
+    import sysconfig  # slow to import
+
     scripts = Path(sysconfig.get_path("scripts"))  # start the programs by asking here
     folders = [Path(f) for f in os.environ.get("PATH", "").split(os.pathsep)]
     others = os.pathsep.join(str(f) for f in folders if f != scripts)

@@ -5,7 +5,6 @@ import html
 import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -17,6 +16,7 @@ from rich.console import Console, RenderableType
 from twinmill import report
 from twinmill.arguments import checked, in_python
 from twinmill.files import check_report, plain, replacing
+from twinmill.version import __version__
 
 WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
 A_PATH = "the path of a file"
@@ -106,7 +106,7 @@ class Reported(Shown):
         place = path_of("folder", folder, "the path of a folder")
         check_report(place)
         section, call = self._page()
-        source = report.Provenance(call, f"twinmill {version('twinmill')}", "")
+        source = report.Provenance(call, f"twinmill {__version__}", "")
         return report.write_report(place, section.title, source, [section])
 
 

@@ -292,7 +292,7 @@ def test_of_what_failed_after_its_object_there_is_no_other(
     def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("twinmill_cli.frame.write_report", full)
+    monkeypatch.setattr("twinmill.report.html.write_report", full)
     code, out, err = twinmill(
         *("compare", coasting_robot.log, "--model", coasting_robot.model),
         *("--out", tmp_path / "report", "--json"),
@@ -512,7 +512,7 @@ def test_a_report_that_cannot_be_written_keeps_what_was_found(
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "r/index.html"))
 
-    monkeypatch.setattr("twinmill_cli.frame.write_report", full)
+    monkeypatch.setattr("twinmill.report.html.write_report", full)
     robot, out = brief_coasting_robot, tmp_path / "m.toml"
     more = ["-o", out] if verb == "explain" else []
     words = [verb, robot.log, "--model", robot.model, *more, "--out", tmp_path / "r"]

@@ -145,6 +145,18 @@ def test_local_line_gives_value_and_slope_of_a_line_exactly_at_uneven_times():
     assert np.isnan(value[segment < 0]).all()
 
 
+def test_local_lines_are_those_of_polyfit_through_the_times_of_one_segment_in_the_window():
+    random = np.random.default_rng(3)
+    t, values = np.cumsum(random.uniform(0.004, 0.012, 60)), random.normal(size=(60, 2))
+    segment = np.repeat([0, 1, 2], [30, 1, 29])
+    value, slope = local_line(t, values, segment, 0.03)
+    for k in (0, 12, 28, 40, 59):
+        near = (np.abs(t - t[k]) <= 0.03) & (segment == segment[k])
+        expected = np.polyfit(t[near] - t[k], values[near], 1)
+        assert np.array([slope[k], value[k]]) == pytest.approx(expected, abs=1e-9)
+    assert (value[30] == values[30]).all() and np.isnan(slope[30]).all()
+
+
 def test_smoothing_lowers_white_noise_like_a_mean_of_its_window(driven):
     robot = driven(60)
     robot.pose[:, 2] += np.random.default_rng(2).normal(0, 0.01, len(robot.pose))

@@ -22,7 +22,6 @@ if working():  # not for --help
     import multiprocessing
     import shutil
     from concurrent.futures import ProcessPoolExecutor, as_completed
-    from importlib.metadata import version
 
     import numpy as np
     from rich.console import Console, Group
@@ -38,6 +37,7 @@ if working():  # not for --help
     from twinmill.model.model_file import write_whole
     from twinmill.report import challenge as page
     from twinmill.terminal import progress_bar
+    from twinmill.version import __version__
     from twinmill_cli.main import run
 
 DONE = "done"  # folder of the cases that are done, while others are not
@@ -210,7 +210,7 @@ def _intervals(
 def _fitted(folder: Path, number: int, seed: int, duration_s: float) -> tuple[int, list[dict]]:
     """A drive's errors, or what a run that was stopped found for it."""
     known = draw_known(number, seed, duration_s)
-    asked = [version("twinmill"), known.sheet, known.plan.seed, duration_s]
+    asked = [__version__, known.sheet, known.plan.seed, duration_s]
     name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
     kept = folder / DONE / f"{name}.json"
     if kept.exists():
@@ -254,7 +254,7 @@ def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
 
 def _one(folder: Path, base: Path, case: Case) -> tuple[int, dict, float]:
     """A case, or what a challenge that was stopped found for the same case and base model."""
-    asked = [version("twinmill"), case.to_json(), case.plan.seed, base.read_text()]
+    asked = [__version__, case.to_json(), case.plan.seed, base.read_text()]
     name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
     kept = folder / DONE / f"{name}.json"
     if kept.exists():

@@ -16,7 +16,6 @@ from twinmill_cli.output import AsJson, deliver, telling
 if working():  # not for --help
     import hashlib
     import shlex
-    from importlib.metadata import version
 
     import numpy as np
     from rich.console import Group
@@ -36,6 +35,7 @@ if working():  # not for --help
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
     from twinmill.terminal import progress_bar
+    from twinmill.version import __version__
     from twinmill_cli.process import process
 
     CHECKED = {**CLAIMS, "process": process}
@@ -119,7 +119,7 @@ def _claims(
     more += [f"--actuation {shlex.quote(str(actuation_table))}"] if actuation_table else []
     source = Provenance(
         " ".join([_command_line(only, seeds, odd_turn), *more]),
-        f"twinmill {version('twinmill')}",
+        f"twinmill {__version__}",
         hashlib.sha256(ModelFile.load("paper.toml").text.encode()).hexdigest(),
     )
     agree = all(claim.agrees for claim in found)

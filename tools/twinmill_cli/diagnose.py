@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,14 +26,12 @@ if working():  # not for --help
     from twinmill.data.measurement import Measurements
     from twinmill.data.steady_table import is_steady_table
     from twinmill.diagnosis.diagnose import diagnose
-    from twinmill.diagnosis.explain import Explanation, explain
     from twinmill.diagnosis.first_sight import at_first_sight
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.diagnosis.stopped import NOTHING_TRIED, stopped
     from twinmill.files import check_new_file
     from twinmill.model.model_file import ModelFile
-    from twinmill.report import Provenance
-    from twinmill.swarm.metrics import swarm_metrics
+    from twinmill.provenance import Provenance
     from twinmill_cli.frame import (
         command_line,
         finish,
@@ -43,6 +41,8 @@ if working():  # not for --help
         provenance,
         told,
     )
+if TYPE_CHECKING:
+    from twinmill.diagnosis.explain import Explanation
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
@@ -202,6 +202,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     # Slow to import, and `make demo` does without what it needs.
     from twinmill.report.swarm_comparison import LOOK
     from twinmill.swarm.compare import compare_swarm
+    from twinmill.swarm.metrics import swarm_metrics
     from twinmill.terminal import progress_bar
 
     try:
@@ -245,6 +246,8 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
     """
+    from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
+
     verb = "explain" if formula else "explain --no-formula"
     native.keep_memory()  # what the work frees it wants again
     source = provenance(

@@ -14,10 +14,9 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    from importlib.metadata import version
-
     from twinmill.export.carried import open_robot
     from twinmill.export.model_files import ExportedModel, default_name, export_model
+    from twinmill.version import __version__
     from twinmill_cli.frame import open_model
 
 
@@ -89,7 +88,7 @@ def _export_model(
     data = {
         **done.to_json(),
         "command": shlex.join(["twinmill", "export-model", model, *(["--to", to] if to else [])]),
-        "version": f"twinmill {version('twinmill')}",
+        "version": f"twinmill {__version__}",
         "model_sha256": source.file.hash,
     }
     deliver(data, _text(done), as_json)

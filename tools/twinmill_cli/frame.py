@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,12 +13,14 @@ import typer
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
-from twinmill.report import Provenance, Section, write_report
-from twinmill.report.html import SCORE_NOTE
+from twinmill.provenance import Provenance
+from twinmill.version import __version__
 from twinmill_cli.output import STOPPED, deliver
 
 if TYPE_CHECKING:  # slow to import, and JSON needs none of it
     from rich.console import RenderableType
+
+    from twinmill.report import Section
 
 
 def command_line(verb: str, logs: list[Path], model: str, output: Path | None = None) -> str:
@@ -52,7 +53,7 @@ def open_model(model: str, out: Path | None) -> ModelFile:
 
 def provenance(command: str, model: ModelFile) -> Provenance:
     """What every output carries."""
-    return Provenance(command, f"twinmill {version('twinmill')}", model.hash)
+    return Provenance(command, f"twinmill {__version__}", model.hash)
 
 
 def load(logs: list[Path], model_file: ModelFile) -> Measurements:
@@ -81,11 +82,11 @@ def finish(
     section: Callable[[], Section],
     as_json: bool,
     out: Path | None,
-    note: str = SCORE_NOTE,
+    scored: bool = True,
 ) -> None:
     """Report, then JSON or text; the section's pictures are drawn for a report alone.
 
-    Of JSON no text need be made.
+    Of JSON no text need be made. A report with a score tells what that means (`scored`).
 
     What was found is told though the report cannot be written, or Ctrl-C stops its drawing; of work
     that was stopped before (`stopped` in data) none is drawn.
@@ -98,7 +99,7 @@ def finish(
     if out and done:
         try:
             drawn = section()
-            report = write_report(out, drawn.title, source, [drawn], note=note)
+            report = _written(out, drawn, source, scored)
         except KeyboardInterrupt:
             done = False
         except (OSError, ValueError) as error:
@@ -113,3 +114,9 @@ def finish(
         if out:
             typer.echo("twinmill: stopped; no report was drawn.", err=True)
         raise typer.Exit(STOPPED)
+
+
+def _written(out: Path, drawn: Section, source: Provenance, scored: bool) -> Path:
+    from twinmill.report.html import SCORE_NOTE, write_report  # slow to import
+
+    return write_report(out, drawn.title, source, [drawn], note=SCORE_NOTE if scored else "")

@@ -203,9 +203,9 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version  # as slow to import as all the rest
+        from twinmill.version import __version__
 
-        typer.echo(f"twinmill {version('twinmill')}")
+        typer.echo(f"twinmill {__version__}")
         raise typer.Exit
 
 

@@ -126,7 +126,7 @@ def _next(
         data["script_as"] = str(ros_path(script_as, output))
     section = partial(present.section, plan, how)
     text = present.terminal(plan, how)
-    finish(data, text, source, section=section, as_json=as_json, out=out, note="")
+    finish(data, text, source, section=section, as_json=as_json, out=out, scored=False)
     return plan
 
 

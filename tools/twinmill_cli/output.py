@@ -13,10 +13,6 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
-from twinmill_cli.lazy import working
-
-if working():  # not for --help
-    from twinmill.files import plain
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -56,6 +52,8 @@ def has_told() -> bool:
 
 def print_object(data: dict) -> None:
     """One JSON object on stdout, in one line."""
+    from twinmill.files import plain  # not for --help
+
     print(json.dumps(plain(data), allow_nan=False), flush=True)
     _told_on[:] = [sys.stdout]
 

@@ -13,8 +13,6 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
-    from importlib.metadata import version
-
     import matplotlib
     from matplotlib.figure import Figure as Canvas
 
@@ -24,6 +22,7 @@ if working():  # not for --help
     from twinmill.report import Figure, Provenance, Section, render_page
     from twinmill.report.canvas import STYLE, draw
     from twinmill.report.log_figures import Drawing
+    from twinmill.version import __version__
 
 SUFFIXES = (".png", ".svg", ".html")
 WIDTH_IN, DPI = 8.0, 150
@@ -58,7 +57,7 @@ def _plot(
         multi_log = read_multi_log(log)
         panels = _panels(multi_log, log)
         command = shlex.join(["twinmill", "plot", str(log), "-o", str(out)])
-        source = Provenance(command, f"twinmill {version('twinmill')}", "")
+        source = Provenance(command, f"twinmill {__version__}", "")
         if out.suffix == ".html":
             temporary.write_text(_page(log, multi_log, panels, source))
         else:

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import shlex
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from twinmill.version import __version__
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Out
 from twinmill_cli.output import AsJson, deliver
@@ -60,7 +60,7 @@ def _score_floor(
     told = sentences(found, missing)
     source = Provenance(
         shlex.join(["twinmill", "score-floor", str(folder), str(outcomes), "--sha256", digest]),
-        f"twinmill {version('twinmill')}",
+        f"twinmill {__version__}",
         hashlib.sha256(plan.request.model_text.encode()).hexdigest(),
     )
     page = section(found, plan, cell=cell, seen=seen, missing=missing)

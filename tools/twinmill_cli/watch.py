@@ -17,7 +17,6 @@ from twinmill_cli.options import DurationS, LcmUrl, Model
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
-    from importlib.metadata import version
     from importlib.util import find_spec
 
     from rich.console import Console
@@ -27,6 +26,7 @@ if working():  # not for --help
     from twinmill.data.stream import from_bus, from_log
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
+    from twinmill.version import __version__
     from twinmill.watch.live_score import WINDOW_S
     from twinmill_cli.frame import open_model
 
@@ -78,7 +78,7 @@ def _watch(
     with replacing(save, force) if save else nullcontext() as file:
         show = _show(batches, model_file, log.name if log else None, file, url=connect)
     command = shlex.join(["twinmill", "watch", *([str(log)] if log else []), "--model", model])
-    source = {"command": command, "version": f"twinmill {version('twinmill')}"}
+    source = {"command": command, "version": f"twinmill {__version__}"}
     data = {
         "saved": str(save) if save else None,
         "messages": show.messages,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where the events of an LCM log lie in its bytes (LCM 1.5, lcm/eventlog.c).
+// The events in the bytes of an LCM log (LCM 1.5, lcm/eventlog.c).
 #include <nanobind/stl/vector.h>
 
 #include <cstdint>
@@ -30,7 +30,8 @@ struct Event
 struct Channel
 {
     std::string name;
-    std::vector<int64_t> stamps_us, starts, ends;
+    std::vector<int64_t> stamps_us;
+    nb::list payloads;
 };
 
 int64_t BigEndian(std::string_view bytes)
@@ -85,17 +86,16 @@ nb::tuple EventsOf(nb::bytes log)
             data.substr(position + kHeader, event->start - position - kHeader);
         const auto [at, is_new] = known.try_emplace(name, channels.size());
         if (is_new)
-            channels.push_back({std::string(name), {}, {}, {}});
+            channels.push_back({std::string(name), {}, {}});
         Channel &channel = channels[at->second];
         channel.stamps_us.push_back(event->stamp_us);
-        channel.starts.push_back(static_cast<int64_t>(event->start));
-        channel.ends.push_back(static_cast<int64_t>(event->end));
+        channel.payloads.append(nb::bytes(data.data() + event->start, event->end - event->start));
         position = event->end;
     }
     nb::list found;
     for (const Channel &channel : channels)
         found.append(nb::make_tuple(nb::bytes(channel.name.data(), channel.name.size()),
-                                    channel.stamps_us, channel.starts, channel.ends));
+                                    channel.stamps_us, channel.payloads));
     return nb::make_tuple(found, gaps);
 }
 
@@ -103,10 +103,11 @@ nb::tuple EventsOf(nb::bytes log)
 
 void BindEvents(nb::module_ &m)
 {
-    m.def("events_of", &EventsOf, "log"_a,
-          "Of the bytes of an LCM log: channels in the order in which they appear, each as its "
-          "name, stamps in us, and where its payloads start and end; and (from, to, whether an "
-          "event came before) of what is no event, to -1 if it goes on to the end.");
+    m.def(
+        "events_of", &EventsOf, "log"_a,
+        "Of the bytes of an LCM log: channels in the order in which they appear, each as its "
+        "name, stamps in us and payloads; and (from, to, whether an event came before) of what is "
+        "no event, to -1 if it goes on to the end.");
 }
 
 }  // namespace twin

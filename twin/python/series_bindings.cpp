@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include "arrays.h"
@@ -264,59 +265,145 @@ Array DisplacedBy(Matrix values, Matrix velocity, int axis, Vector step_s, Vecto
     return ToNumpy(std::move(displaced), {starts.size(), ends.shape(1), 3, values.shape(1)});
 }
 
-// A signal (G, C) at a place between two of its rows; beyond its ends it goes on as it is there.
-class Read
+// Sums about one time of the times near it and of C columns there, from which its lines follow.
+class Near
 {
 public:
-    explicit Read(Matrix signal) : signal_(signal), width_(signal.shape(1)) {}
+    explicit Near(size_t width) : y_(width), ty_(width) {}
 
-    // Calls visit(c, value) for each column.
-    template <class Visit>
-    void At(double place, Visit visit) const
+    void Clear()
     {
-        const double within = std::clamp(place, 0.0, static_cast<double>(signal_.shape(0)) - 1.001);
-        const auto row = static_cast<size_t>(within);
-        const double part = within - static_cast<double>(row);
-        const double *from = signal_.data() + row * width_;
-        for (size_t c = 0; c < width_; ++c)
-            visit(c, from[c] * (1 - part) + from[width_ + c] * part);
+        s0_ = s1_ = s2_ = 0;
+        std::ranges::fill(y_, 0.0);
+        std::ranges::fill(ty_, 0.0);
+    }
+
+    void Add(double dt, const double *own, const double *other)
+    {
+        s0_ += 1;
+        s1_ += dt;
+        s2_ += dt * dt;
+        for (size_t c = 0; c < y_.size(); ++c)
+        {
+            const double dy = other[c] - own[c];
+            y_[c] += dy;
+            ty_[c] += dt * dy;
+        }
+    }
+
+    // NaN for a slope where the time stands alone.
+    void WriteLines(const double *own, double *value, double *slope) const
+    {
+        const double determinant = s0_ * s2_ - s1_ * s1_;
+        for (size_t c = 0; c < y_.size(); ++c)
+        {
+            value[c] = own[c];
+            if (determinant <= 0)
+                continue;
+            value[c] += (s2_ * y_[c] - s1_ * ty_[c]) / determinant;
+            slope[c] = (s0_ * ty_[c] - s1_ * y_[c]) / determinant;
+        }
     }
 
 private:
-    Matrix signal_;
-    size_t width_;
+    double s0_ = 0, s1_ = 0, s2_ = 0;
+    std::vector<double> y_, ty_;
 };
+
+// (2, N, C) value and slope there of a straight line by least squares around each of N times, of
+// the columns of values (N, C): of times within `half_width` and `reach` rows, and of one segment.
+Array LocalLines(Vector times, Matrix values, Indices segments, double half_width, size_t reach)
+{
+    const size_t count = times.size(), width = values.shape(1);
+    if (values.shape(0) != count || segments.size() != count)
+        throw std::invalid_argument("values and segments must have one row per time");
+    const double *t = times.data();
+    const int64_t *segment = segments.data();
+    std::vector<double> lines(2 * count * width, std::numeric_limits<double>::quiet_NaN());
+    Near near(width);
+    for (size_t n = 0; n < count; ++n)
+    {
+        if (segment[n] < 0)
+            continue;
+        const double *own = values.data() + n * width;
+        near.Clear();
+        for (size_t k = n - std::min(n, reach); k < std::min(n + reach + 1, count); ++k)
+            if (segment[k] == segment[n] && std::abs(t[k] - t[n]) <= half_width)
+                near.Add(t[k] - t[n], own, values.data() + k * width);
+        near.WriteLines(own, lines.data() + n * width, lines.data() + (count + n) * width);
+    }
+    return ToNumpy(std::move(lines), {2, count, width});
+}
+
+// Where a signal is read between two of its rows; beyond its ends it goes on as it is there.
+struct Between
+{
+    size_t row;
+    double part;
+
+    Between(double place, size_t rows)
+    {
+        const double within = std::clamp(place, 0.0, static_cast<double>(rows) - 1.001);
+        row = static_cast<size_t>(within);
+        part = within - static_cast<double>(row);
+    }
+};
+
+constexpr size_t kBeside = 3;  // columns beside a signal
+
+// Sums over places of squares of kBeside of a signal's columns, the first of which is `first` (G,
+// C), and of their products with what stands beside each place.
+void SumProducts(std::span<const Between> at, const double *first, size_t width,
+                 const double *beside, double *squares, double *products)
+{
+    std::array<double, kBeside> square{}, product{};
+    for (const Between &here : at)
+    {
+        const double *from = first + here.row * width, *to = from + width;
+        for (size_t c = 0; c < kBeside; ++c)
+        {
+            const double value = from[c] * (1 - here.part) + to[c] * here.part;
+            square[c] += value * value;
+            product[c] += value * beside[c];
+        }
+        beside += kBeside;
+    }
+    std::ranges::copy(square, squares);
+    std::ranges::copy(product, products);
+}
 
 // (2, S, B, C) sums over stretches, which begin at rows `begins` of places (K,), of a signal's
 // columns that are read `shifts` (S,) before these: of their squares, and of their products with
-// the columns of `beside` (K, W), over and over.
+// the columns of `beside` (K, 3), over and over.
 Array SumsByShift(Matrix signal, Vector places, Vector shifts, Matrix beside, Indices begins)
 {
-    const size_t count = places.size(), width = signal.shape(1), across = beside.shape(1);
+    const size_t count = places.size(), rows = signal.shape(0), width = signal.shape(1);
     const size_t stretches = begins.size();
-    if (signal.shape(0) < 2 || beside.shape(0) != count || across == 0)
+    if (rows < 2 || beside.shape(0) != count || beside.shape(1) != kBeside || width % kBeside)
         throw std::invalid_argument(
-            "the signal must have two rows or more, and as many rows stand beside it as places");
+            "the signal must have two rows or more, its columns those of "
+            "`beside` over and over, and these as many rows as places");
     const auto begin = [&](size_t b) {
         return b < stretches ? static_cast<size_t>(begins.data()[b]) : count;
     };
     for (size_t b = 0; b < stretches; ++b)
         if (begin(b) > begin(b + 1) || begin(b) > count)
             throw std::invalid_argument("stretches must begin one after the other, at places");
-    const Read read(signal);
     const size_t size = shifts.size() * stretches * width;
-    std::vector<double> sums(2 * size);
-    double *square = sums.data(), *product = square + size;
-    for (size_t s = 0; s < shifts.size(); ++s)
-        for (size_t b = 0; b < stretches; ++b, square += width, product += width)
-            for (size_t k = begin(b); k < begin(b + 1); ++k)
-            {
-                const double *other = beside.data() + k * across;
-                read.At(places.data()[k] - shifts.data()[s], [&](size_t c, double value) {
-                    square[c] += value * value;
-                    product[c] += value * other[c % across];
-                });
-            }
+    auto sums = std::make_unique_for_overwrite<double[]>(2 * size);
+    double *square = sums.get(), *product = square + size;
+    std::vector<Between> at;
+    for (const double shift : Span(shifts))
+    {
+        at.clear();
+        for (const double place : Span(places))
+            at.emplace_back(place - shift, rows);
+        for (size_t b = 0; b < stretches; ++b)
+            for (size_t c = 0; c < width; c += kBeside, square += kBeside, product += kBeside)
+                SumProducts(std::span(at).subspan(begin(b), begin(b + 1) - begin(b)),
+                            signal.data() + c, width, beside.data() + begin(b) * kBeside, square,
+                            product);
+    }
     return ToNumpy(std::move(sums), {2, shifts.size(), stretches, width});
 }
 
@@ -417,11 +504,16 @@ void BindSeries(nb::module_ &m)
           "(N,) values of which changes below a least one are not taken, from 0.");
     m.def("wound", &Wound, "way"_a, "most"_a,
           "(N,) how far something is wound up by steps of way, -1 to 1: by `most` it is wholly.");
+    m.def("local_lines", &LocalLines, "times"_a, "values"_a, "segments"_a, "half_width"_a,
+          "reach"_a,
+          "(2, N, C) value and slope of a line by least squares around each time (N,), of columns "
+          "(N, C): of times within a half width and `reach` rows, in one segment (N,); NaN where "
+          "that is below 0, the slope where a time stands alone, too.");
     m.def(
         "sums_by_shift", &SumsByShift, "signal"_a, "places"_a, "shifts"_a, "beside"_a, "begins"_a,
         "(2, S, B, C) sums over stretches of places (K,), which begin at `begins` (B,), of what a "
         "signal (G, C) is at places less `shifts` (S,): of its squares, and of its products with "
-        "the columns `beside` (K, W), over and over.");
+        "the columns `beside` (K, 3), over and over.");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
           "push.");

@@ -77,12 +77,10 @@ def expected(detections: Detections, model: native.Model) -> Arrays:
 def measured_speed(track: Track) -> Arrays:
     """(T, 4) t_s, forward and left in m/s, turn in rad/s, from the poses."""
     half_s = max(SPEED_HALF_S, 1.5 * track.timing.pose_period_s)
-    slopes = [
-        local_line(track.pose_t_s, track.pose[:, k], track.segment, half_s)[1] for k in range(3)
-    ]
-    forward, left = rotate(slopes[0], slopes[1], -track.heading_smooth)
+    x_mps, y_mps, turn_radps = local_line(track.pose_t_s, track.pose, track.segment, half_s)[1].T
+    forward, left = rotate(x_mps, y_mps, -track.heading_smooth)
     every = max(1, round(SPEED_S / track.timing.pose_period_s))
-    return {"speed": np.column_stack([track.pose_t_s, forward, left, slopes[2]])[::every]}
+    return {"speed": np.column_stack([track.pose_t_s, forward, left, turn_radps])[::every]}
 
 
 class RobotView:

@@ -165,9 +165,7 @@ def _explained(gram: np.ndarray, moment: np.ndarray) -> float:
 def _body_velocity(track: Track) -> tuple[np.ndarray, np.ndarray]:
     """(K,) s and (K, 3) forward, left, LEVER_M * turning; m/s; thinned."""
     width_s = max(SLOPE_S, 1.5 * track.timing.pose_period_s)  # three poses at least
-    slope = np.column_stack(
-        [local_line(track.pose_t_s, track.pose[:, k], track.segment, width_s)[1] for k in range(3)]
-    )
+    _, slope = local_line(track.pose_t_s, track.pose, track.segment, width_s)
     cos, sin = np.cos(track.heading_smooth), np.sin(track.heading_smooth)
     velocity = np.column_stack(
         [

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
 import lcm
@@ -78,9 +77,8 @@ def split_events(data: bytes, name: str) -> Events:
             events.warnings.append(
                 f"{name}: bytes {position} to {following} are no event; skipped."
             )
-    for channel_bytes, stamps_us, starts, ends in channels:
+    for channel_bytes, stamps_us, payloads in channels:
         channel = channel_bytes.decode("utf-8", "replace")
-        payloads = [data[a:b] for a, b in zip(starts, ends, strict=True)]
         events.by_channel.setdefault(channel, []).extend(payloads)
         events.stamps_us.setdefault(channel, []).extend(stamps_us)
     if not events.by_channel:
@@ -98,12 +96,12 @@ def layout_of(message: type) -> np.dtype:
     Args:
         message: class generated from lcm_types/<name>.lcm, which lies beside it.
     """
-    text = files(turbopi).joinpath(f"{message.__name__}.lcm").read_text()
+    text = Path(turbopi.__file__).with_name(f"{message.__name__}.lcm").read_text()
     fields = [
         (name, NUMBERS[kind], int(count)) if count else (name, NUMBERS[kind])
         for kind, name, count in FIELD.findall(text.partition("{")[2])
     ]
-    return np.dtype([("hash", "S8"), *fields])
+    return np.dtype([("hash", ">u8"), *fields])
 
 
 def decode(
@@ -121,9 +119,15 @@ def decode(
         LogError: if more payloads are of another type.
     """
     layout, fingerprint = layout_of(message), message._get_packed_fingerprint()
-    whole = [p for p in payloads if len(p) == layout.itemsize and p[:8] == fingerprint]
-    if len(whole) < len(payloads):
-        if warnings is None or not few_broken(len(payloads) - len(whole), len(payloads)):
+    whole = payloads
+    if set(map(len, payloads)) - {layout.itemsize}:
+        whole = [p for p in payloads if len(p) == layout.itemsize]
+    messages = np.frombuffer(b"".join(whole), layout)
+    known = messages["hash"] == np.frombuffer(fingerprint, layout["hash"])
+    if not known.all():
+        messages = messages[known]
+    if len(messages) < len(payloads):
+        if warnings is None or not few_broken(len(payloads) - len(messages), len(payloads)):
             (strange, *_) = (
                 p for p in payloads if len(p) != layout.itemsize or p[:8] != fingerprint
             )
@@ -132,8 +136,8 @@ def decode(
                 f"{strange[:8].hex()}, expected {fingerprint.hex()}): the log was made with other "
                 "message types; convert it with the programs that wrote it."
             )
-        warnings.append(broken(channel, len(payloads) - len(whole), len(payloads)))
-    return np.frombuffer(b"".join(whole), layout)
+        warnings.append(broken(channel, len(payloads) - len(messages), len(payloads)))
+    return messages
 
 
 def few_broken(count: int, of: int) -> bool:

@@ -4,6 +4,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.data.cuts import find_segments
 from twinmill.data.log import CommandKind, LogError, RobotLog
@@ -156,7 +157,7 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
 
 
 def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) -> np.ndarray:
-    """Commands in force at times on the robot's clock: (N,), (M,), (M, 4) to (N, 4).
+    """Commands in force at times on the robot's clock: (N,), (M,), (M, C) to (N, C).
 
     Zero before the first.
     """
@@ -237,35 +238,18 @@ def local_line(
 
     Args:
         t_s: (N,) ascending.
-        values: (N,) one per time.
+        values: (N,) one per time, or (N, C).
         segment: (N,) as in Track.
         half_width_s: of the window.
 
     Returns:
-        (N,) its value at the sample and (N,) its slope per second; NaN where segment is -1, slope
-        NaN too where the sample stands alone.
+        Like values, its value at the sample and its slope per second; NaN where segment is -1,
+        slope NaN too where the sample stands alone.
     """
-    count, sample = len(t_s), np.arange(len(t_s))
     reach = int(np.ceil(half_width_s / np.median(np.diff(t_s))))
-    s0, s1, s2, sy, sty = (np.zeros(count) for _ in range(5))
-    for lag in range(-reach, reach + 1):
-        other = np.clip(sample + lag, 0, count - 1)
-        near = (
-            (other == sample + lag)
-            & (segment[other] == segment)
-            & (segment >= 0)
-            & (np.abs(t_s[other] - t_s) <= half_width_s)
-        )
-        dt = np.where(near, t_s[other] - t_s, 0.0)
-        dy = np.where(near, values[other] - values, 0.0)
-        s0, s1, s2 = s0 + near, s1 + dt, s2 + dt * dt
-        sy, sty = sy + dy, sty + dt * dy
-    determinant = s0 * s2 - s1 * s1
-    alone = determinant <= 0
-    safe = np.where(alone, 1.0, determinant)
-    value = values + np.where(alone, 0.0, (s2 * sy - s1 * sty) / safe)
-    slope = np.where(alone, np.nan, (s0 * sty - s1 * sy) / safe)
-    return np.where(segment < 0, np.nan, value), np.where(segment < 0, np.nan, slope)
+    columns = np.ascontiguousarray(values.reshape(len(t_s), -1))
+    value, slope = native.local_lines(t_s, columns, segment, half_width_s, reach)
+    return value.reshape(values.shape), slope.reshape(values.shape)
 
 
 def _rest(robot: RobotLog, lost_s: np.ndarray) -> np.ndarray:
@@ -326,12 +310,10 @@ def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float
     whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
     middle = middle[whole]
     first, last = middle - half, middle + half
+    straight = _straight(robot.command, robot.command_kind)[:, None]
     forward = np.column_stack(
         [
-            _straight(
-                command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, robot.command),
-                robot.command_kind,
-            )
+            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, straight)
             for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)
         ]
     )
@@ -373,7 +355,7 @@ def _bend_rad(pose: np.ndarray, first: np.ndarray, middle: np.ndarray, last: np.
 
 
 def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:
-    """(N,) forward command where it asks for straight motion, else 0."""
+    """(M,) forward command where it asks for straight motion, else 0."""
     if kind == "twist":
         return np.where((command[:, 1:3] == 0).all(axis=1), command[:, 0], 0.0)
     return np.where(np.ptp(command, axis=1) == 0, command[:, 0], 0.0)

@@ -22,8 +22,9 @@ from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock, time_notes, unsteady_clocks
 from twinmill.fitting.opening import Opened, judged, lag_is_kept, with_own_gains
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.covariance import Covariance
-from twinmill.model.model_file import Fitted, ModelFile, child_of
+from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     GAINS,
     LAG,

@@ -4,7 +4,6 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,6 +17,7 @@ from twinmill.export.script import BAG_FILES
 from twinmill.export.tables import tables_of, write_csv, write_parquet
 from twinmill.files import check_absent, folder_beside, put_in_place, replacing, replacing_folder
 from twinmill.model.outlines import Body
+from twinmill.version import __version__
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def export_log(
     recording = read_recording(log)
     provenance = {
         "command": command,
-        "version": f"twinmill {version('twinmill')}",
+        "version": f"twinmill {__version__}",
         "log_sha256": recording.sha256,
         "t0_utime_us": recording.t0_utime_us,
     }

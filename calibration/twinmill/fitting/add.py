@@ -40,7 +40,8 @@ from twinmill.fitting.opening import (
 )
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.starts import Left, projected, starts_of
-from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
+from twinmill.model.child_file import Fitted, write_child
+from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
     CAMERA_STAGES,
     GAINS,

@@ -21,7 +21,7 @@ from twinmill.fitting.opening import (
     open_measurements,
 )
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child
+from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
     BASE_GAINS,
     CLOCK,
@@ -171,6 +171,8 @@ def fit(
         LogError: no measurement can be judged.
         ModelError: the new file cannot be written, or `held` names what is not fitted.
     """
+    from twinmill.model.child_file import Fitted, write_child  # slow to import, for a fit alone
+
     opened = open_measurements(measurements, model_file)
     model = model_file.model
     kept = lag_is_kept(judged(opened), _told(model_file, measurements))

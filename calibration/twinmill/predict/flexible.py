@@ -6,6 +6,7 @@ through a few first-order lags, with terms for stopping, for coupling between th
 room. It is never shown as a model; it only tells noise from what some model could explain.
 """
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,7 @@ from twinmill.predict.residual import StepGrid, rotate
 
 LEVELS = (0.15, 0.3, 0.5, 0.65, 0.8, 0.9, 1.0)  # of the largest command
 LAGS_S = (0.0, 0.03, 0.07, 0.15)
+USUAL = 2  # of these lags: what is squared, or goes with the voltage
 COAST_S = (0.07, 0.15, 0.4)
 BLOCK_S = 4.0
 FOLDS = 10
@@ -63,44 +65,38 @@ def _fitted(x: np.ndarray, y: np.ndarray, fold: np.ndarray) -> tuple[np.ndarray,
 
 def _terms(
     measurement: Measurement, grid: StepGrid, offset_s: float, heading_rad: np.ndarray
-) -> list[np.ndarray]:
+) -> Iterator[np.ndarray]:
     """For each axis the (S, P) regressors of its velocity."""
     command = _command(measurement, grid, offset_s)
-    odd = np.stack([np.sign(command) * _hat(np.abs(command), i) for i in range(len(LEVELS))], -1)
+    size, sign = np.abs(command), np.sign(command)
+    odd = np.stack([sign * _hat(size, i) for i in range(len(LEVELS))], -1)
     odd = np.einsum("aw,swl->sal", AXES, odd)
-    slow = _lagged(odd, grid)
-    stopped = np.all(command == 0, axis=1)[:, None, None]
-    coast = np.concatenate([_lag(odd, tau_s, grid) for tau_s in COAST_S], -1) * stopped
-    linear = slow.sum(-1).reshape(len(command), -1, 3)  # lags as columns, axes last
-    even = _lagged(np.abs(command) @ AXES.T, grid)
+    lagged = {tau_s: _lag(odd, tau_s, grid) for tau_s in {*LAGS_S, *COAST_S}}
+    linear = [sum(np.moveaxis(lagged[tau_s], -1, 0)) for tau_s in LAGS_S]  # (S, axes) each
+    even = [_lag(size @ AXES.T, tau_s, grid) for tau_s in LAGS_S]
+    stopped = np.all(command == 0, axis=1)[:, None]
     voltage = command_at(
         grid.t_s - offset_s,
         measurement.track.command_t_s,
         np.nan_to_num(measurement.track.battery_V)[:, None],
     )
     voltage = voltage - voltage.mean()
-    moving = (np.abs(command).max(1) > 0)[:, None] * 1.0
+    moving = (size.max(1) > 0)[:, None] * 1.0
     c, s = np.cos(heading_rad)[:, None] * moving, np.sin(heading_rad)[:, None] * moving
-    per_axis = []
+    usual, straight = linear[USUAL], np.hstack([*linear, *even])
+    bent = np.hstack([usual * usual[:, [1, 2, 0]], np.abs(usual)])
     for axis in range(3):
-        own = linear[:, 2, axis : axis + 1]
         room = {0: [c, s], 1: [-s, c], 2: [moving]}[axis]
-        per_axis.append(
-            np.concatenate(
-                [
-                    slow[:, :, axis].reshape(len(command), -1),
-                    coast[:, axis],
-                    linear.reshape(len(command), -1),
-                    even.reshape(len(command), -1),
-                    own * voltage,
-                    linear[:, 2] * linear[:, 2, [1, 2, 0]],
-                    np.abs(linear[:, 2]),
-                    *room,
-                ],
-                axis=1,
-            )
+        yield np.hstack(
+            [
+                *(lagged[tau_s][:, axis] for tau_s in LAGS_S),
+                *(lagged[tau_s][:, axis] * stopped for tau_s in COAST_S),
+                straight,
+                usual[:, [axis]] * voltage,
+                bent,
+                *room,
+            ]
         )
-    return per_axis
 
 
 def _command(measurement: Measurement, grid: StepGrid, offset_s: float) -> np.ndarray:
@@ -121,11 +117,7 @@ def _hat(level: np.ndarray, i: int) -> np.ndarray:
     return np.interp(level, nodes, peak)
 
 
-def _lagged(signal: np.ndarray, grid: StepGrid) -> np.ndarray:
-    """Signal (S, ...) through each of the lags: (S, lags, ...)."""
-    return np.stack([_lag(signal, tau_s, grid) for tau_s in LAGS_S], 1)
-
-
 def _lag(signal: np.ndarray, tau_s: float, grid: StepGrid) -> np.ndarray:
+    """Signal (S, ...) through a lag."""
     keep = np.exp(-grid.period_s / tau_s) if tau_s > 0 else 0.0
     return filtered([1 - keep], [1, -keep], signal, axis=0)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The outcome of a challenge for people: terminal and HTML."""
 
-from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from twinmill.challenge.scoring import BARS, BINS, LARGEST_GROUP
 from twinmill.report import Figure, Provenance, Section, show, write_report
 from twinmill.report.canvas import BEFORE, draw
 from twinmill.report.tables import Cell, Table
+from twinmill.version import __version__
 
 
 def shown(found: dict, times_s: list[float]) -> RenderableType:
@@ -57,7 +57,7 @@ def write(folder: Path, found: dict, times_s: list[float]) -> Path:
         figures=[_power(found)],
         tables=[_rates(found, times_s), *_lost(found), _confusion(found)],
     )
-    source = Provenance(found["command"], f"twinmill {version('twinmill')}", "")
+    source = Provenance(found["command"], f"twinmill {__version__}", "")
     return write_report(folder, "Blind test of diagnosis", source, [section], note="")
 
 

@@ -10,20 +10,8 @@ from markupsafe import Markup, escape
 
 from twinmill.files import REPORT, check_report, made_folder
 from twinmill.model.model_file import write_whole
+from twinmill.provenance import Provenance
 from twinmill.report.tables import Table, Tone
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """What every output carries; the model's hash is empty where none was used."""
-
-    command: str
-    version: str
-    model_sha256: str
-
-    def to_json(self) -> dict:
-        """Fields of JSON output."""
-        return vars(self)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@
 import time
 from collections import Counter
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 
 import twinmill_native as native
@@ -17,6 +16,7 @@ from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
 from twinmill.terminal import progress_bar
+from twinmill.version import __version__
 
 MOST_WORLDS = 10_000_000  # a row of each is in memory at the end
 MOST_SEEDS = 2**63 - 1  # of 64 bits with a sign
@@ -42,7 +42,7 @@ def make_request(
         behavior=behavior,
         model_name=model_file.path.name,
         model_text=model_file.text,
-        version=version("twinmill"),
+        version=__version__,
         axes=parsed,
         tables=own,
         **rest,

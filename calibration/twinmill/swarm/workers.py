@@ -3,12 +3,12 @@
 
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from importlib.metadata import version
 
 import twinmill_native as native
 
 from twinmill.programs import available_cores
 from twinmill.swarm.request import Request, run_part
+from twinmill.version import __version__
 
 Done = tuple[int, dict[str, list]]
 CONNECT_S = 15
@@ -38,9 +38,9 @@ def run_here(request: Request, parts: dict[int, range], workers: int | None) -> 
 def _run_remote(text: str, worlds: range) -> dict[str, list]:
     """On a worker of the cluster."""
     request = Request.from_json(text)
-    if version("twinmill") != request.version:
+    if __version__ != request.version:
         raise ValueError(
-            f"a worker has twinmill {version('twinmill')}, but this is {request.version}: "
+            f"a worker has twinmill {__version__}, but this is {request.version}: "
             "install the same on both."
         )
     if request.to_json() != text:

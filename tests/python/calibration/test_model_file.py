@@ -9,8 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from twinmill.model.child_file import Fitted, write_child
 from twinmill.model.covariance import Covariance
-from twinmill.model.model_file import Fitted, ModelError, ModelFile, write_child, write_whole
+from twinmill.model.model_file import ModelError, ModelFile, write_whole
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
 

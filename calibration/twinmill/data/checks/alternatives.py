@@ -310,7 +310,7 @@ class Search:
         power, along, total = sums
         lefts, shifts_s = [], []
         for part in (slice(split), slice(split, None)):
-            left, _ = self._judged(power[:, part], along[:, part], total[part], part)
+            left, _ = self._judged(power[:, part], along[:, part], total[part])
             k = int(left.sum(axis=1).argmin())
             lefts.append(left[k] * total[part].sum() / total.sum())
             shifts_s.append(float(self.lates_s[k]))
@@ -323,7 +323,7 @@ class Search:
         power, along, total = self.by_shift(jump.explained.lag_s)
         split, variance = int(np.searchsorted(self.motion.t_s[self.starts], jump.t_s)), 0.0
         for part in (slice(split), slice(split, None)):
-            left, _ = self._judged(power[:, part], along[:, part], total[part], part)
+            left, _ = self._judged(power[:, part], along[:, part], total[part])
             left *= total[part].sum()
             without = [place_of_least(self.lates_s, left.sum(axis=1) - b) for b in left.T]
             variance += (len(without) - 1) * float(np.var(without))  # Efron and Stein 1981
@@ -420,23 +420,21 @@ class Search:
         return self._judged(power, along, total)
 
     def _judged(
-        self, power: np.ndarray, along: np.ndarray, total: np.ndarray, part: slice = slice(None)
+        self, power: np.ndarray, along: np.ndarray, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """(A, B) share left by stretch, judged by fits to the other half; (A, 3) gains.
 
         Args: power, along (A, B, SHAPES, 3): told times itself and times measured. total (B,).
-        part: of all stretches, which these are.
         """
         left = np.zeros(power.shape[:2])
+        each, channel = np.ogrid[: len(power), : power.shape[3]]
         for half in (0, 1):
-            fit, judge = self.fold[part] != half, self.fold[part] == half
-            p, m = power[:, fit].sum(axis=1), along[:, fit].sum(axis=1)
+            p, m = (sums[:, 1 - half :: 2].sum(axis=1) for sums in (power, along))
             gain = np.maximum(m, 0) / np.maximum(p, 1e-12)  # (A, SHAPES, C)
-            shape = np.argmax(gain * m, axis=1)[:, None]  # that which explains most
-            best = np.take_along_axis(gain, shape, axis=1)
-            here_p = np.take_along_axis(power[:, judge], shape[:, None], axis=2)[:, :, 0]
-            here_m = np.take_along_axis(along[:, judge], shape[:, None], axis=2)[:, :, 0]
-            left[:, judge] = (best**2 * here_p - 2 * best * here_m).sum(axis=2)
+            shape = np.argmax(gain * m, axis=1)  # that which explains most
+            best = gain[each, shape, channel][:, :, None]
+            p, m = (sums[:, half::2][each, :, shape, channel] for sums in (power, along))
+            left[:, half::2] = (best**2 * p - 2 * best * m).sum(axis=1)
         left = (left + total) / max(total.sum(), 1e-12)
         linear_p, linear_m = power[:, :, 1].sum(axis=1), along[:, :, 1].sum(axis=1)
         moves = linear_p > NEGLIGIBLE * linear_p.max(axis=1, keepdims=True)
@@ -456,11 +454,12 @@ def _left_by_first(
         for h in (0, 1)
     ]
     left = np.cumsum(total)[counts - 1]
+    each, split, channel = np.ogrid[: len(power), : len(counts), : power.shape[3]]
     for (here_p, here_m), (p, m) in (halves, halves[::-1]):
         gain = np.maximum(m, 0) / np.maximum(p, 1e-12)
-        shape = np.argmax(gain * m, axis=2)[:, :, None]  # (A, K, 1, C)
-        best, p, m = (np.take_along_axis(a, shape, axis=2) for a in (gain, here_p, here_m))
-        left = left + (best**2 * p - 2 * best * m).sum(axis=(2, 3))
+        shape = np.argmax(gain * m, axis=2)  # (A, K, C)
+        best, p, m = (sums[each, split, shape, channel] for sums in (gain, here_p, here_m))
+        left = left + (best**2 * p - 2 * best * m).sum(axis=2)
     return left
 
 

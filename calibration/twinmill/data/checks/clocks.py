@@ -284,9 +284,10 @@ def _rate(search: Search, own: Explained) -> tuple[float, float]:
     left = by_block.sum(axis=1)
     k = int(np.clip(left.argmin(), 1, len(left) - 2))
     near = slice(k - 1, k + 2)
-    without = [_vertex(rates[near], left[near] - block[near]) for block in by_block.T]
+    without = _vertex(rates[near], left[near, None] - by_block[near])
     std = float(np.sqrt((len(without) - 1) * np.var(without)))  # jackknife, Efron and Stein 1981
-    return (_vertex(rates[near], left[near]), std) if np.isfinite(std) else (np.nan, np.nan)
+    rate = float(_vertex(rates[near], left[near]))
+    return (rate, std) if np.isfinite(std) else (np.nan, np.nan)
 
 
 def _drifted(search: Search, own: Explained, rate: float) -> Explained:
@@ -305,7 +306,8 @@ def _gained(drift: Explained, step: Explained) -> float:
     return float(gained.sum() / max(gained.std() * np.sqrt(len(gained)), 1e-12))
 
 
-def _vertex(x: np.ndarray, y: np.ndarray) -> float:
-    """Place of the least value by the parabola through three points; NaN if it has none."""
-    square, slope, _ = np.polyfit(x, y, 2)
-    return float(-slope / (2 * square)) if square > 0 else np.nan
+def _vertex(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Places of the least of values (3, ...) at (3,) by parabolas through them; NaN without one."""
+    first, last = (np.diff(y, axis=0).T / np.diff(x)).T
+    bend = (last - first) / (x[2] - x[0])
+    return (x[0] + x[1]) / 2 - first / (2 * np.where(bend > 0, bend, np.nan))

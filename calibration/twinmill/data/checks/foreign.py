@@ -58,7 +58,7 @@ class Compared:
 def _largest_rise(values: np.ndarray) -> slice:
     """The run of neighbours with the largest sum (Bentley 1984)."""
     best, best_sum, begin, so_far = slice(0, 0), 0.0, 0, 0.0
-    for k, value in enumerate(values):
+    for k, value in enumerate(values.tolist()):
         if so_far <= 0:
             begin, so_far = k, 0.0
         so_far += value

@@ -54,11 +54,8 @@ class Motion:
     def of(cls, track: Track) -> "Motion":
         """Speeds and headings of a track, from straight lines through its nearby poses."""
         half_s = max(HALF_S, 1.5 * track.timing.pose_period_s)
-        line = [
-            local_line(track.pose_t_s, track.pose[:, k], track.segment, half_s) for k in range(3)
-        ]
-        slope = np.column_stack([s for _, s in line])
-        heading_rad = line[2][0]
+        value, slope = local_line(track.pose_t_s, track.pose, track.segment, half_s)
+        heading_rad = value[:, 2]
         if not track.has_heading:
             slope[:, 2], heading_rad = 0, 0 * slope[:, 0]
         known = np.flatnonzero(np.isfinite(slope).all(axis=1))

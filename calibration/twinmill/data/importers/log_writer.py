@@ -3,7 +3,6 @@
 
 import heapq
 from collections.abc import Iterator
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ import turbopi
 from twinmill.data.importers.series import CommandSeries, DetectionSeries, PoseSeries
 from twinmill.data.lcm_log import log_file
 from twinmill.data.log import KINDS
+from twinmill.version import __version__
 
 CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
 
@@ -53,7 +53,7 @@ def write_log(
 def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:
     run = turbopi.run_t()
     run.utime_us, run.robot_id = int(series.utime_us[0]), series.robot_id
-    run.source, run.version, run.config_toml = "robot", version("twinmill"), config_toml
+    run.source, run.version, run.config_toml = "robot", __version__, config_toml
     yield run.utime_us, f"R{series.robot_id:02d}_RUN", run.encode()
 
 

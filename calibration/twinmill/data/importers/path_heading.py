@@ -114,10 +114,8 @@ def _way_mps(t_s: np.ndarray, poses: PoseSeries) -> np.ndarray:
     """(N,) complex velocity in W; NaN where a pose is lost."""
     segment = np.where(poses.valid, 0, -1)
     place = np.where(poses.valid[:, None], poses.position_m, 0.0)
-    return (
-        local_line(t_s, place[:, 0], segment, AROUND_S)[1]
-        + 1j * local_line(t_s, place[:, 1], segment, AROUND_S)[1]
-    )
+    _, slope = local_line(t_s, place, segment, AROUND_S)
+    return slope[:, 0] + 1j * slope[:, 1]
 
 
 def _fill_straights(

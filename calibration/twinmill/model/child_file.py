@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Model files written anew with what was fitted; the rest of the text stays as it is."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import tomlkit
+import twinmill_native as native
+
+from twinmill.model.covariance import Covariance
+from twinmill.model.model_file import ModelFile, quantity_names
+from twinmill.model.parameters import (
+    ParameterEstimate,
+    catalogue_name,
+    catalogue_of,
+    effect_names,
+)
+
+
+class NoiseTable(Protocol):
+    """Noise of a log, as far as a model file records it."""
+
+    speed_mps: float
+
+    def to_json(self) -> dict[str, float]:
+        """Keys and values of the table `[noise]`."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit found out and a new model file records.
+
+    Attributes:
+        model: with the fitted values and effects.
+        estimates: with their uncertainties.
+        logs: sha256 of the logs fitted on, by name.
+        score_before, score_after: on those logs.
+        noise: of the first log, or None to leave the old.
+        clock: offset and rate that the logs share, by name; empty if they do not agree.
+        base_told: the base was held near what other logs told; they keep the credit.
+        left_over: what a diagnosis found that no effect explains; None if there was none.
+        robots: what is a robot's own, by its number.
+        covariance: of the estimates; None where the fit has none.
+    """
+
+    model: native.Model
+    estimates: list[ParameterEstimate]
+    logs: dict[str, str]
+    score_before: float
+    score_after: float
+    noise: NoiseTable | None = None
+    clock: dict[str, ParameterEstimate] = field(default_factory=dict)
+    base_told: bool = False
+    left_over: dict[str, float] | None = None
+    robots: dict[int, list[ParameterEstimate]] = field(default_factory=dict)
+    covariance: Covariance | None = None
+
+
+def write_child(
+    parent: ModelFile, fitted: Fitted, path: Path, command: str, *, force: bool = True
+) -> None:
+    """Writes the fitted model to a new file: whole or not at all; `force` replaces one.
+
+    Raises:
+        ModelError: the file cannot be written.
+    """
+    child_of(parent, fitted, path, command).write(force)
+
+
+def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> ModelFile:
+    """The fitted model as its file has it, before that is written."""
+    document = tomlkit.parse(parent.text)
+    document["parent"] = parent.hash
+    document["created_by"] = command
+    _write_moved(document, parent.model, fitted.model)
+    _write_base(document, fitted)
+    _write_effects(document, fitted)
+    _write_robots(document, fitted)
+    if fitted.noise:
+        section = document.setdefault("noise", tomlkit.table())
+        section.update({k: _short(v) for k, v in fitted.noise.to_json().items()})
+    if fitted.clock:
+        section = document.setdefault("clock", tomlkit.table())
+        clock = {name.removeprefix("clock."): e for name, e in fitted.clock.items()}
+        section.update({key: _short(e.value) for key, e in clock.items()})
+        section["std"] = {key: _short(e.std) for key, e in clock.items()}
+        section["fitted_on"] = list(fitted.logs.values())
+    old = document.get("fit", {}).get("left_over", {})
+    covariance = parent.covariance.of(quantity_names(fitted.model)).replaced_by(fitted.covariance)
+    document["fit"] = {
+        "logs": list(fitted.logs),
+        "score_before": _short(fitted.score_before),
+        "score_after": _short(fitted.score_after),
+    }
+    speed_mps = fitted.noise.speed_mps if fitted.noise else parent.noise_speed_mps
+    if speed_mps:
+        document["fit"]["noise_speed_mps"] = _short(speed_mps)
+    if fitted.left_over is not None:
+        left = {group: _short(value) for group, value in fitted.left_over.items()}
+        old = {**left, "fitted_on": list(fitted.logs.values())} if left else {}
+    if old:
+        document["fit"]["left_over"] = old
+    if covariance.names:
+        document["fit"]["covariance"] = covariance.to_toml()
+    text = tomlkit.dumps(document)
+    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _write_moved(document: tomlkit.TOMLDocument, before: native.Model, after: native.Model) -> None:
+    """Values of the base that are not as before, those that a log hardly tells as well.
+
+    The predictions that were scored had them.
+    """
+    base = document.setdefault("base", tomlkit.table())
+    for entry in after.values():
+        section, *key = entry["name"].split(".")
+        if section != "base" or entry["value"] == before.get(entry["name"]):
+            continue
+        values, place = (base[key[0]], int(key[1])) if len(key) == 2 else (base, key[0])
+        values[place] = _short(entry["value"])
+
+
+def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    base = document.setdefault("base", tomlkit.table())
+    stds: dict = {}
+    for estimate in fitted.estimates:
+        section, *key = estimate.name.split(".")
+        if section != "base":
+            continue
+        values, errors, place = base, stds, key[0]
+        if len(key) == 2:  # an entry of a table: those that were not fitted have no error
+            values, place = base[key[0]], int(key[1])
+            errors = stds.setdefault(key[0], [math.nan] * len(values))
+        values[place], errors[place] = _short(estimate.value), _short(estimate.std)
+    if stds and not fitted.base_told:
+        base["std"] = stds
+        base["fitted_on"] = list(fitted.logs.values())
+
+
+def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    """What is one robot's own, as [robots.R03]."""
+    for robot_id, estimates in sorted(fitted.robots.items()):
+        robots = document.setdefault("robots", tomlkit.table(is_super_table=True))
+        own = robots.setdefault(f"R{robot_id:02d}", tomlkit.table())
+        for estimate in estimates:
+            *effect, key = estimate.name.removeprefix("base.").split(".")
+            place = own.setdefault(effect[0], tomlkit.inline_table()) if effect else own
+            place[key] = _short(estimate.value)
+
+
+def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
+    entries, stds = catalogue_of(fitted.model), {e.name: e.std for e in fitted.estimates}
+    old = list(document.get("effect", []))
+    tables = tomlkit.aot()
+    instances = zip(effect_names(fitted.model), fitted.model.texts, strict=True)
+    for i, (instance, texts) in enumerate(instances):
+        table = tomlkit.table() if i >= len(old) else old[i]
+        name = catalogue_name(instance)
+        table["name"] = name
+        table.update({key: text for key, text in texts.items() if text})
+        keys = [p["name"] for p in entries[name]["parameters"]]
+        for key in keys:
+            table[key] = _short(fitted.model.get(f"{instance}.{key}"))
+        known = {
+            key: _short(stds[f"{instance}.{key}"]) for key in keys if f"{instance}.{key}" in stds
+        }
+        if known:
+            table["std"] = known
+            table["fitted_on"] = ", ".join(fitted.logs)
+        if i >= len(old):
+            table["error_before"] = _short(fitted.score_before)
+            table["error_after"] = _short(fitted.score_after)
+        tables.append(table)
+    if len(tables):
+        document["effect"] = tables
