@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -53,10 +52,6 @@ CHOICE_EVERY = 2  # horizons: those between would choose the same groups
 MEMORY_S = 0.3  # between errors that are independent
 PLACE_SCALE_M = 2.0
 MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
-
-
-# (F,) coefficients of all rows and (K, F) without each fold.
-Coefficients = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -134,6 +129,10 @@ class Response:
         base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
         lag_s: of that base.
         offset_s: capture's clock less the robot's.
+
+    Attributes:
+        velocities: (3, N, 1 + K) forward, left, turning at points: of the fit to all, and without
+            each fold.
     """
 
     def __init__(
@@ -145,7 +144,7 @@ class Response:
         self.base_mps = base_mps[self.points]
         self.features, self.groups = self._features(self.base_mps)
         self._index_windows()
-        self.coefficients: list[Coefficients | None] = [None, None]
+        self.velocities = np.zeros((3, len(self.points), 1 + self.folds))
         self._fit(rms(data.measured), [None, None])
         self._fit(self.errors, self.ridges)
         self.unboosted = self.across
@@ -406,28 +405,28 @@ class Response:
     def _fit(
         self, scale: np.ndarray, ridges: list[np.ndarray | None], parts: Sequence[int] = (0, 1)
     ) -> None:
-        """Coefficients with the errors (H, 3) of another fit as weights.
+        """Velocities with the errors (H, 3) of another fit as weights; 0 where nothing tells them.
 
-        They are of the plane and of turning, None where nothing tells them. Those of a part that is
-        not fitted stay.
+        Those of a part of the motion, the plane or turning, that is not fitted stay.
         """
         first = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
         self.ridges = [first if ridge is None else ridge for ridge in ridges]
-        self.coefficients = [None if k in parts else c for k, c in enumerate(self.coefficients)]
+        self.velocities = self.velocities.copy()
         for part in parts:
+            self.velocities[list(AXES[part])] = 0.0
             rows = self._rows(part, scale, self.data.measured)
             if rows is not None:
                 equations = Equations.of(self._led(part, rows, [self.features]), rows)
                 groups = np.concatenate([self.groups[axis] for axis in AXES[part]])
                 self.ridges[part], *found = _ridge(equations, groups, self.ridges[part])
-                self.coefficients[part] = found
+                self._follow(part, np.vstack(found).T)
         self._judge()
 
     @property
     def motion(self) -> Motion:
         """At each point, as fitted so far."""
         return Motion(
-            velocity=self.velocities()[0],
+            velocity=self.velocities[..., 0].T.copy(),
             base=self.base_mps,
             pose=self.pose,
             heading_rad=self.heading_rad,
@@ -532,18 +531,18 @@ class Response:
             scale: (H, 3) errors that count as one.
         """
         left = self.data.measured.copy()
-        for part, found in enumerate(self.coefficients):
+        for part in range(len(AXES)):
             rows = self._rows(part, scale, left)
-            if found is None or rows is None:
-                continue
-            x = self._led(part, rows, [self.features])
-            made = [x[own] @ one for own, one in zip(rows.parts.slices, found[1], strict=True)]
-            left[tuple(rows.at)] -= np.concatenate(made) / rows.weight
+            if rows is not None:
+                led = self._led(part, rows, [self.velocities])
+                of_axes = led.reshape(len(led), -1, self.velocities.shape[2])
+                made = of_axes[np.arange(len(led)), :, 1 + rows.parts.inside].sum(axis=1)
+                left[tuple(rows.at)] -= made / rows.weight
         return left
 
     def _judge(self) -> None:
         """Errors of the stages so far: fitted to all, and to other blocks."""
-        whole, *without = self.velocities()
+        whole, *without = self.velocities.transpose(2, 1, 0)
         everything = np.zeros(len(self.starts), int)
         self.within = difference(self.data.measured, self.predict([whole], everything))
         self.across = difference(self.data.measured, self.predict(without, self.fold))
@@ -553,21 +552,15 @@ class Response:
         """(H, 3) between those of the fit to all, too small, and those on left-out parts."""
         return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
-    def velocities(self) -> np.ndarray:
-        """(1 + K, N, 3) forward, left, turning at points: of the fit to all, and without each fold.
+    def _follow(self, part: int, coefficients: np.ndarray) -> None:
+        """Velocities of the plane or of turning by (F, 1 + K) coefficients of its features.
 
         Of all fits at once: one by one each goes through all features again.
         """
-        found = np.zeros((1 + self.folds, len(self.step_s), 3))
-        for axes, fits in zip(AXES, self.coefficients, strict=True):
-            if fits is None:
-                continue
-            whole, without = fits
-            each = np.vstack([whole, without]).T
-            edges = np.cumsum([0, *(self.features[axis].shape[1] for axis in axes)])
-            for axis, (first, last) in zip(axes, pairwise(edges), strict=True):
-                found[:, :, axis] = (self.features[axis] @ each[first:last]).T
-        return found
+        axes = list(AXES[part])
+        edges = np.cumsum([self.features[axis].shape[1] for axis in axes])
+        for axis, own in zip(axes, np.split(coefficients, edges[:-1]), strict=True):
+            self.velocities[axis] = self.features[axis] @ own
 
     def predict(self, velocities: Sequence[np.ndarray], which: np.ndarray) -> np.ndarray:
         """(W, H, 3) displacements, the heading integrated by the response itself.
