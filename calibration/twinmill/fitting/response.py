@@ -46,6 +46,7 @@ GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
+WORTH_HALVING = 16  # features in half of a matrix
 WIDE = 64  # features whose rows are made at once
 AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
@@ -699,7 +700,7 @@ class _LeftOut:
         self.used = np.flatnonzero(ridge[self.groups] < OUT)
         used = np.ix_(range(len(self.grams)), self.used, self.used)
         rise = np.diag((self.mean * ridge[self.groups])[self.used])
-        self.inverse = np.linalg.inv(self.grams[used] + rise)
+        self.inverse = _inverse(self.grams[used] + rise)
         return self._fitted()
 
     def moved(self, group: int, value: float) -> float:
@@ -765,6 +766,24 @@ class _LeftOut:
         found = np.linalg.solve(within + rise, np.broadcast_to(left, (len(values), *left.shape)))
         found = found[..., 0].transpose(1, 2, 0)
         return made @ found, found
+
+
+def _inverse(grams: np.ndarray) -> np.ndarray:
+    """(K, F, F) of positive definite matrices, by Cholesky: in a third of the time of numpy's."""
+    lower = _lower_inverse(np.linalg.cholesky(grams))
+    return lower.swapaxes(1, 2) @ lower
+
+
+def _lower_inverse(lower: np.ndarray) -> np.ndarray:
+    """(K, F, F) of triangular matrices, by halves."""
+    half = lower.shape[1] // 2
+    if half < WORTH_HALVING:
+        return np.linalg.inv(lower)
+    found = np.zeros_like(lower)
+    found[:, :half, :half] = first = _lower_inverse(lower[:, :half, :half])
+    found[:, half:, half:] = last = _lower_inverse(lower[:, half:, half:])
+    found[:, half:, :half] = -last @ lower[:, half:, :half] @ first
+    return found
 
 
 def _ridge(
