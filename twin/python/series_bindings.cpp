@@ -425,6 +425,56 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
     return ToNumpy(std::move(out), {pushes.size(), 2});
 }
 
+// Solves the count equations in rows of count + 1, the last of each the right side: of a definite
+// matrix, whose upper half alone is looked at.
+void Eliminate(std::span<double> rows, size_t count, double *solution)
+{
+    const size_t width = count + 1;
+    for (size_t j = 0; j < count; ++j)
+    {
+        const double *pivot = rows.data() + j * width;
+        for (size_t i = j + 1; i < count; ++i)
+        {
+            const double share = pivot[i] / pivot[j];
+            double *row = rows.data() + i * width;
+            for (size_t k = i; k < width; ++k)
+                row[k] -= share * pivot[k];
+        }
+    }
+    for (size_t j = count; j-- > 0;)
+    {
+        const double *row = rows.data() + j * width;
+        double left = row[count];
+        for (size_t k = j + 1; k < count; ++k)
+            left -= row[k] * solution[k];
+        solution[j] = left / row[j];
+    }
+}
+
+Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
+{
+    const size_t matrices = grams.shape(0), count = grams.shape(1), trials = rises.shape(1);
+    if (grams.shape(2) != count || rises.shape(0) != matrices || moments.shape(0) != matrices ||
+        moments.shape(1) != count)
+        throw std::invalid_argument(
+            "there must be rises and a moment of each square matrix, and as long as its rows");
+    std::vector<double> rows(count * (count + 1));
+    auto solved = std::make_unique_for_overwrite<double[]>(matrices * trials * count);
+    for (size_t m = 0; m < matrices; ++m)
+        for (size_t t = 0; t < trials; ++t)
+        {
+            for (size_t i = 0; i < count; ++i)
+            {
+                double *row = rows.data() + i * (count + 1);
+                std::copy_n(grams.data() + (m * count + i) * count, count, row);
+                row[i] += rises.data()[m * trials + t];
+                row[count] = moments.data()[m * count + i];
+            }
+            Eliminate(rows, count, solved.get() + (m * trials + t) * count);
+        }
+    return ToNumpy(std::move(solved), {matrices, trials, count});
+}
+
 }  // namespace
 
 void BindSeries(nb::module_ &m)
@@ -448,6 +498,9 @@ void BindSeries(nb::module_ &m)
         "(2, S, B, C) sums over stretches of places (K,), which begin at `begins` (B,), of what a "
         "signal (G, C) is at places less `shifts` (S,): of its squares, and of its products with "
         "the columns `beside` (K, W), over and over.");
+    m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
+          "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
+          "its diagonal and definite then, for right sides (M, F).");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
           "push.");

@@ -24,7 +24,7 @@ from twinmill.filters import filtered
 from twinmill.fitting import wheel_angles
 from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
-from twinmill.fitting.boosting import Learners, Parts, boosted, squares
+from twinmill.fitting.boosting import Learners, Parts, at_ridges, boosted, squares
 from twinmill.fitting.dependence import Features, Group, Motion, Product, even_step_s
 from twinmill.fitting.independence import independent_shares
 from twinmill.fitting.settings import FLOOR_SETTINGS
@@ -744,17 +744,15 @@ class _LeftOut:
         b - B (I/s + B_g)^-1 b_g, with B the inverse's columns of the group.
         """
         columns, block, rise = self._rise(own, values)
-        less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * self.beta[:, own])
-        return columns @ less[..., 0].transpose(1, 2, 0)
+        return columns @ at_ridges(block, 1 / rise, self.beta[:, own, 0]).swapaxes(1, 2)
 
     def _rise(
         self, own: np.ndarray, values: Sequence[float]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """B, B_g and s (V, 1, 1, 1)."""
+        """B, B_g and s (V,)."""
         at = np.searchsorted(self.used, own)
         more = np.array(values) - self.ridge[self.groups[own[0]]]
-        rise = self.mean[own[0]] * more[:, None, None, None]
-        return self.inverse[:, :, at], self.inverse[:, at[:, None], at], rise
+        return self.inverse[:, :, at], self.inverse[:, at[:, None], at], self.mean[own[0]] * more
 
     def _let_in(self, own: np.ndarray, values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """The same where a group that is out comes in, and its (K, g, V) coefficients."""
@@ -762,9 +760,7 @@ class _LeftOut:
         made = self.inverse @ across
         within = self.grams[:, own[:, None], own] - across.swapaxes(1, 2) @ made
         left = self.moments[:, own, None] - across.swapaxes(1, 2) @ self.beta[:, self.used]
-        rise = self.mean[own[0]] * np.array(values)[:, None, None, None] * np.eye(len(own))
-        found = np.linalg.solve(within + rise, np.broadcast_to(left, (len(values), *left.shape)))
-        found = found[..., 0].transpose(1, 2, 0)
+        found = at_ridges(within, self.mean[own[0]] * np.array(values), left[..., 0]).swapaxes(1, 2)
         return made @ found, found
 
 

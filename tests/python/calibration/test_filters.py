@@ -157,6 +157,19 @@ def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
         native.sums_by_shift(values, places, shifts, beside, np.array([0, 30]))
 
 
+@pytest.mark.parametrize("count", [1, 8, 30])
+def test_definite_matrices_are_solved_at_each_rise(count):
+    random = np.random.default_rng(5)
+    x, moments = random.normal(size=(4, 40, count)), random.normal(size=(4, count))
+    grams, rises = x.swapaxes(1, 2) @ x, np.array([[0.1, 3.0]] * 3 + [[-1e4, -1e5]])
+    found = native.solved_risen(grams, rises, moments)  # those of the last are negative
+    for gram, rise, moment, solved in zip(grams, rises, moments, found, strict=True):
+        for r, own in zip(rise, solved, strict=True):
+            assert own == pytest.approx(np.linalg.solve(gram + r * np.eye(count), moment))
+    with pytest.raises(ValueError, match="of each square matrix"):
+        native.solved_risen(grams, rises, moments[:, :0])
+
+
 def test_sums_refuse_rows_that_are_not_there():
     with pytest.raises(ValueError, match="rows of values"):
         native.led_between(
