@@ -313,6 +313,18 @@ private:
     size_t width_;
 };
 
+Array ReadAt(Matrix signal, Vector places)
+{
+    if (signal.shape(0) < 2)
+        throw std::invalid_argument("the signal must have two rows or more");
+    const Read read(signal);
+    const size_t width = signal.shape(1);
+    auto values = std::make_unique_for_overwrite<double[]>(places.size() * width);
+    for (size_t k = 0; k < places.size(); ++k)
+        read.At(places.data()[k], [&](size_t c, double value) { values[k * width + c] = value; });
+    return ToNumpy(std::move(values), {places.size(), width});
+}
+
 // (2, S, B, C) sums over stretches, which begin at rows `begins` of places (K,), of a signal's
 // columns that are read `shifts` (S,) before these: of their squares, and of their products with
 // the columns of `beside` (K, W), over and over.
@@ -365,15 +377,20 @@ Array Filtered(Vector numerator, Vector denominator, Matrix signal)
     return ToNumpy(std::move(out), {count, width});
 }
 
-Array Faded(Vector keep, Vector pushes)
+Array Faded(Matrix keep, Matrix pushes)
 {
-    if (keep.size() != pushes.size())
+    const size_t count = pushes.shape(0), width = pushes.shape(1);
+    if (keep.shape(0) != count || keep.shape(1) != width)
         throw std::invalid_argument("there must be as many shares as pushes");
-    std::vector<double> out(pushes.size());
-    double last = 0;
-    for (size_t n = 0; n < out.size(); ++n)
-        out[n] = last = keep.data()[n] * last + pushes.data()[n];
-    return ToNumpy(std::move(out), {pushes.size()});
+    auto faded = std::make_unique_for_overwrite<double[]>(count * width);
+    std::vector<double> last(width);
+    for (size_t n = 0; n < count; ++n)
+        for (size_t f = 0; f < width; ++f)
+        {
+            const size_t at = n * width + f;
+            faded[at] = last[f] = keep.data()[at] * last[f] + pushes.data()[at];
+        }
+    return ToNumpy(std::move(faded), {count, width});
 }
 
 Array Held(Vector values, double least)
@@ -488,11 +505,13 @@ void BindSeries(nb::module_ &m)
     m.def("filtered", &Filtered, "numerator"_a, "denominator"_a, "signal"_a,
           "(N, F) of a recursive filter that begins at rest.");
     m.def("faded", &Faded, "keep"_a, "pushes"_a,
-          "(N,) y[n] = keep[n] y[n - 1] + pushes[n], from rest.");
+          "(N, F) y[n] = keep[n] y[n - 1] + pushes[n], from rest.");
     m.def("held", &Held, "values"_a, "least"_a,
           "(N,) values of which changes below a least one are not taken, from 0.");
     m.def("wound", &Wound, "way"_a, "most"_a,
           "(N,) how far something is wound up by steps of way, -1 to 1: by `most` it is wholly.");
+    m.def("read_at", &ReadAt, "signal"_a, "places"_a,
+          "(K, C) what a signal (G, C) is at places (K,) between its rows.");
     m.def(
         "sums_by_shift", &SumsByShift, "signal"_a, "places"_a, "shifts"_a, "beside"_a, "begins"_a,
         "(2, S, B, C) sums over stretches of places (K,), which begin at `begins` (B,), of what a "

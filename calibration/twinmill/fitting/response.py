@@ -25,7 +25,7 @@ from twinmill.fitting import wheel_angles
 from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
 from twinmill.fitting.boosting import Learners, Parts, at_ridges, boosted, squares
-from twinmill.fitting.dependence import Features, Group, Motion, Product, even_step_s
+from twinmill.fitting.dependence import Features, Group, Motion, Product, even_step_s, hats
 from twinmill.fitting.independence import independent_shares
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
@@ -35,7 +35,7 @@ from twinmill.predict.windows import EVERY_S, difference, rms
 EDGES_S = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
 COARSE_S = np.array([0.0, 0.07, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
 SLOW_POSES_S = 0.1
-LEVELS = np.arange(0.05, 0.951, 0.05)  # peaks of the hats over the duty
+LEVELS = 21  # of the duty, even; each is the peak of a hat but the lowest and the highest
 HAT_LAGS = (0.5, 1.0, 1.8)  # times the base's lag
 BASE_LAGS_S = (0.0, 0.1, 0.3)
 SHORTEST_LAG_S = 0.03
@@ -199,23 +199,24 @@ class Response:
         shaped = self._shaped(shapes, linear)
         near = self.edges_s[1:] <= NEAR_S
         soft = taps[:, near].mean(axis=1)
-        base = self._lagged_base(base_mps)
+        alike = {
+            "base": self._lagged_base(base_mps),
+            "product": _products(soft),
+            "place": self._places(soft),
+        }
         features, groups = [], []
         for axis in range(3):
             own = [k for k, a in enumerate(axes) if a in (axis, None)]
             cross = [k for k in range(linear.shape[1]) if k not in own]
-            parts = {
-                "base": base,
+            parts = alike | {
                 "own": taps[:, :, own],
                 "cross": taps[:, :, cross],
-                "shape": shaped[:, :, own],
-                "product": _products(soft),
+                "shape": shaped[:, own],
                 "room": self._room(axis, soft),
-                "place": self._places(soft),
             }
-            flat = {g: p.reshape(len(p), -1) for g, p in parts.items()}
-            features.append(np.concatenate(list(flat.values()), axis=1))
-            groups.append(np.repeat(np.arange(len(GROUPS)), [f.shape[1] for f in flat.values()]))
+            flat = [parts[group].reshape(len(soft), -1) for group in GROUPS]
+            features.append(np.concatenate(flat, axis=1))
+            groups.append(np.repeat(np.arange(len(GROUPS)), [f.shape[1] for f in flat]))
         return features, groups
 
     def _commands(self) -> tuple[np.ndarray, np.ndarray, list[int | None]]:
@@ -225,14 +226,8 @@ class Response:
         if track.command_kind == "duty":
             duty = command / max(np.abs(command).max(), 1e-9)
             level = np.abs(duty)
-            nodes = np.r_[0.0, LEVELS, 1.0]
-            hats = [
-                np.interp(level, nodes, np.eye(len(nodes))[i]) for i in range(1, len(nodes) - 1)
-            ]
-            shapes = np.stack(
-                [(np.sign(duty) * h) @ MIXING.T for h in hats] + [level @ MIXING.T], -1
-            )
-            return duty @ MIXING.T, shapes, [0, 1, 2]
+            odd = np.sign(duty)[..., None] * hats(level, 0.0, 1.0, LEVELS)[..., 1:-1]
+            return duty @ MIXING.T, MIXING @ np.concatenate([odd, level[..., None]], -1), [0, 1, 2]
         used = np.flatnonzero(command.any(axis=0))
         linear = command[:, used] / np.maximum(np.abs(command[:, used]).max(axis=0), 1e-9)
         shapes = np.stack([linear * np.abs(linear), np.tanh(6 * linear), np.abs(linear)], -1)
@@ -248,19 +243,15 @@ class Response:
     def _averages(self, signal: np.ndarray) -> np.ndarray:
         """(M, n) held commands to (N, taps, n) means between each two edges before the middle."""
         t_s = self.data.measurement.track.command_t_s
-        area = np.vstack(
-            [np.zeros(signal.shape[1]), np.cumsum(signal[:-1] * np.diff(t_s)[:, None], 0)]
-        )
-        knots_s, areas = (
-            np.append(t_s, t_s[-1] + 1e3),
-            np.vstack([area, area[-1] + 1e3 * signal[-1]]),
-        )
-        at = self.middle_s[:, None] - self.edges_s
-        value = np.stack([np.interp(at, knots_s, a) for a in areas.T], axis=-1)
+        area = np.zeros_like(signal)
+        np.cumsum(signal[:-1] * np.diff(t_s)[:, None], axis=0, out=area[1:])
+        at_s = self.middle_s[:, None] - self.edges_s
+        k = np.maximum(np.searchsorted(t_s, at_s, side="right") - 1, 0)
+        value = area[k] + signal[k] * np.maximum(at_s - t_s[k], 0)[..., None]
         return (value[:, :-1] - value[:, 1:]) / np.diff(self.edges_s)[None, :, None]
 
     def _shaped(self, shapes: np.ndarray, linear: np.ndarray) -> np.ndarray:
-        """(N, k, n) of (M, n, k) shapes: of duties through lags, of others averaged over delays.
+        """(N, n, k) of (M, n, k) shapes: of duties through lags, of others averaged over delays.
 
         Of duties also the (M, n) linear commands while all wheels are told to stop.
         """
@@ -268,14 +259,13 @@ class Response:
         if track.command_kind != "duty":
             few = np.unique(np.linspace(0, len(self.edges_s) - 3, 5).astype(int))
             averaged = [self._averages(shapes[..., k])[:, few] for k in range(shapes.shape[2])]
-            return np.concatenate(averaged, axis=1)
+            return np.concatenate(averaged, axis=1).swapaxes(1, 2)
         held = self._held(shapes.reshape(len(shapes), -1))
-        lagged = [self._low_pass(held, f * self.lag_s) for f in HAT_LAGS]
-        at = np.stack([self._at(signal) for signal in lagged], axis=-1)
-        curve = at.reshape(len(at), shapes.shape[1], -1).transpose(0, 2, 1)
+        lagged = [self._at(self._low_pass(held, f * self.lag_s)) for f in HAT_LAGS]
+        curves = [at.reshape(len(at), *shapes.shape[1:]) for at in lagged]
         stopped = self._at((self._held(track.command) == 0).all(axis=1)[:, None].astype(float))
         late = stopped[:, :, None] * self._averages(linear)[:, :6]
-        return np.concatenate([curve, late], axis=1)
+        return np.concatenate([*curves, late.swapaxes(1, 2)], axis=2)
 
     @cached_property
     def _grid_s(self) -> np.ndarray:
@@ -292,9 +282,7 @@ class Response:
 
     def _at(self, signal: np.ndarray) -> np.ndarray:
         """(G, c) on the grid to (N, c) at the middles of the steps."""
-        place = np.clip((self.middle_s - self._grid_s[0]) / GRID_S, 0, len(self._grid_s) - 1.001)
-        k, part = place.astype(int), (place % 1)[:, None]
-        return signal[k] * (1 - part) + signal[k + 1] * part
+        return native.read_at(signal, (self.middle_s - self._grid_s[0]) / GRID_S)
 
     @staticmethod
     def _low_pass(signal: np.ndarray, lag_s: float) -> np.ndarray:

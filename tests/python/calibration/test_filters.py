@@ -35,6 +35,8 @@ def test_what_fades_evenly_does_what_lfilter_does():
 def test_what_is_forgotten_at_once_leaves_the_last_push():
     keep, pushes = np.array([0.5, 1.0, 0.0, 1.0]), np.array([1.0, 2.0, 4.0, 8.0])
     assert faded(keep, pushes) == pytest.approx([1, 3, 4, 12])
+    both = faded(np.stack([keep, keep[::-1]], -1), np.stack([pushes, pushes], -1))
+    assert both[:, 1] == pytest.approx([1, 2, 6, 11])
 
 
 @pytest.mark.parametrize("damping", [0.05, 0.7])
@@ -139,6 +141,18 @@ def test_turning_rates_turn_as_far_as_the_steps_add_up_to(drive):
     turned_rad = np.cumsum(velocity[:, 2] * step_s)
     expected = weight[:, 0] * (turned_rad[ENDS[:, 1]] - turned_rad[STARTS])
     assert found[:, 0] == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_signal_is_read_between_its_rows_and_goes_on_beyond_them():
+    values = np.random.default_rng(4).normal(size=(40, 3))
+    places = np.array([-2.0, 0.0, 0.25, 17.9, 60.0])
+    read = [np.interp(places, np.arange(40), v) for v in values.T]
+    assert native.read_at(values, places) == pytest.approx(np.column_stack(read), abs=0.01)
+    inside = places[1:4]
+    read = [np.interp(inside, np.arange(40), v) for v in values.T]
+    assert native.read_at(values, inside) == pytest.approx(np.column_stack(read), abs=1e-12)
+    with pytest.raises(ValueError, match="two rows"):
+        native.read_at(values[:1], places)
 
 
 def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
