@@ -134,6 +134,7 @@ class Response:
     Attributes:
         velocities: (3, N, 1 + K) forward, left, turning at points: of the fit to all, and without
             each fold.
+        features: of each group, which has a ridge of its own.
     """
 
     def __init__(
@@ -143,7 +144,7 @@ class Response:
         self.lag_s = max(SHORTEST_LAG_S, lag_s)
         self._choose_points()
         self.base_mps = base_mps[self.points]
-        self.features, self.groups = self._features(self.base_mps)
+        self.features = self._features(self.base_mps)
         self._index_windows()
         self.velocities = np.zeros((3, len(self.points), 1 + self.folds))
         self._fit(rms(data.measured), [None, None])
@@ -192,8 +193,8 @@ class Response:
 
     # -- features -------------------------------------------------------------------------------
 
-    def _features(self, base_mps: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Per body axis the (N, F) features and the (F,) number of their group."""
+    def _features(self, base_mps: np.ndarray) -> list[Features]:
+        """Those of each of GROUPS."""
         linear, shapes, axes = self._commands()
         taps = self._averages(linear)
         shaped = self._shaped(shapes, linear)
@@ -204,7 +205,7 @@ class Response:
             "product": _products(soft),
             "place": self._places(soft),
         }
-        features, groups = [], []
+        by_axis = []
         for axis in range(3):
             own = [k for k, a in enumerate(axes) if a in (axis, None)]
             cross = [k for k in range(linear.shape[1]) if k not in own]
@@ -214,10 +215,8 @@ class Response:
                 "shape": shaped[:, own],
                 "room": self._room(axis, soft),
             }
-            flat = [parts[group].reshape(len(soft), -1) for group in GROUPS]
-            features.append(np.concatenate(flat, axis=1))
-            groups.append(np.repeat(np.arange(len(GROUPS)), [f.shape[1] for f in flat]))
-        return features, groups
+            by_axis.append([parts[group].reshape(len(soft), -1) for group in GROUPS])
+        return list(zip(*by_axis, strict=True))
 
     def _commands(self) -> tuple[np.ndarray, np.ndarray, list[int | None]]:
         """(M, n) linear commands over their largest, (M, n, k) shapes, body axis of each."""
@@ -405,8 +404,9 @@ class Response:
             self.velocities[list(AXES[part])] = 0.0
             rows = self._rows(part, scale, self.data.measured)
             if rows is not None:
-                equations = Equations.of(self._led(part, rows, [self.features]), rows)
-                groups = np.concatenate([self.groups[axis] for axis in AXES[part]])
+                equations = Equations.of(self._led(part, rows, self.features), rows)
+                widths = [[f[axis].shape[1] for f in self.features] for axis in AXES[part]]
+                groups = np.concatenate([np.repeat(np.arange(len(w)), w) for w in widths])
                 self.ridges[part], *found = _ridge(equations, groups, self.ridges[part])
                 self._follow(part, np.vstack(found).T)
         self._judge()
@@ -502,13 +502,7 @@ class Response:
         A part of the motion that no group was chosen for is not fitted anew: it would gain other
         weights alone.
         """
-        first = len(self.ridges[0])
-        self.features, self.groups = list(self.features), list(self.groups)
-        for axis in {axis for c in chosen for axis in c.axes}:
-            added = [c.features[axis] for c in chosen]
-            numbers = [np.full(f.shape[1], first + k) for k, f in enumerate(added)]
-            self.features[axis] = np.hstack([self.features[axis], *added])
-            self.groups[axis] = np.concatenate([self.groups[axis], *numbers])
+        self.features = [*self.features, *(c.features for c in chosen)]
         ridges = [np.concatenate([own, [c.ridge for c in chosen]]) for own in self.ridges]
         parts = [k for k, axes in enumerate(AXES) if any(c.axes == axes for c in chosen)]
         self._fit(scale, ridges, parts)
@@ -546,10 +540,10 @@ class Response:
 
         Of all fits at once: one by one each goes through all features again.
         """
-        axes = list(AXES[part])
-        edges = np.cumsum([self.features[axis].shape[1] for axis in axes])
-        for axis, own in zip(axes, np.split(coefficients, edges[:-1]), strict=True):
-            self.velocities[axis] = self.features[axis] @ own
+        each = [(axis, f[axis]) for axis in AXES[part] for f in self.features]
+        edges = np.cumsum([f.shape[1] for _, f in each])
+        for (axis, f), own in zip(each, np.split(coefficients, edges[:-1]), strict=True):
+            self.velocities[axis] += f @ own
 
     def predict(self, velocities: Sequence[np.ndarray], which: np.ndarray) -> np.ndarray:
         """(W, H, 3) displacements, the heading integrated by the response itself.
