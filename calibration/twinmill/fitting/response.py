@@ -197,7 +197,7 @@ class Response:
         """Those of each of GROUPS."""
         linear, shapes, axes = self._commands()
         taps = self._averages(linear)
-        shaped = self._shaped(shapes, linear)
+        shaped = self._shaped(shapes, taps)
         near = self.edges_s[1:] <= NEAR_S
         soft = taps[:, near].mean(axis=1)
         alike = {
@@ -249,10 +249,10 @@ class Response:
         value = area[k] + signal[k] * np.maximum(at_s - t_s[k], 0)[..., None]
         return (value[:, :-1] - value[:, 1:]) / np.diff(self.edges_s)[None, :, None]
 
-    def _shaped(self, shapes: np.ndarray, linear: np.ndarray) -> np.ndarray:
+    def _shaped(self, shapes: np.ndarray, taps: np.ndarray) -> np.ndarray:
         """(N, n, k) of (M, n, k) shapes: of duties through lags, of others averaged over delays.
 
-        Of duties also the (M, n) linear commands while all wheels are told to stop.
+        Of duties also (N, taps, n) averages of the commands while all wheels are told to stop.
         """
         track = self.data.measurement.track
         if track.command_kind != "duty":
@@ -263,7 +263,7 @@ class Response:
         lagged = [self._at(self._low_pass(held, f * self.lag_s)) for f in HAT_LAGS]
         curves = [at.reshape(len(at), *shapes.shape[1:]) for at in lagged]
         stopped = self._at((self._held(track.command) == 0).all(axis=1)[:, None].astype(float))
-        late = stopped[:, :, None] * self._averages(linear)[:, :6]
+        late = stopped[:, :, None] * taps[:, :6]
         return np.concatenate([*curves, late.swapaxes(1, 2)], axis=2)
 
     @cached_property
