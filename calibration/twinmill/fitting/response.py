@@ -47,7 +47,7 @@ FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
 WORTH_HALVING = 16  # features in half of a matrix
-WIDE = 64  # features whose rows are made at once
+WIDE = 32  # features whose rows are made at once
 AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
 MEMORY_S = 0.3  # between errors that are independent
