@@ -536,7 +536,7 @@ class Response:
         return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
     def _follow(self, part: int, coefficients: np.ndarray) -> None:
-        """Velocities of the plane or of turning by (F, 1 + K) coefficients of its features.
+        """Velocities of the plane or of turning, 0 so far, by (F, 1 + K) coefficients of features.
 
         Of all fits at once: one by one each goes through all features again.
         """
