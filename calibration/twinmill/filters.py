@@ -51,5 +51,6 @@ def swung(
 
 
 def faded(keep: np.ndarray, pushes: np.ndarray) -> np.ndarray:
-    """(N,) y[n] = keep[n] y[n - 1] + pushes[n], from rest."""
-    return native.faded(keep, pushes)
+    """(N, ...) y[n] = keep[n] y[n - 1] + pushes[n], from rest."""
+    flat = (np.ascontiguousarray(a).reshape(len(a), -1) for a in (keep, pushes))
+    return native.faded(*flat).reshape(keep.shape)

@@ -19,6 +19,7 @@ namespace
 {
 
 constexpr size_t kNoPlace = SIZE_MAX;
+constexpr size_t kRows = 16;  // that are made at once
 
 // By row of values: 0 where a list has its number, else kNoPlace.
 std::vector<size_t> Wanted(size_t count, std::initializer_list<std::span<const int64_t>> lists)
@@ -36,57 +37,64 @@ std::vector<size_t> Wanted(size_t count, std::initializer_list<std::span<const i
 // Columns (N, m k): each of the second's m signals times each of the first's k gains.
 using Product = std::pair<Matrix, Matrix>;
 
-size_t WidthOf(const Product &product)
+// Several products side by side, written for some rows at once.
+class Columns
 {
-    return product.first.shape(1) * product.second.shape(1);
-}
-
-// Of all columns side by side.
-size_t WidthOf(const std::vector<Product> &products, size_t count)
-{
-    size_t width = 0;
-    for (const Product &product : products)
+public:
+    Columns(const std::vector<Product> &products, size_t count) : products_(products)
     {
-        if (product.first.shape(0) != count || product.second.shape(0) != count)
-            throw std::invalid_argument("steps must be as many as rows of gains and of signals");
-        width += WidthOf(product);
+        for (const auto &[gains, signals] : products)
+        {
+            if (gains.shape(0) != count || signals.shape(0) != count)
+                throw std::invalid_argument(
+                    "steps must be as many as rows of gains and of signals");
+            width_ += gains.shape(1) * signals.shape(1);
+        }
     }
-    return width;
-}
 
-// Adds a row of several products to sums, one after the other for each share.
-double *AddRow(const std::vector<Product> &products, size_t n, std::span<const double> shares,
-               double *sum)
-{
-    for (const auto &[gains, signals] : products)
-    {
-        const size_t width = gains.shape(1), count = signals.shape(1);
-        const double *gain = gains.data() + n * width, *signal = signals.data() + n * count;
-        for (const double share : shares)
-            for (size_t k = 0; k < count; ++k, sum += width)
-                for (size_t f = 0; f < width; ++f)
-                    sum[f] += share * (gain[f] * signal[k]);
-    }
-    return sum;
-}
+    size_t Width() const { return width_; }
 
-// Writes what lies between two sums, along a direction.
-double *WriteBetween(const std::vector<Product> &products, const double *&from, const double *&to,
-                     std::span<const double> direction, double *out)
-{
-    for (const Product &product : products)
+    // Rows first to last, so many values apart.
+    void Write(size_t first, size_t last, size_t apart, double *out) const
     {
-        const size_t width = WidthOf(product);
-        for (size_t f = 0; f < width; ++f)
-            out[f] = direction[0] * (to[f] - from[f]);
-        for (size_t k = 1; k < direction.size(); ++k)
-            for (size_t f = 0; f < width; ++f)
-                out[f] += direction[k] * (to[k * width + f] - from[k * width + f]);
-        from += direction.size() * width;
-        to += direction.size() * width;
-        out += width;
+        for (const auto &[gains, signals] : products_)
+        {
+            const size_t width = gains.shape(1), count = signals.shape(1);
+            const double *gain = gains.data() + first * width;
+            const double *signal = signals.data() + first * count;
+            double *row = out;
+            for (size_t n = first; n < last; ++n, gain += width, signal += count, row += apart)
+                for (size_t k = 0; k < count; ++k)
+                    Times(gain, width, signal[k], row + k * width);
+            out += width * count;
+        }
     }
-    return out;
+
+private:
+    // Two at a time: most gains are pairs, a cosine and a sine.
+    static void Times(const double *gain, size_t width, double signal, double *out)
+    {
+        size_t f = 0;
+        for (; f + 2 <= width; f += 2)
+        {
+            out[f] = gain[f] * signal;
+            out[f + 1] = gain[f + 1] * signal;
+        }
+        if (f < width)
+            out[f] = gain[f] * signal;
+    }
+
+    const std::vector<Product> &products_;
+    size_t width_ = 0;
+};
+
+// Writes what lies between two sums of a count of values, of each along both axes of the plane,
+// the second axis' so many places behind: along a direction.
+void WriteBetween(const double *from, const double *to, size_t count, size_t behind, double x,
+                  double y, double *out)
+{
+    for (size_t f = 0; f < count; ++f)
+        out[f] = x * (to[f] - from[f]) + y * (to[behind + f] - from[behind + f]);
 }
 
 // How far velocities lead a robot along a direction of the plane, from each start to its end; or
@@ -99,29 +107,47 @@ Array LedBetween(const std::vector<Product> &forward, const std::vector<Product>
         throw std::invalid_argument("steps must have two columns, or for turning one");
     if (ends.size() != rows || direction.shape(0) != rows || direction.shape(1) != ways)
         throw std::invalid_argument("ends and directions must be as many as starts, and as steps");
-    const size_t width = WidthOf(forward, count) + WidthOf(left, count);
+    const Columns before(forward, count), beside(left, count);
+    const size_t ahead = before.Width(), aside = beside.Width(), width = ahead + aside;
     std::vector<size_t> place = Wanted(count, {Span(starts), Span(ends)});
-    std::vector<double> sums, row(ways * width);
-    sums.reserve(row.size() * static_cast<size_t>(std::ranges::count(place, 0U)));
+    std::vector<double> some(kRows * width), sums(ways * width), kept;
+    kept.reserve(sums.size() * static_cast<size_t>(std::ranges::count(place, 0U)));
     for (size_t n = 0; n < count; ++n)
     {
-        const std::span<const double> ahead(steps.data() + ways * n, ways);
-        double *aside = AddRow(forward, n, ahead, row.data());
-        if (!left.empty())
-            AddRow(left, n, std::array{-ahead[1], ahead[0]}, aside);
+        if (n % kRows == 0)
+        {
+            const size_t last = std::min(n + kRows, count);
+            before.Write(n, last, width, some.data());
+            beside.Write(n, last, width, some.data() + ahead);
+        }
+        const double *row = some.data() + n % kRows * width;
+        for (size_t k = 0; k < ways; ++k)
+        {
+            const double step = steps.data()[ways * n + k];
+            double *sum = sums.data() + k * width;
+            for (size_t f = 0; f < width; ++f)
+                sum[f] += step * row[f];
+        }
         if (place[n] == kNoPlace)
             continue;
-        place[n] = sums.size();
-        sums.insert(sums.end(), row.begin(), row.end());
+        place[n] = kept.size();
+        kept.insert(kept.end(), sums.begin(), sums.end());
     }
     auto led = std::make_unique_for_overwrite<double[]>(rows * width);
     for (size_t r = 0; r < rows; ++r)
     {
-        const double *from = sums.data() + place[static_cast<size_t>(starts.data()[r])];
-        const double *to = sums.data() + place[static_cast<size_t>(ends.data()[r])];
-        const std::span<const double> along(direction.data() + ways * r, ways);
-        WriteBetween(left, from, to, along,
-                     WriteBetween(forward, from, to, along, led.get() + r * width));
+        const double *from = kept.data() + place[static_cast<size_t>(starts.data()[r])];
+        const double *to = kept.data() + place[static_cast<size_t>(ends.data()[r])];
+        const double *along = direction.data() + ways * r;
+        double *out = led.get() + r * width;
+        if (ways == 2)
+        {
+            WriteBetween(from, to, ahead, width, along[0], along[1], out);
+            WriteBetween(from + ahead, to + ahead, aside, width, along[1], -along[0], out + ahead);
+        }
+        else
+            for (size_t f = 0; f < width; ++f)
+                out[f] = along[0] * (to[f] - from[f]);
     }
     return ToNumpy(std::move(led), {rows, width});
 }
@@ -349,6 +375,24 @@ struct Between
     }
 };
 
+// (K, C) of a signal (G, C) at places (K,).
+Array ReadAt(Matrix signal, Vector places)
+{
+    const size_t rows = signal.shape(0), width = signal.shape(1);
+    if (rows < 2)
+        throw std::invalid_argument("the signal must have two rows or more");
+    auto values = std::make_unique_for_overwrite<double[]>(places.size() * width);
+    double *value = values.get();
+    for (const double place : Span(places))
+    {
+        const Between here(place, rows);
+        const double *from = signal.data() + here.row * width, *to = from + width;
+        for (size_t c = 0; c < width; ++c)
+            *value++ = from[c] * (1 - here.part) + to[c] * here.part;
+    }
+    return ToNumpy(std::move(values), {places.size(), width});
+}
+
 constexpr size_t kBeside = 3;  // columns beside a signal
 
 // Sums over places of squares of kBeside of a signal's columns, the first of which is `first` (G,
@@ -426,15 +470,20 @@ Array Filtered(Vector numerator, Vector denominator, Matrix signal)
     return ToNumpy(std::move(out), {count, width});
 }
 
-Array Faded(Vector keep, Vector pushes)
+Array Faded(Matrix keep, Matrix pushes)
 {
-    if (keep.size() != pushes.size())
+    const size_t count = pushes.shape(0), width = pushes.shape(1);
+    if (keep.shape(0) != count || keep.shape(1) != width)
         throw std::invalid_argument("there must be as many shares as pushes");
-    std::vector<double> out(pushes.size());
-    double last = 0;
-    for (size_t n = 0; n < out.size(); ++n)
-        out[n] = last = keep.data()[n] * last + pushes.data()[n];
-    return ToNumpy(std::move(out), {pushes.size()});
+    auto faded = std::make_unique_for_overwrite<double[]>(count * width);
+    std::vector<double> last(width);
+    for (size_t n = 0; n < count; ++n)
+        for (size_t f = 0; f < width; ++f)
+        {
+            const size_t at = n * width + f;
+            faded[at] = last[f] = keep.data()[at] * last[f] + pushes.data()[at];
+        }
+    return ToNumpy(std::move(faded), {count, width});
 }
 
 Array Held(Vector values, double least)
@@ -486,6 +535,56 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
     return ToNumpy(std::move(out), {pushes.size(), 2});
 }
 
+// Solves the count equations in rows of count + 1, the last of each the right side: of a definite
+// matrix, whose upper half alone is looked at.
+void Eliminate(std::span<double> rows, size_t count, double *solution)
+{
+    const size_t width = count + 1;
+    for (size_t j = 0; j < count; ++j)
+    {
+        const double *pivot = rows.data() + j * width;
+        for (size_t i = j + 1; i < count; ++i)
+        {
+            const double share = pivot[i] / pivot[j];
+            double *row = rows.data() + i * width;
+            for (size_t k = i; k < width; ++k)
+                row[k] -= share * pivot[k];
+        }
+    }
+    for (size_t j = count; j-- > 0;)
+    {
+        const double *row = rows.data() + j * width;
+        double left = row[count];
+        for (size_t k = j + 1; k < count; ++k)
+            left -= row[k] * solution[k];
+        solution[j] = left / row[j];
+    }
+}
+
+Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
+{
+    const size_t matrices = grams.shape(0), count = grams.shape(1), trials = rises.shape(1);
+    if (grams.shape(2) != count || rises.shape(0) != matrices || moments.shape(0) != matrices ||
+        moments.shape(1) != count)
+        throw std::invalid_argument(
+            "there must be rises and a moment of each square matrix, and as long as its rows");
+    std::vector<double> rows(count * (count + 1));
+    auto solved = std::make_unique_for_overwrite<double[]>(matrices * trials * count);
+    for (size_t m = 0; m < matrices; ++m)
+        for (size_t t = 0; t < trials; ++t)
+        {
+            for (size_t i = 0; i < count; ++i)
+            {
+                double *row = rows.data() + i * (count + 1);
+                std::copy_n(grams.data() + (m * count + i) * count, count, row);
+                row[i] += rises.data()[m * trials + t];
+                row[count] = moments.data()[m * count + i];
+            }
+            Eliminate(rows, count, solved.get() + (m * trials + t) * count);
+        }
+    return ToNumpy(std::move(solved), {matrices, trials, count});
+}
+
 }  // namespace
 
 void BindSeries(nb::module_ &m)
@@ -499,7 +598,7 @@ void BindSeries(nb::module_ &m)
     m.def("filtered", &Filtered, "numerator"_a, "denominator"_a, "signal"_a,
           "(N, F) of a recursive filter that begins at rest.");
     m.def("faded", &Faded, "keep"_a, "pushes"_a,
-          "(N,) y[n] = keep[n] y[n - 1] + pushes[n], from rest.");
+          "(N, F) y[n] = keep[n] y[n - 1] + pushes[n], from rest.");
     m.def("held", &Held, "values"_a, "least"_a,
           "(N,) values of which changes below a least one are not taken, from 0.");
     m.def("wound", &Wound, "way"_a, "most"_a,
@@ -509,11 +608,16 @@ void BindSeries(nb::module_ &m)
           "(2, N, C) value and slope of a line by least squares around each time (N,), of columns "
           "(N, C): of times within a half width and `reach` rows, in one segment (N,); NaN where "
           "that is below 0, the slope where a time stands alone, too.");
+    m.def("read_at", &ReadAt, "signal"_a, "places"_a,
+          "(K, C) what a signal (G, C) is at places (K,) between its rows.");
     m.def(
         "sums_by_shift", &SumsByShift, "signal"_a, "places"_a, "shifts"_a, "beside"_a, "begins"_a,
         "(2, S, B, C) sums over stretches of places (K,), which begin at `begins` (B,), of what a "
         "signal (G, C) is at places less `shifts` (S,): of its squares, and of its products with "
         "the columns `beside` (K, 3), over and over.");
+    m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
+          "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
+          "its diagonal and definite then, for right sides (M, F).");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
           "push.");

@@ -12,6 +12,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.fitting.settings import FLOOR_SETTINGS
 
@@ -110,24 +111,24 @@ class _Alike:
             push: (K, all features) moments of the rows inside each part.
             pull: of those that do not touch it.
         """
-        push, pull = (self._own(m)[:, :, None] for m in (push, pull))
-        rise = self.mean[:, None] * LADDER
-        beta = _solved(self.others[:, :, None], rise[:, None], pull)  # (L, K, ridges, F)
-        return np.einsum("lkrf,lkrf->lr", beta, 2 * push - beta @ self.inside)
+        push, pull = (self._own(m) for m in (push, pull))
+        each = zip(self.others, self.mean, pull, strict=True)
+        beta = np.array([at_ridges(gram, mean * LADDER, own) for gram, mean, own in each])
+        return np.einsum("lkrf,lkrf->lr", beta, 2 * push[:, :, None] - beta @ self.inside)
 
     def fitted(self, k: int, pull: np.ndarray, ridge: float) -> np.ndarray:
         """(K, F) coefficients of the k-th without each part."""
-        return _solved(self.others[k], self.mean[k] * ridge, self._own(pull)[k])
+        return at_ridges(self.others[k], self.mean[k] * np.array([ridge]), self._own(pull)[k])[:, 0]
 
     def _own(self, moments: np.ndarray) -> np.ndarray:
         """(L, K, F) of (K, all features)."""
         return moments[:, self.columns].swapaxes(0, 1)
 
 
-def _solved(gram: np.ndarray, ridge: np.ndarray | float, moment: np.ndarray) -> np.ndarray:
-    """(..., F) coefficients at some ridges (...)."""
-    rise = np.asarray(ridge)[..., None, None] * np.eye(gram.shape[-1])
-    return np.linalg.solve(gram + rise, moment[..., None])[..., 0]
+def at_ridges(grams: np.ndarray, ridges: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """(K, V, F) coefficients by (K, F, F) products and (K, F) moments, at each of V ridges."""
+    rises = np.repeat(ridges[None], len(grams), axis=0)
+    return native.solved_risen(np.ascontiguousarray(grams), rises, np.ascontiguousarray(moments))
 
 
 class Learners:

@@ -16,7 +16,7 @@ from itertools import pairwise, product
 import numpy as np
 import twinmill_native as native
 
-from twinmill.filters import filtered
+from twinmill.filters import faded, filtered
 from twinmill.fitting.wheel_angles import Wheel
 from twinmill.model.parameters import (
     MOTION_STAGES,
@@ -90,7 +90,7 @@ class Motion:
             middles = np.linspace(low, high, PLACES)
             width_m = max(middles[1] - middles[0], 0.1)
             bells.append(np.exp(-(((axis[:, None] - middles) / width_m) ** 2)))
-            strips.append(_hats(axis, low, high, STRIPS))
+            strips.append(hats(axis, low, high, STRIPS))
         x, y = bells
         return (x[:, :, None] * y[:, None, :]).reshape(len(axis), -1), np.hstack(strips)
 
@@ -145,10 +145,10 @@ def _single(motion: Motion) -> Iterator[Features]:
     head = _harmonics(motion.heading_rad)
     always = np.hstack([np.ones((len(head), 1)), head])
     turned = np.cumsum(motion.base[:, 2] * motion.step_s)
-    hours = _hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
+    hours = hats(motion.t_s, motion.t_s.min(), motion.t_s.max(), _count(motion.t_s, 6.0, 24))
     yield from _by_place(motion)
     yield from _courses(motion)
-    for gain in (head, hours, _hats(turned, turned.min(), turned.max(), TURNED)):
+    for gain in (head, hours, hats(turned, turned.min(), turned.max(), TURNED)):
         yield _scaled(motion, gain)
     for gain in (always, *motion.where, hours):
         yield from _drifts(motion, gain)
@@ -372,19 +372,10 @@ def lags_that_change(told: np.ndarray, lag_s: float, motion: Motion) -> Iterator
     least, most = np.log(lag_s * np.array(list(product(LAGS, LAGS)))).T
     times_s = np.exp(least + (most - least) * shares[..., None])  # (N, sizes, 3, pairs)
     keep = np.exp(-even_step_s(motion.step_s) / times_s)
-    behind = _following(told[:, None, :, None], keep) - base[:, None, :, None]
+    behind = faded(keep, (1 - keep) * told[:, None, :, None]) - base[:, None, :, None]
     for own in behind.swapaxes(0, 1):
         forward, left, turning = np.ascontiguousarray(own.swapaxes(0, 1))
         yield [(forward, left, turning)]
-
-
-def _following(told: np.ndarray, keep: np.ndarray) -> np.ndarray:
-    """(N, ...) what follows told values, and in each step keeps (N, ...) shares of what it had."""
-    out, now = np.empty_like(keep), np.zeros(keep.shape[1:])
-    for own, share, fresh in zip(out, keep, (1 - keep) * told, strict=True):
-        now = now * share + fresh
-        own[:] = now
-    return out
 
 
 def missing(told: np.ndarray, usual: float) -> np.ndarray:
@@ -471,10 +462,11 @@ def _waves(along: np.ndarray, shortest: float) -> Iterator[np.ndarray]:
 
 def _levels(size: np.ndarray) -> np.ndarray:
     """(N, CURVE - 1) hats over a speed, 0 at rest."""
-    return _hats(size, 0.0, max(size.max(), 1e-9), CURVE)[:, 1:]
+    return hats(size, 0.0, max(size.max(), 1e-9), CURVE)[:, 1:]
 
 
-def _hats(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
-    """(N, count) weights of linear interpolation between even nodes."""
-    nodes = np.linspace(low, max(high, low + 1e-9), count)
-    return np.stack([np.interp(values, nodes, one) for one in np.eye(count)], axis=-1)
+def hats(values: np.ndarray, low: float, high: float, count: int) -> np.ndarray:
+    """(..., count) weights of linear interpolation between even nodes."""
+    last = count - 1
+    place = np.clip((values - low) * (last / max(high - low, 1e-9)), 0, last)
+    return np.maximum(1 - np.abs(place[..., None] - np.arange(count)), 0)

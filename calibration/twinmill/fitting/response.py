@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -25,8 +24,8 @@ from twinmill.filters import filtered
 from twinmill.fitting import wheel_angles
 from twinmill.fitting.beat import HORIZONS as BEAT_HORIZONS
 from twinmill.fitting.beat import beat_radps
-from twinmill.fitting.boosting import Learners, Parts, boosted, squares
-from twinmill.fitting.dependence import Features, Group, Motion, Product, even_step_s
+from twinmill.fitting.boosting import Learners, Parts, at_ridges, boosted, squares
+from twinmill.fitting.dependence import Features, Group, Motion, Product, even_step_s, hats
 from twinmill.fitting.independence import independent_shares
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.predict.datasets import Trajectory
@@ -36,7 +35,7 @@ from twinmill.predict.windows import EVERY_S, difference, rms
 EDGES_S = np.array([0.0, 0.03, 0.07, 0.12, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
 COARSE_S = np.array([0.0, 0.07, 0.18, 0.26, 0.36, 0.50, 0.70, 1.0, 1.5])
 SLOW_POSES_S = 0.1
-LEVELS = np.arange(0.05, 0.951, 0.05)  # peaks of the hats over the duty
+LEVELS = 21  # of the duty, even; each is the peak of a hat but the lowest and the highest
 HAT_LAGS = (0.5, 1.0, 1.8)  # times the base's lag
 BASE_LAGS_S = (0.0, 0.1, 0.3)
 SHORTEST_LAG_S = 0.03
@@ -47,16 +46,13 @@ GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
-WIDE = 64  # features whose rows are made at once
+WORTH_HALVING = 16  # features in half of a matrix
+WIDE = 32  # features whose rows are made at once
 AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
 MEMORY_S = 0.3  # between errors that are independent
 PLACE_SCALE_M = 2.0
 MIXING = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # of four mecanum wheels
-
-
-# (F,) coefficients of all rows and (K, F) without each fold.
-Coefficients = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -134,6 +130,11 @@ class Response:
         base_mps: (N, 3) velocity of the base model at each pose, refitted to this log.
         lag_s: of that base.
         offset_s: capture's clock less the robot's.
+
+    Attributes:
+        velocities: (3, N, 1 + K) forward, left, turning at points: of the fit to all, and without
+            each fold.
+        features: of each group, which has a ridge of its own.
     """
 
     def __init__(
@@ -143,9 +144,9 @@ class Response:
         self.lag_s = max(SHORTEST_LAG_S, lag_s)
         self._choose_points()
         self.base_mps = base_mps[self.points]
-        self.features, self.groups = self._features(self.base_mps)
+        self.features = self._features(self.base_mps)
         self._index_windows()
-        self.coefficients: list[Coefficients | None] = [None, None]
+        self.velocities = np.zeros((3, len(self.points), 1 + self.folds))
         self._fit(rms(data.measured), [None, None])
         self._fit(self.errors, self.ridges)
         self.unboosted = self.across
@@ -192,31 +193,30 @@ class Response:
 
     # -- features -------------------------------------------------------------------------------
 
-    def _features(self, base_mps: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Per body axis the (N, F) features and the (F,) number of their group."""
+    def _features(self, base_mps: np.ndarray) -> list[Features]:
+        """Those of each of GROUPS."""
         linear, shapes, axes = self._commands()
         taps = self._averages(linear)
-        shaped = self._shaped(shapes, linear)
+        shaped = self._shaped(shapes, taps)
         near = self.edges_s[1:] <= NEAR_S
         soft = taps[:, near].mean(axis=1)
-        base = self._lagged_base(base_mps)
-        features, groups = [], []
+        alike = {
+            "base": self._lagged_base(base_mps),
+            "product": _products(soft),
+            "place": self._places(soft),
+        }
+        by_axis = []
         for axis in range(3):
             own = [k for k, a in enumerate(axes) if a in (axis, None)]
             cross = [k for k in range(linear.shape[1]) if k not in own]
-            parts = {
-                "base": base,
+            parts = alike | {
                 "own": taps[:, :, own],
                 "cross": taps[:, :, cross],
-                "shape": shaped[:, :, own],
-                "product": _products(soft),
+                "shape": shaped[:, own],
                 "room": self._room(axis, soft),
-                "place": self._places(soft),
             }
-            flat = {g: p.reshape(len(p), -1) for g, p in parts.items()}
-            features.append(np.concatenate(list(flat.values()), axis=1))
-            groups.append(np.repeat(np.arange(len(GROUPS)), [f.shape[1] for f in flat.values()]))
-        return features, groups
+            by_axis.append([parts[group].reshape(len(soft), -1) for group in GROUPS])
+        return list(zip(*by_axis, strict=True))
 
     def _commands(self) -> tuple[np.ndarray, np.ndarray, list[int | None]]:
         """(M, n) linear commands over their largest, (M, n, k) shapes, body axis of each."""
@@ -225,14 +225,8 @@ class Response:
         if track.command_kind == "duty":
             duty = command / max(np.abs(command).max(), 1e-9)
             level = np.abs(duty)
-            nodes = np.r_[0.0, LEVELS, 1.0]
-            hats = [
-                np.interp(level, nodes, np.eye(len(nodes))[i]) for i in range(1, len(nodes) - 1)
-            ]
-            shapes = np.stack(
-                [(np.sign(duty) * h) @ MIXING.T for h in hats] + [level @ MIXING.T], -1
-            )
-            return duty @ MIXING.T, shapes, [0, 1, 2]
+            odd = np.sign(duty)[..., None] * hats(level, 0.0, 1.0, LEVELS)[..., 1:-1]
+            return duty @ MIXING.T, MIXING @ np.concatenate([odd, level[..., None]], -1), [0, 1, 2]
         used = np.flatnonzero(command.any(axis=0))
         linear = command[:, used] / np.maximum(np.abs(command[:, used]).max(axis=0), 1e-9)
         shapes = np.stack([linear * np.abs(linear), np.tanh(6 * linear), np.abs(linear)], -1)
@@ -248,34 +242,29 @@ class Response:
     def _averages(self, signal: np.ndarray) -> np.ndarray:
         """(M, n) held commands to (N, taps, n) means between each two edges before the middle."""
         t_s = self.data.measurement.track.command_t_s
-        area = np.vstack(
-            [np.zeros(signal.shape[1]), np.cumsum(signal[:-1] * np.diff(t_s)[:, None], 0)]
-        )
-        knots_s, areas = (
-            np.append(t_s, t_s[-1] + 1e3),
-            np.vstack([area, area[-1] + 1e3 * signal[-1]]),
-        )
-        at = self.middle_s[:, None] - self.edges_s
-        value = np.stack([np.interp(at, knots_s, a) for a in areas.T], axis=-1)
+        area = np.zeros_like(signal)
+        np.cumsum(signal[:-1] * np.diff(t_s)[:, None], axis=0, out=area[1:])
+        at_s = self.middle_s[:, None] - self.edges_s
+        k = np.maximum(np.searchsorted(t_s, at_s, side="right") - 1, 0)
+        value = area[k] + signal[k] * np.maximum(at_s - t_s[k], 0)[..., None]
         return (value[:, :-1] - value[:, 1:]) / np.diff(self.edges_s)[None, :, None]
 
-    def _shaped(self, shapes: np.ndarray, linear: np.ndarray) -> np.ndarray:
-        """(N, k, n) of (M, n, k) shapes: of duties through lags, of others averaged over delays.
+    def _shaped(self, shapes: np.ndarray, taps: np.ndarray) -> np.ndarray:
+        """(N, n, k) of (M, n, k) shapes: of duties through lags, of others averaged over delays.
 
-        Of duties also the (M, n) linear commands while all wheels are told to stop.
+        Of duties also (N, taps, n) averages of the commands while all wheels are told to stop.
         """
         track = self.data.measurement.track
         if track.command_kind != "duty":
             few = np.unique(np.linspace(0, len(self.edges_s) - 3, 5).astype(int))
             averaged = [self._averages(shapes[..., k])[:, few] for k in range(shapes.shape[2])]
-            return np.concatenate(averaged, axis=1)
+            return np.concatenate(averaged, axis=1).swapaxes(1, 2)
         held = self._held(shapes.reshape(len(shapes), -1))
-        lagged = [self._low_pass(held, f * self.lag_s) for f in HAT_LAGS]
-        at = np.stack([self._at(signal) for signal in lagged], axis=-1)
-        curve = at.reshape(len(at), shapes.shape[1], -1).transpose(0, 2, 1)
+        lagged = [self._at(self._low_pass(held, f * self.lag_s)) for f in HAT_LAGS]
+        curves = [at.reshape(len(at), *shapes.shape[1:]) for at in lagged]
         stopped = self._at((self._held(track.command) == 0).all(axis=1)[:, None].astype(float))
-        late = stopped[:, :, None] * self._averages(linear)[:, :6]
-        return np.concatenate([curve, late], axis=1)
+        late = stopped[:, :, None] * taps[:, :6]
+        return np.concatenate([*curves, late.swapaxes(1, 2)], axis=2)
 
     @cached_property
     def _grid_s(self) -> np.ndarray:
@@ -292,9 +281,7 @@ class Response:
 
     def _at(self, signal: np.ndarray) -> np.ndarray:
         """(G, c) on the grid to (N, c) at the middles of the steps."""
-        place = np.clip((self.middle_s - self._grid_s[0]) / GRID_S, 0, len(self._grid_s) - 1.001)
-        k, part = place.astype(int), (place % 1)[:, None]
-        return signal[k] * (1 - part) + signal[k + 1] * part
+        return native.read_at(signal, (self.middle_s - self._grid_s[0]) / GRID_S)
 
     @staticmethod
     def _low_pass(signal: np.ndarray, lag_s: float) -> np.ndarray:
@@ -406,28 +393,29 @@ class Response:
     def _fit(
         self, scale: np.ndarray, ridges: list[np.ndarray | None], parts: Sequence[int] = (0, 1)
     ) -> None:
-        """Coefficients with the errors (H, 3) of another fit as weights.
+        """Velocities with the errors (H, 3) of another fit as weights; 0 where nothing tells them.
 
-        They are of the plane and of turning, None where nothing tells them. Those of a part that is
-        not fitted stay.
+        Those of a part of the motion, the plane or turning, that is not fitted stay.
         """
         first = np.array([FIRST_RIDGE.get(g, OUT) for g in GROUPS])
         self.ridges = [first if ridge is None else ridge for ridge in ridges]
-        self.coefficients = [None if k in parts else c for k, c in enumerate(self.coefficients)]
+        self.velocities = self.velocities.copy()
         for part in parts:
+            self.velocities[list(AXES[part])] = 0.0
             rows = self._rows(part, scale, self.data.measured)
             if rows is not None:
-                equations = Equations.of(self._led(part, rows, [self.features]), rows)
-                groups = np.concatenate([self.groups[axis] for axis in AXES[part]])
+                equations = Equations.of(self._led(part, rows, self.features), rows)
+                widths = [[f[axis].shape[1] for f in self.features] for axis in AXES[part]]
+                groups = np.concatenate([np.repeat(np.arange(len(w)), w) for w in widths])
                 self.ridges[part], *found = _ridge(equations, groups, self.ridges[part])
-                self.coefficients[part] = found
+                self._follow(part, np.vstack(found).T)
         self._judge()
 
     @property
     def motion(self) -> Motion:
         """At each point, as fitted so far."""
         return Motion(
-            velocity=self.velocities()[0],
+            velocity=self.velocities[..., 0].T.copy(),
             base=self.base_mps,
             pose=self.pose,
             heading_rad=self.heading_rad,
@@ -514,13 +502,7 @@ class Response:
         A part of the motion that no group was chosen for is not fitted anew: it would gain other
         weights alone.
         """
-        first = len(self.ridges[0])
-        self.features, self.groups = list(self.features), list(self.groups)
-        for axis in {axis for c in chosen for axis in c.axes}:
-            added = [c.features[axis] for c in chosen]
-            numbers = [np.full(f.shape[1], first + k) for k, f in enumerate(added)]
-            self.features[axis] = np.hstack([self.features[axis], *added])
-            self.groups[axis] = np.concatenate([self.groups[axis], *numbers])
+        self.features = [*self.features, *(c.features for c in chosen)]
         ridges = [np.concatenate([own, [c.ridge for c in chosen]]) for own in self.ridges]
         parts = [k for k, axes in enumerate(AXES) if any(c.axes == axes for c in chosen)]
         self._fit(scale, ridges, parts)
@@ -532,18 +514,18 @@ class Response:
             scale: (H, 3) errors that count as one.
         """
         left = self.data.measured.copy()
-        for part, found in enumerate(self.coefficients):
+        for part in range(len(AXES)):
             rows = self._rows(part, scale, left)
-            if found is None or rows is None:
-                continue
-            x = self._led(part, rows, [self.features])
-            made = [x[own] @ one for own, one in zip(rows.parts.slices, found[1], strict=True)]
-            left[tuple(rows.at)] -= np.concatenate(made) / rows.weight
+            if rows is not None:
+                led = self._led(part, rows, [self.velocities])
+                of_axes = led.reshape(len(led), -1, self.velocities.shape[2])
+                made = of_axes[np.arange(len(led)), :, 1 + rows.parts.inside].sum(axis=1)
+                left[tuple(rows.at)] -= made / rows.weight
         return left
 
     def _judge(self) -> None:
         """Errors of the stages so far: fitted to all, and to other blocks."""
-        whole, *without = self.velocities()
+        whole, *without = self.velocities.transpose(2, 1, 0)
         everything = np.zeros(len(self.starts), int)
         self.within = difference(self.data.measured, self.predict([whole], everything))
         self.across = difference(self.data.measured, self.predict(without, self.fold))
@@ -553,21 +535,15 @@ class Response:
         """(H, 3) between those of the fit to all, too small, and those on left-out parts."""
         return np.sqrt((rms(self.within) ** 2 + rms(self.across) ** 2) / 2)
 
-    def velocities(self) -> np.ndarray:
-        """(1 + K, N, 3) forward, left, turning at points: of the fit to all, and without each fold.
+    def _follow(self, part: int, coefficients: np.ndarray) -> None:
+        """Velocities of the plane or of turning, 0 so far, by (F, 1 + K) coefficients of features.
 
         Of all fits at once: one by one each goes through all features again.
         """
-        found = np.zeros((1 + self.folds, len(self.step_s), 3))
-        for axes, fits in zip(AXES, self.coefficients, strict=True):
-            if fits is None:
-                continue
-            whole, without = fits
-            each = np.vstack([whole, without]).T
-            edges = np.cumsum([0, *(self.features[axis].shape[1] for axis in axes)])
-            for axis, (first, last) in zip(axes, pairwise(edges), strict=True):
-                found[:, :, axis] = (self.features[axis] @ each[first:last]).T
-        return found
+        each = [(axis, f[axis]) for axis in AXES[part] for f in self.features]
+        edges = np.cumsum([f.shape[1] for _, f in each])
+        for (axis, f), own in zip(each, np.split(coefficients, edges[:-1]), strict=True):
+            self.velocities[axis] += f @ own
 
     def predict(self, velocities: Sequence[np.ndarray], which: np.ndarray) -> np.ndarray:
         """(W, H, 3) displacements, the heading integrated by the response itself.
@@ -706,7 +682,7 @@ class _LeftOut:
         self.used = np.flatnonzero(ridge[self.groups] < OUT)
         used = np.ix_(range(len(self.grams)), self.used, self.used)
         rise = np.diag((self.mean * ridge[self.groups])[self.used])
-        self.inverse = np.linalg.inv(self.grams[used] + rise)
+        self.inverse = _inverse(self.grams[used] + rise)
         return self._fitted()
 
     def moved(self, group: int, value: float) -> float:
@@ -750,17 +726,15 @@ class _LeftOut:
         b - B (I/s + B_g)^-1 b_g, with B the inverse's columns of the group.
         """
         columns, block, rise = self._rise(own, values)
-        less = np.linalg.solve(np.eye(len(own)) + rise * block, rise * self.beta[:, own])
-        return columns @ less[..., 0].transpose(1, 2, 0)
+        return columns @ at_ridges(block, 1 / rise, self.beta[:, own, 0]).swapaxes(1, 2)
 
     def _rise(
         self, own: np.ndarray, values: Sequence[float]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """B, B_g and s (V, 1, 1, 1)."""
+        """B, B_g and s (V,)."""
         at = np.searchsorted(self.used, own)
         more = np.array(values) - self.ridge[self.groups[own[0]]]
-        rise = self.mean[own[0]] * more[:, None, None, None]
-        return self.inverse[:, :, at], self.inverse[:, at[:, None], at], rise
+        return self.inverse[:, :, at], self.inverse[:, at[:, None], at], self.mean[own[0]] * more
 
     def _let_in(self, own: np.ndarray, values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """The same where a group that is out comes in, and its (K, g, V) coefficients."""
@@ -768,10 +742,26 @@ class _LeftOut:
         made = self.inverse @ across
         within = self.grams[:, own[:, None], own] - across.swapaxes(1, 2) @ made
         left = self.moments[:, own, None] - across.swapaxes(1, 2) @ self.beta[:, self.used]
-        rise = self.mean[own[0]] * np.array(values)[:, None, None, None] * np.eye(len(own))
-        found = np.linalg.solve(within + rise, np.broadcast_to(left, (len(values), *left.shape)))
-        found = found[..., 0].transpose(1, 2, 0)
+        found = at_ridges(within, self.mean[own[0]] * np.array(values), left[..., 0]).swapaxes(1, 2)
         return made @ found, found
+
+
+def _inverse(grams: np.ndarray) -> np.ndarray:
+    """(K, F, F) of positive definite matrices, by Cholesky: in a third of the time of numpy's."""
+    lower = _lower_inverse(np.linalg.cholesky(grams))
+    return lower.swapaxes(1, 2) @ lower
+
+
+def _lower_inverse(lower: np.ndarray) -> np.ndarray:
+    """(K, F, F) of triangular matrices, by halves."""
+    half = lower.shape[1] // 2
+    if half < WORTH_HALVING:
+        return np.linalg.inv(lower)
+    found = np.zeros_like(lower)
+    found[:, :half, :half] = first = _lower_inverse(lower[:, :half, :half])
+    found[:, half:, half:] = last = _lower_inverse(lower[:, half:, half:])
+    found[:, half:, :half] = -last @ lower[:, half:, :half] @ first
+    return found
 
 
 def _ridge(

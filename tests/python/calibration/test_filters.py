@@ -35,6 +35,8 @@ def test_what_fades_evenly_does_what_lfilter_does():
 def test_what_is_forgotten_at_once_leaves_the_last_push():
     keep, pushes = np.array([0.5, 1.0, 0.0, 1.0]), np.array([1.0, 2.0, 4.0, 8.0])
     assert faded(keep, pushes) == pytest.approx([1, 3, 4, 12])
+    both = faded(np.stack([keep, keep[::-1]], -1), np.stack([pushes, pushes], -1))
+    assert both[:, 1] == pytest.approx([1, 2, 6, 11])
 
 
 @pytest.mark.parametrize("damping", [0.05, 0.7])
@@ -141,6 +143,18 @@ def test_turning_rates_turn_as_far_as_the_steps_add_up_to(drive):
     assert found[:, 0] == pytest.approx(expected, abs=1e-12)
 
 
+def test_a_signal_is_read_between_its_rows_and_goes_on_beyond_them():
+    values = np.random.default_rng(4).normal(size=(40, 3))
+    places = np.array([-2.0, 0.0, 0.25, 17.9, 60.0])
+    read = [np.interp(places, np.arange(40), v) for v in values.T]
+    assert native.read_at(values, places) == pytest.approx(np.column_stack(read), abs=0.01)
+    inside = places[1:4]
+    read = [np.interp(inside, np.arange(40), v) for v in values.T]
+    assert native.read_at(values, inside) == pytest.approx(np.column_stack(read), abs=1e-12)
+    with pytest.raises(ValueError, match="two rows"):
+        native.read_at(values[:1], places)
+
+
 def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
     random = np.random.default_rng(4)
     values, beside = random.normal(size=(40, 6)), random.normal(size=(25, 3))
@@ -155,6 +169,19 @@ def test_sums_by_shift_are_those_of_the_signal_read_between_its_rows():
             assert along[s, b] == pytest.approx(products[first:end].sum(axis=0), abs=1e-12)
     with pytest.raises(ValueError, match="one after the other"):
         native.sums_by_shift(values, places, shifts, beside, np.array([0, 30]))
+
+
+@pytest.mark.parametrize("count", [1, 8, 30])
+def test_definite_matrices_are_solved_at_each_rise(count):
+    random = np.random.default_rng(5)
+    x, moments = random.normal(size=(4, 40, count)), random.normal(size=(4, count))
+    grams, rises = x.swapaxes(1, 2) @ x, np.array([[0.1, 3.0]] * 3 + [[-1e4, -1e5]])
+    found = native.solved_risen(grams, rises, moments)  # those of the last are negative
+    for gram, rise, moment, solved in zip(grams, rises, moments, found, strict=True):
+        for r, own in zip(rise, solved, strict=True):
+            assert own == pytest.approx(np.linalg.solve(gram + r * np.eye(count), moment))
+    with pytest.raises(ValueError, match="of each square matrix"):
+        native.solved_risen(grams, rises, moments[:, :0])
 
 
 def test_sums_refuse_rows_that_are_not_there():
