@@ -37,7 +37,7 @@ class Evidence:
 
     Args:
         logs: place among the fit's data sets, and the log.
-        motions: one for each log.
+        motion: of the logs.
         fit: of the final model.
         changes: of all logs' rows by each of the library's terms.
     """
@@ -45,11 +45,11 @@ class Evidence:
     def __init__(
         self,
         logs: Sequence[tuple[int, Opened]],
-        motions: Sequence[Motion],
+        motion: Motion,
         fit: ScoreFit,
         changes: Columns,
     ) -> None:
-        self.logs, self.motions = logs, motions
+        self.logs, self.motion = logs, motion
         self.every_s = logs[0][1].data.every_s
         self._divide()
         rows, _ = fit.state
@@ -60,7 +60,7 @@ class Evidence:
         self.weight = self.more * weight[self.kept]
         self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
         self._changes = changes
-        self._free = np.hstack([self._free, self.raw(sized(GAINS, motions))])
+        self._free = np.hstack([self._free, self.raw(sized(GAINS, motion))])
         self.weighed(np.ones(len(self._left)))
 
     def _divide(self) -> None:
@@ -136,9 +136,10 @@ class Evidence:
         columns = np.empty((len(self._left), len(own)))
         columns[:, ~own] = self._changes.some([f.column for f in forms if f.column >= 0], self.kept)
         if made:
+            changes = self.motion.columns(made)
             first = 0
-            for motion, inside in zip(self.motions, self._inside, strict=True):
-                some = motion.columns(made)[inside]
+            for change, inside in zip(changes, self._inside, strict=True):
+                some = change[inside]
                 columns[first : first + len(some), own] = some
                 first += len(some)
         columns *= self.weight[:, None]
@@ -284,7 +285,7 @@ def fitted(rows: Evidence, chosen: Chosen, half: np.ndarray) -> np.ndarray:
 
 def made(rows: Evidence, forms: Sequence[Form], half: np.ndarray, found: Chosen) -> Chosen:
     """The best of forms whose columns are not there yet."""
-    known = sized(forms, rows.motions)
+    known = sized(forms, rows.motion)
     return best_of(rows, Pool(known, rows.raw(known)), half, found) if known else found
 
 

@@ -91,16 +91,15 @@ def formula_of(
         changes: of all logs' rows by each.
         rival: what the formula must outdo.
     """
-    pairs = zip(logs, velocities, strict=True)
-    motions = [Motion.of(own, v, HORIZONS) for (_, own), v in pairs]
+    opened = [own for _, own in logs]
+    motion = Motion.of(opened, velocities, HORIZONS)
     model = fit.models[logs[0][0]]
-    rows = Evidence(logs, motions, fit, changes)
+    rows = Evidence(logs, motion, fit, changes)
     if len(rows.parts) < FEWEST:
         return None
-    beat_radps = beat_of([m.own for m in motions])
-    own = own_forms(motions, beat_radps, drives_sideways(model), bool(model.wheels()))
+    own = own_forms(motion.names, beat_of(opened), drives_sideways(model), bool(model.wheels()))
     command_unit = "rad/s" if model.drive == "wheel_speed" else ""  # a duty is a plain figure
-    forms = [*from_library(terms, command_unit), *sized(own, motions)]
+    forms = [*from_library(terms, command_unit), *sized(own, motion)]
     pool = Pool(forms, rows.raw(forms))
     clock = Recurring(rows)
     half = np.arange(len(rows.parts)) % 2 == 0
@@ -344,7 +343,7 @@ def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen
     tops = dict.fromkeys([int(simplest), int(np.argmax(net))])
     polished = [_polished(rows, pool.some([k]), half, found) for k in tops]
     plainer = [f for c in polished if (f := c.forms[-1].plainer)]
-    for form in sized(plainer, rows.motions):
+    for form in sized(plainer, rows.motion):
         polished.append(_polished(rows, Pool([form], rows.raw([form])), half, found))
     most = max(c.net for c in polished)
     close = [c for c in polished if c.net >= most - _alike(most)]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One candidate formula without a physics name, and what a velocity does to the errors of a log."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,3 +103,13 @@ def displaced(
         np.ascontiguousarray(np.maximum(response.ends, 0)),
         heading[response.data.windows.starts],
     )
+
+
+def displaced_by(
+    response: Response, velocity: np.ndarray, values: Mapping[int, np.ndarray]
+) -> np.ndarray:
+    """(W, H, 3, T) the same by (N, T) velocities in each of several body axes."""
+    first, *others = (displaced(response, velocity, v, axis) for axis, v in values.items())
+    for other in others:
+        first += other
+    return first
