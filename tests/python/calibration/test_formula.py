@@ -200,7 +200,7 @@ AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
 def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
     """The plant with the effect `equation`: another program, which integrates."""
     own, moves = motion
-    (form,) = sized([form], [moves])
+    (form,) = sized([form], moves)
     columns = moves.columns([form])[0].reshape(-1, len(form.shapes))
     model = own.model.copy()
     model.add_effect("equation", joined([form]))
