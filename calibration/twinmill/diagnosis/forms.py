@@ -455,10 +455,7 @@ def large(values: np.ndarray) -> np.ndarray:
 
 
 def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:
-    """The library's terms that the effect `equation` can have.
-
-    Not what changes all speeds at once with time: the form `motion` says that without the wheels.
-    """
+    """The library's terms that are forms."""
     return [
         Form(
             t.adds_to,
@@ -469,7 +466,7 @@ def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:
             command_unit=command_unit if "u" in words(t.formula) else "",
         )
         for k, t in enumerate(terms)
-        if t.addable and not t.family and not t.formula.endswith("*rim")
+        if t.is_form
     ]
 
 

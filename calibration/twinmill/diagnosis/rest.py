@@ -286,15 +286,23 @@ class Doubted:
         return replace(found, instead_of=self.names) if found else None
 
 
-def formulas_of(opened: Sequence[Opened], fit: ScoreFit) -> Formulas | None:
-    """Formulas over the logs of a fit; None if it has none whose floor told a smooth response."""
+def formulas_of(
+    opened: Sequence[Opened], fit: ScoreFit, *, forms_alone: bool = False
+) -> Formulas | None:
+    """Formulas over the logs of a fit; None if it has none whose floor told a smooth response.
+
+    Args:
+        opened: the fit's measurements, in its order.
+        fit: of them.
+        forms_alone: those alone of which one may be proven.
+    """
     seen = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
     if not seen:
         return None
     places, logs = zip(*seen, strict=True)
     every = thinning([o.data for o in logs], SETTINGS.few_starts, SETTINGS.starts_apart_s)
     logs = thinned(logs, every)
-    found = library(logs, [fit.models[i] for i in places])
+    found = library(logs, [fit.models[i] for i in places], forms_alone=forms_alone)
     return Formulas(list(zip(places, logs, strict=True)), *found, seen, every)
 
 

@@ -68,6 +68,14 @@ class Term:
         return not words(self.formula) & NO_NAMES
 
     @property
+    def is_form(self) -> bool:
+        """A form of its own, which the effect `equation` can have.
+
+        Not what changes all speeds at once with time: the form `motion` says that without wheels.
+        """
+        return self.addable and not self.family and not self.formula.endswith("*rim")
+
+    @property
     def is_step(self) -> bool:
         """Before a moment it is the opposite of what it is after it."""
         return self.formula.startswith("sign(t - ")
