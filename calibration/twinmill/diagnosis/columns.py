@@ -48,14 +48,18 @@ class Columns:
     def __len__(self) -> int:
         return self._place.shape[1]
 
-    def some(self, wanted: np.ndarray, rows: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(r, k) of some rows, the columns of these (k,) numbers."""
+    def some(self, wanted: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """(r, k) of rows of these (r,) numbers, or of all, the columns of these (k,) numbers."""
         piece, place = self._place[:, wanted]
         numbers = np.unique(piece)
         if len(numbers) == 1:
-            return self.pieces[numbers[0]][rows][:, place]
-        found = np.empty((len(self.pieces[0][rows]), len(piece)))
+            return self._of_piece(numbers[0], place, rows)
+        found = np.empty((len(self.pieces[0]) if rows is None else len(rows), len(piece)))
         for n in numbers:
             own = piece == n
-            found[:, own] = self.pieces[n][rows][:, place[own]]
+            found[:, own] = self._of_piece(n, place[own], rows)
         return found
+
+    def _of_piece(self, n: int, place: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
+        piece = self.pieces[n]
+        return (piece if rows is None else piece.take(rows, axis=0)).take(place, axis=1)

@@ -130,18 +130,15 @@ class Evidence:
         return weighed - self.basis @ (self.basis.T @ weighed)
 
     def raw(self, forms: Sequence[Form]) -> np.ndarray:
-        """(R, K) columns of forms, whitened as the fit is."""
-        made = [f for f in forms if f.column < 0]
-        own = np.array([f.column < 0 for f in forms for _ in f.shapes], bool)
-        columns = np.empty((len(self._left), len(own)))
-        columns[:, ~own] = self._changes.some([f.column for f in forms if f.column >= 0], self.kept)
+        """(R, K) columns of forms, whitened as the fit is; the library's stand before others."""
+        known = [f.column for f in forms if f.column >= 0]
+        made = forms[len(known) :]
+        columns = np.empty((len(self._left), len(known) + sum(len(f.shapes) for f in made)))
+        if known:
+            kept = np.flatnonzero(self.kept)
+            columns[:, : len(known)] = self._changes.some(np.array(known), kept)
         if made:
-            changes = self.motion.columns(made)
-            first = 0
-            for change, inside in zip(changes, self._inside, strict=True):
-                some = change[inside]
-                columns[first : first + len(some), own] = some
-                first += len(some)
+            columns[:, len(known) :] = self.motion.columns(made, self._inside)
         columns *= self.weight[:, None]
         return columns
 

@@ -293,45 +293,51 @@ class Motion:
         return np.concatenate([made(*(v[p] for v in values)) for p in self.parts], axis=-1)
 
     def values(self, form: Form) -> np.ndarray:
-        """(N, k) of a form's shapes; of one of all wheels (N, k) for a robot that drives on."""
+        """(k, N) of a form's shapes; of one of all wheels for a robot that drives on."""
         return self._along(form, "vx")
 
     def _along(self, form: Form, axis: str) -> np.ndarray:
         """The same, with a speed of the body in the place of the wheels'."""
         key = (form.adds_to, axis if not form.of_body else "", form.texts, form.rates)
         if key not in self._known:
-            self._known[key] = self._computed(form, {**self.names, TARGET: self.names[axis]})
+            self._known[key] = self._computed(form, axis)
         return self._known[key]
 
-    def _computed(self, form: Form, names: dict[str, np.ndarray]) -> np.ndarray:
+    def _computed(self, form: Form, axis: str) -> np.ndarray:
+        names = {**self.names, TARGET: self.names[axis]}
         if form.adds_to == "theta_rad":
             names["theta"] = self._captured_rad
         states = [{}]
         if form.state and form.state.swings:
-            states = [self._swung(form, goal, names) for goal in form.state.goals]
+            goals = (axis if goal == TARGET else goal for goal in form.state.goals)
+            states = [self._swung(form, goal) for goal in goals]
         elif form.state:
             states = [{"s": self._remembered(form, names)}]
         pairs = zip(form.texts, cycle(states), strict=False)
         found = [_value(text, names | own) for text, own in pairs]
-        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found], axis=-1)
+        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found])
 
-    def _swung(
-        self, form: Form, goal: str, names: Mapping[str, np.ndarray]
-    ) -> dict[str, np.ndarray]:
+    def _swung(self, form: Form, goal: str) -> dict[str, np.ndarray]:
         """(N,) means over each step of s and r that swing around a goal."""
-        pushes = np.broadcast_to(_value(goal, names), names["t"].shape)
-        key = ("swing", pushes.tobytes(), form.constant, form.damping)
+        key = ("swing", goal, form.constant, form.damping)
         if key not in self._known:
             self._known[key] = self._each(
-                lambda own, step_s: np.stack(swung(own, step_s, form.constant, form.damping)),
-                self._in_the_middle(pushes),
+                lambda own, step_s: swung(own, step_s, form.constant, form.damping),
+                self._in_the_middle(goal),
                 self._step_s,
             )
         return dict(zip(("s", "r"), self._known[key], strict=True))
 
-    def _in_the_middle(self, values: np.ndarray) -> np.ndarray:
-        """(N,) of the middle of each step; a step of several poses has them from its last one."""
-        return values - self._sooner * np.diff(values, prepend=values[:1])
+    def _in_the_middle(self, goal: str) -> np.ndarray:
+        """(N,) of a goal in the middle of each step.
+
+        A step of several poses has the values from its last one.
+        """
+        key = ("middle", goal)
+        if key not in self._known:
+            values = _value(goal, self.names)
+            self._known[key] = values - self._sooner * np.diff(values, prepend=values[:1])
+        return self._known[key]
 
     @cached_property
     def _sooner(self) -> np.ndarray:
@@ -352,34 +358,40 @@ class Motion:
         keep = np.exp(-rate * self._step_s)
         return self._each(_mean_faded, keep, goal * (1 - keep))
 
-    def columns(self, forms: Sequence[Form]) -> list[np.ndarray]:
-        """(W, H, 3, K) change of each log's errors by each number of some forms, in floors."""
-        weights = [np.nan_to_num(own.data.weight[:, self.horizons])[..., None] for own in self.logs]
-        found = [np.empty((*w.shape[:3], sum(len(f.shapes) for f in forms))) for w in weights]
-        place = dict(zip(forms, np.cumsum([0, *(len(f.shapes) for f in forms)]), strict=False))
-        for adds_to in {f.adds_to for f in forms}:
-            own = [f for f in forms if f.adds_to == adds_to]
-            where = np.concatenate([place[f] + np.arange(len(f.shapes)) for f in own])
-            changes = self._displaced(adds_to, own)
-            for whole, weight, change in zip(found, weights, changes, strict=True):
-                whole[..., where] = weight * change
+    def columns(self, forms: Sequence[Form], kept: Sequence[np.ndarray]) -> np.ndarray:
+        """(R, K) change of the logs' errors by each number of some forms, in floors.
+
+        Args:
+            forms: of known sizes.
+            kept: (W, H, 3) bool of each log: R in all of them.
+        """
+        ends = np.cumsum([0, *(len(f.shapes) for f in forms)])
+        found = np.empty((sum(np.count_nonzero(k) for k in kept), ends[-1]))
+        for adds_to in dict.fromkeys(f.adds_to for f in forms):
+            own = [k for k, f in enumerate(forms) if f.adds_to == adds_to]
+            where = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in own])
+            changes, first = self._displaced(adds_to, [forms[k] for k in own]), 0
+            for log, change, inside in zip(self.logs, changes, kept, strict=True):
+                rows = change[inside]
+                rows *= np.nan_to_num(log.data.weight[:, self.horizons][inside])[:, None]
+                found[first : first + len(rows), where] = rows
+                first += len(rows)
         return found
 
     def _displaced(self, adds_to: str, forms: Sequence[Form]) -> Iterator[np.ndarray]:
         """(W, H, 3, K) change of each log's displacements by some forms, all of one place."""
         axes = SPEEDS if adds_to == RIM else ("vx",)  # wheels and body are in proportion
-        every = [[self._along(f, axis) for f in forms] for axis in axes]
-        strengths = np.concatenate([f.strengths for f in forms])
-        for own, part in zip(self.logs, self.parts, strict=True):
-            response = copy(own.floor.response)
+        every = [[(self._along(f, axis), f.strengths[:, None]) for f in forms] for axis in axes]
+        for log, part in zip(self.logs, self.parts, strict=True):
+            response = copy(log.floor.response)
             response.ends = response.ends[:, self.horizons]
-            values = [np.hstack([v[part] for v in known]) * strengths for known in every]
+            rows = (np.concatenate([v[:, part] * s for v, s in known]) for known in every)
+            values = [np.ascontiguousarray(own.T) for own in rows]
             if adds_to == "theta_rad":
-                yield _turned(response, values[0], own.data.measured[:, self.horizons])
+                yield _turned(response, values[0], log.data.measured[:, self.horizons])
             else:
-                yield displaced_by(
-                    response, self.velocity[part], self._pushes(adds_to, values, part)
-                )
+                pushes = self._pushes(adds_to, values, part)
+                yield displaced_by(response, self.velocity[part], pushes)
 
     def _pushes(
         self, adds_to: str, values: Sequence[np.ndarray], part: slice
@@ -437,8 +449,8 @@ def sized(forms: Sequence[Form], motion: Motion) -> list[Form]:
     every = 1 + len(motion.velocity) // MOST_POINTS
     some = np.concatenate([np.arange(p.start, p.stop, every) for p in motion.parts])
     for form in forms:
-        values = np.abs(motion.values(form)[some])
-        rms = np.sqrt(np.einsum("nk,nk->k", values, values) / len(values))
+        values = np.abs(motion.values(form).take(some, axis=1))
+        rms = np.sqrt(np.einsum("kn,kn->k", values, values) / len(some))
         sizes = np.maximum(large(values), rms)
         if np.isfinite(sizes).all() and (sizes > 1e-9).all():
             found.append(replace(form, sizes=tuple(float(s) for s in sizes)))
@@ -446,12 +458,12 @@ def sized(forms: Sequence[Form], motion: Motion) -> list[Form]:
 
 
 def large(values: np.ndarray) -> np.ndarray:
-    """(k,) what 95 % of (N, k) values are below: NumPy's percentile takes five times as long."""
-    last = len(values) - 1
+    """(k,) what 95 % of (k, N) values are below: NumPy's percentile takes five times as long."""
+    last = values.shape[1] - 1
     place = 0.95 * last
     below, above = int(place), min(int(place) + 1, last)
-    ordered = np.partition(values, [below, above], axis=0)
-    return ordered[below] + (place - below) * (ordered[above] - ordered[below])
+    ordered = np.partition(values, [below, above], axis=1)
+    return ordered[:, below] + (place - below) * (ordered[:, above] - ordered[:, below])
 
 
 def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:

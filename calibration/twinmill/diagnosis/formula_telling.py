@@ -71,7 +71,7 @@ def drives_back(rows: Evidence, formula: Formula) -> bool:
     numbers = np.array([n.value for n in formula.numbers if n.name])
     motion = rows.motion
     every = motion.names[axis] if axis else np.ones(len(motion.velocity))
-    added = np.hstack([motion.values(f) for f in forms]) @ numbers[: _shapes(forms)]
+    added = np.hstack([motion.values(f).T for f in forms]) @ numbers[: _shapes(forms)]
     for part in motion.parts:
         speed, after = every[part], every[part] + added[part]
         usual = np.sqrt(np.mean(speed[speed != 0] ** 2)) if speed.any() else np.inf
@@ -113,8 +113,8 @@ def _drawn(
     rows: Evidence, forms: Sequence[Form], values: Sequence[float], bins: Sequence[Form]
 ) -> np.ndarray:
     """(B,) the formula in bins, as what is left there is fitted: by least squares on carriers."""
-    whole = np.hstack([rows.motion.values(f) for f in forms]) @ np.array(values)
-    weights = [rows.motion.values(b)[:, 0] for b in bins]
+    whole = np.hstack([rows.motion.values(f).T for f in forms]) @ np.array(values)
+    weights = [rows.motion.values(b)[0] for b in bins]
     return np.array([w @ whole / max(w @ w, 1e-12) for w in weights])
 
 

@@ -200,7 +200,7 @@ def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
     for key in [k for k in values[0] if all(k in v for v in values)]:
         every = np.concatenate([v[key][::step] for v in values])
         # What all but the largest are below; of rare ones, which that would call nothing, the RMS.
-        high = float(large(np.abs(every)[:, None])[0])
+        high = float(large(np.abs(every)[None])[0])
         sizes[key] = max(high, float(np.sqrt(np.mean(every**2))), 1e-9)
     return sizes
 

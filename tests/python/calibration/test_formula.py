@@ -201,7 +201,7 @@ def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
     """The plant with the effect `equation`: another program, which integrates."""
     own, moves = motion
     (form,) = sized([form], moves)
-    columns = moves.columns([form])[0].reshape(-1, len(form.shapes))
+    columns = moves.columns([form], [np.ones(own.data.measured.shape, bool)])
     model = own.model.copy()
     model.add_effect("equation", joined([form]))
     names = ["equation.p0", "equation.p1"]
