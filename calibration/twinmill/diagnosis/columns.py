@@ -4,8 +4,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
+
+NARROW = 64  # columns
 
 
 @dataclass(frozen=True)
@@ -13,7 +16,8 @@ class Columns:
     """T columns of R rows, in pieces.
 
     All side by side would be a hundred megabytes, which the system clears before it gives them;
-    pieces fit into what was used before.
+    pieces fit into what was used before. Narrow ones are one: to call for the products of each
+    would take longer than these do.
 
     Attributes:
         pieces: (R, t) some after the other.
@@ -29,7 +33,7 @@ class Columns:
         """
         pieces: list[np.ndarray] = []
         first = 0
-        for own in logs:
+        for own in map(_joined, logs):
             if len(own[0]) == count:
                 return cls(own)
             pieces = pieces or [np.empty((count, p.shape[1])) for p in own]
@@ -63,3 +67,12 @@ class Columns:
     def _of_piece(self, n: int, place: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
         piece = self.pieces[n]
         return (piece if rows is None else piece.take(rows, axis=0)).take(place, axis=1)
+
+
+def _joined(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The same, neighbours that are narrow in one."""
+    found: list[np.ndarray] = []
+    for narrow, some in groupby(pieces, lambda p: p.shape[1] <= NARROW):
+        own = [*some]
+        found += [np.hstack(own)] if narrow else own
+    return found

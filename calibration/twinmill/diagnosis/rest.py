@@ -716,8 +716,8 @@ class Products:
         self.along = self.across.sum(0)
         self.inside = squares(basis, self.parts)
         self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
-        more = self.along * (self.inside @ self.along - 2 * self.across)
-        self.energy = square + more.sum(1)
+        more = self.inside @ self.along - 2 * self.across
+        self.energy = square + np.einsum("bpt,pt->bt", more, self.along)
         before, after = square.sum(0), self.energy.sum(0)
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
         self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
