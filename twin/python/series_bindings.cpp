@@ -400,7 +400,8 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
         const double away = s - push, from_s = s, from_r = r;
         s = push + (cos + fading * sin) * away + sin * r;
         r = (cos - fading * sin) * r - rate * rate * sin * away;
-        const double moved = s - from_s, speeding = (r - from_r + 2 * damping * rate * moved) / dt_s;
+        const double moved = s - from_s,
+                     speeding = (r - from_r + 2 * damping * rate * moved) / dt_s;
         mean_s[n] = push - speeding / (rate * rate);
         mean_r[n] = moved / dt_s;
     }
