@@ -29,10 +29,8 @@ def filtered(
     return np.moveaxis(found.reshape(x.shape), 0, axis)
 
 
-def swung(
-    pushes: np.ndarray, step_s: np.ndarray, rate: float, damping: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Means over steps of s and of r = ds/dt, from rest: dr/dt = w^2 (push - s) - 2 z w r.
+def swung(pushes: np.ndarray, step_s: np.ndarray, rate: float, damping: float) -> np.ndarray:
+    """(2, N) means over steps of s and of r = ds/dt, from rest: dr/dt = w^2 (push - s) - 2 z w r.
 
     Exact where each push holds for its step. A step of no length leaves both as they are.
 
@@ -42,12 +40,7 @@ def swung(
         rate: w, 1/s.
         damping: z, below 1.
     """
-    ends = native.swung(np.ascontiguousarray(pushes), step_s, rate, damping)
-    changes = np.diff(ends, axis=0, prepend=np.zeros((1, 2)))
-    lasting = np.where(step_s > 0, step_s, np.inf)
-    speeding = (changes[:, 1] + 2 * damping * rate * changes[:, 0]) / lasting
-    means = np.where(step_s > 0, pushes - speeding / rate**2, ends[:, 0])
-    return means, np.where(step_s > 0, changes[:, 0] / lasting, ends[:, 1])
+    return native.swung(pushes, step_s, rate, damping)
 
 
 def faded(keep: np.ndarray, pushes: np.ndarray) -> np.ndarray:

@@ -515,10 +515,17 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
         throw std::invalid_argument("there must be as many steps as pushes");
     const double fast = rate * std::sqrt(1 - damping * damping), fading = damping * rate;
     std::vector<double> out(2 * pushes.size());
+    double *mean_s = out.data(), *mean_r = mean_s + pushes.size();
     double s = 0, r = 0, last_s = -1, cos = 0, sin = 0;
     for (size_t n = 0; n < pushes.size(); ++n)
     {
         const double dt_s = step_s.data()[n], push = pushes.data()[n];
+        if (dt_s <= 0)
+        {
+            mean_s[n] = s;
+            mean_r[n] = r;
+            continue;
+        }
         if (dt_s != last_s)
         {
             const double fade = std::exp(-fading * dt_s);
@@ -526,13 +533,15 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
             sin = fade * std::sin(fast * dt_s) / fast;
             last_s = dt_s;
         }
-        const double away = s - push;
+        const double away = s - push, from_s = s, from_r = r;
         s = push + (cos + fading * sin) * away + sin * r;
         r = (cos - fading * sin) * r - rate * rate * sin * away;
-        out[2 * n] = s;
-        out[2 * n + 1] = r;
+        const double moved = s - from_s,
+                     speeding = (r - from_r + 2 * damping * rate * moved) / dt_s;
+        mean_s[n] = push - speeding / (rate * rate);
+        mean_r[n] = moved / dt_s;
     }
-    return ToNumpy(std::move(out), {pushes.size(), 2});
+    return ToNumpy(std::move(out), {2, pushes.size()});
 }
 
 // Solves the count equations in rows of count + 1, the last of each the right side: of a definite
@@ -619,8 +628,8 @@ void BindSeries(nb::module_ &m)
           "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
           "its diagonal and definite then, for right sides (M, F).");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
-          "(N, 2) s and ds/dt at the end of each step, from rest, of what swings around each "
-          "push.");
+          "(2, N) means of s and of ds/dt over each step, from rest, of what swings around each "
+          "push; a step of no length leaves both as they are.");
     m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
           "direction"_a,
           "(R, F) how far each forward and left velocity leads along a `direction` (R, 2) from "

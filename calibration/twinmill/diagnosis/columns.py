@@ -4,8 +4,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
+
+NARROW = 64  # columns
 
 
 @dataclass(frozen=True)
@@ -13,7 +16,8 @@ class Columns:
     """T columns of R rows, in pieces.
 
     All side by side would be a hundred megabytes, which the system clears before it gives them;
-    pieces fit into what was used before.
+    pieces fit into what was used before. Narrow ones are one: to call for the products of each
+    would take longer than these do.
 
     Attributes:
         pieces: (R, t) some after the other.
@@ -29,7 +33,7 @@ class Columns:
         """
         pieces: list[np.ndarray] = []
         first = 0
-        for own in logs:
+        for own in map(_joined, logs):
             if len(own[0]) == count:
                 return cls(own)
             pieces = pieces or [np.empty((count, p.shape[1])) for p in own]
@@ -48,14 +52,27 @@ class Columns:
     def __len__(self) -> int:
         return self._place.shape[1]
 
-    def some(self, wanted: np.ndarray, rows: np.ndarray | slice = slice(None)) -> np.ndarray:
-        """(r, k) of some rows, the columns of these (k,) numbers."""
+    def some(self, wanted: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """(r, k) of rows of these (r,) numbers, or of all, the columns of these (k,) numbers."""
         piece, place = self._place[:, wanted]
         numbers = np.unique(piece)
         if len(numbers) == 1:
-            return self.pieces[numbers[0]][rows][:, place]
-        found = np.empty((len(self.pieces[0][rows]), len(piece)))
+            return self._of_piece(numbers[0], place, rows)
+        found = np.empty((len(self.pieces[0]) if rows is None else len(rows), len(piece)))
         for n in numbers:
             own = piece == n
-            found[:, own] = self.pieces[n][rows][:, place[own]]
+            found[:, own] = self._of_piece(n, place[own], rows)
         return found
+
+    def _of_piece(self, n: int, place: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
+        piece = self.pieces[n]
+        return (piece if rows is None else piece.take(rows, axis=0)).take(place, axis=1)
+
+
+def _joined(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """The same, neighbours that are narrow in one."""
+    found: list[np.ndarray] = []
+    for narrow, some in groupby(pieces, lambda p: p.shape[1] <= NARROW):
+        own = [*some]
+        found += [np.hstack(own)] if narrow else own
+    return found

@@ -532,7 +532,7 @@ def _lacking(
     trial = less[names[0]]
     for name in names[1:]:
         trial = without_effect(trial, name)
-    formulas = formulas_of(known, trial.fit)
+    formulas = formulas_of(known, trial.fit, forms_alone=True)
     return Doubted(names, formulas, trial.fit) if formulas else None
 
 

@@ -37,7 +37,7 @@ class Evidence:
 
     Args:
         logs: place among the fit's data sets, and the log.
-        motions: one for each log.
+        motion: of the logs.
         fit: of the final model.
         changes: of all logs' rows by each of the library's terms.
     """
@@ -45,11 +45,11 @@ class Evidence:
     def __init__(
         self,
         logs: Sequence[tuple[int, Opened]],
-        motions: Sequence[Motion],
+        motion: Motion,
         fit: ScoreFit,
         changes: Columns,
     ) -> None:
-        self.logs, self.motions = logs, motions
+        self.logs, self.motion = logs, motion
         self.every_s = logs[0][1].data.every_s
         self._divide()
         rows, _ = fit.state
@@ -60,7 +60,7 @@ class Evidence:
         self.weight = self.more * weight[self.kept]
         self._left, self._free = self.more * left[self.kept], self.more * free[self.kept]
         self._changes = changes
-        self._free = np.hstack([self._free, self.raw(sized(GAINS, motions))])
+        self._free = np.hstack([self._free, self.raw(sized(GAINS, motion))])
         self.weighed(np.ones(len(self._left)))
 
     def _divide(self) -> None:
@@ -130,17 +130,15 @@ class Evidence:
         return weighed - self.basis @ (self.basis.T @ weighed)
 
     def raw(self, forms: Sequence[Form]) -> np.ndarray:
-        """(R, K) columns of forms, whitened as the fit is."""
-        made = [f for f in forms if f.column < 0]
-        own = np.array([f.column < 0 for f in forms for _ in f.shapes], bool)
-        columns = np.empty((len(self._left), len(own)))
-        columns[:, ~own] = self._changes.some([f.column for f in forms if f.column >= 0], self.kept)
+        """(R, K) columns of forms, whitened as the fit is; the library's stand before others."""
+        known = [f.column for f in forms if f.column >= 0]
+        made = forms[len(known) :]
+        columns = np.empty((len(self._left), len(known) + sum(len(f.shapes) for f in made)))
+        if known:
+            kept = np.flatnonzero(self.kept)
+            columns[:, : len(known)] = self._changes.some(np.array(known), kept)
         if made:
-            first = 0
-            for motion, inside in zip(self.motions, self._inside, strict=True):
-                some = motion.columns(made)[inside]
-                columns[first : first + len(some), own] = some
-                first += len(some)
+            columns[:, len(known) :] = self.motion.columns(made, self._inside)
         columns *= self.weight[:, None]
         return columns
 
@@ -217,14 +215,19 @@ class Sums:
 
     def held_out(self, half: np.ndarray) -> np.ndarray:
         """(T,) fall of the cost on each stretch of a half, fitted to its others."""
-        total = np.zeros(self.grams.shape[1])
-        for k in np.flatnonzero(half):
-            others = half.astype(float)
-            others[k] = 0.0
-            numbers = self.fitted(others)
-            total += 2 * np.einsum("tk,tk->t", numbers, self.moments[k])
-            total -= np.einsum("ti,tij,tj->t", numbers, self.grams[k], numbers)
-        return total
+        grams, moments = self.grams[half], self.moments[half]
+        others = grams.sum(axis=0) - grams + np.eye(grams.shape[-1])
+        numbers = np.linalg.solve(others, (moments.sum(axis=0) - moments)[..., None])
+        left = 2 * moments[..., None] - grams @ numbers
+        return np.einsum("stki,stki->t", numbers, left)
+
+    def some(self, wanted: Sequence[int]) -> "Sums":
+        """Those of the forms of these numbers."""
+        return Sums(self.grams[:, wanted], self.moments[:, wanted])
+
+    def of_rows_that_weigh(self, times: float) -> "Sums":
+        """The same if all rows weigh so many times what they do."""
+        return Sums(times**2 * self.grams, times**2 * self.moments)
 
 
 @dataclass(frozen=True)
@@ -284,7 +287,7 @@ def fitted(rows: Evidence, chosen: Chosen, half: np.ndarray) -> np.ndarray:
 
 def made(rows: Evidence, forms: Sequence[Form], half: np.ndarray, found: Chosen) -> Chosen:
     """The best of forms whose columns are not there yet."""
-    known = sized(forms, rows.motions)
+    known = sized(forms, rows.motion)
     return best_of(rows, Pool(known, rows.raw(known)), half, found) if known else found
 
 

@@ -8,11 +8,11 @@ follows from the predicted motion, without a pass of the plant.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache
-from itertools import cycle
+from functools import cache, cached_property
+from itertools import cycle, pairwise
 from types import CodeType, MappingProxyType
 
 import numpy as np
@@ -28,7 +28,7 @@ from twinmill.diagnosis.term import (
     TYPICAL,
     WAY,
     Term,
-    displaced,
+    displaced_by,
     times,
 )
 from twinmill.filters import faded, swung
@@ -68,6 +68,7 @@ DAMPINGS = (0.07, 0.3)
 DAMPED = 2.2  # times which a better damping may differ
 LEAST_DAMPED, MOST_DAMPED = 0.01, 0.8  # beyond it hardly anything overshoots
 MOST_POINTS = 10_000  # of all logs, about, by which the size of a form is told
+TOGETHER = 16  # forms of which the values stay near the processor until they are summed up
 FUNCTIONS = {"abs": np.abs, "sign": np.sign, "sqrt": np.sqrt, "cos": np.cos, "sin": np.sin}
 FUNCTIONS["max"] = np.maximum
 
@@ -231,147 +232,207 @@ GAINS = tuple(Form(to, (axis,), "") for to, axis in zip(CHANNELS, SPEEDS, strict
 
 @dataclass(frozen=True)
 class Motion:
-    """One log as the model moves in it, at the points of its floor's response.
+    """Logs as the model moves in them, one after the other, at points of their floors' responses.
 
     Attributes:
-        own: the log.
+        logs: in this order.
         velocity: (N, 3) of the body, m/s and rad/s.
         names: (N,) each, as the effect `equation` names them.
         horizons: numbers of those that count here: the rest would choose the same.
     """
 
-    own: Opened
+    logs: Sequence[Opened]
     velocity: np.ndarray
     names: Mapping[str, np.ndarray]
     horizons: Sequence[int]
     _known: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def of(cls, own: Opened, velocity: np.ndarray, horizons: Sequence[int]) -> "Motion":
-        """Of a log and (N, 3) the velocity in it."""
-        response = own.floor.response
+    def of(
+        cls, logs: Sequence[Opened], velocities: Sequence[np.ndarray], horizons: Sequence[int]
+    ) -> "Motion":
+        """Of logs and (N, 3) the velocity in each."""
+        responses = [own.floor.response for own in logs]
+        velocity = np.concatenate(velocities)
         vx, vy, omega = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
-        x, y = response.pose[:, 0], response.pose[:, 1]
-        moves = (np.abs(velocity) > STILL).any(axis=1) * 1.0
+        x, y = np.concatenate([r.pose[:, :2] for r in responses]).T
+        theta = np.concatenate([r.heading_rad for r in responses])
         names = dict(
-            moves=moves,
+            moves=(np.abs(velocity) > STILL).any(axis=1) * 1.0,
             vx=vx,
             vy=vy,
             omega=omega,
             x=x,
             y=y,
-            theta=response.heading_rad,
-            course=response.heading_rad + np.arctan2(vy, vx),
-            t=response.middle_s,
+            theta=theta,
+            course=theta + np.arctan2(vy, vx),
+            t=np.concatenate([r.middle_s for r in responses]),
         )
-        return cls(own, velocity, names, horizons)
+        names = {name: np.ascontiguousarray(values) for name, values in names.items()}
+        return cls(logs, velocity, names, horizons)
+
+    @cached_property
+    def parts(self) -> list[slice]:
+        """The points of each log."""
+        ends = np.cumsum([0, *(len(own.floor.response.step_s) for own in self.logs)])
+        return [slice(a, b) for a, b in pairwise(ends.tolist())]
+
+    @cached_property
+    def _step_s(self) -> np.ndarray:
+        """(N,) of which the first of each log is 0."""
+        return np.concatenate([own.floor.response.step_s for own in self.logs])
+
+    @cached_property
+    def _captured_rad(self) -> np.ndarray:
+        """(N,) headings as they are captured at the points."""
+        heading = [own.measurement.track.heading_smooth for own in self.logs]
+        pairs = zip(heading, self.logs, strict=True)
+        return np.nan_to_num(np.concatenate([h[own.floor.response.points] for h, own in pairs]))
+
+    def _each(self, made: Callable[..., np.ndarray], *values: np.ndarray) -> np.ndarray:
+        """(..., N) made of (N,) values, of each log by itself."""
+        return np.concatenate([made(*(v[p] for v in values)) for p in self.parts], axis=-1)
 
     def values(self, form: Form) -> np.ndarray:
-        """(N, k) of a form's shapes; of one of all wheels (N, k) for a robot that drives on."""
+        """(k, N) of a form's shapes; of one of all wheels for a robot that drives on."""
         return self._along(form, "vx")
 
     def _along(self, form: Form, axis: str) -> np.ndarray:
         """The same, with a speed of the body in the place of the wheels'."""
         key = (form.adds_to, axis if not form.of_body else "", form.texts, form.rates)
         if key not in self._known:
-            self._known[key] = self._computed(form, {**self.names, TARGET: self.names[axis]})
+            self._known[key] = self._computed(form, axis)
         return self._known[key]
 
-    def _computed(self, form: Form, names: dict[str, np.ndarray]) -> np.ndarray:
+    def _computed(self, form: Form, axis: str) -> np.ndarray:
+        names = {**self.names, TARGET: self.names[axis]}
         if form.adds_to == "theta_rad":
-            track = self.own.measurement.track
-            names["theta"] = np.nan_to_num(track.heading_smooth[self.own.floor.response.points])
+            names["theta"] = self._captured_rad
         states = [{}]
         if form.state and form.state.swings:
-            states = [self._swung(form, goal, names) for goal in form.state.goals]
+            goals = (axis if goal == TARGET else goal for goal in form.state.goals)
+            states = [self._swung(form, goal) for goal in goals]
         elif form.state:
             states = [{"s": self._remembered(form, names)}]
         pairs = zip(form.texts, cycle(states), strict=False)
         found = [_value(text, names | own) for text, own in pairs]
-        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found], axis=-1)
+        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found])
 
-    def _swung(
-        self, form: Form, goal: str, names: Mapping[str, np.ndarray]
-    ) -> dict[str, np.ndarray]:
+    def _swung(self, form: Form, goal: str) -> dict[str, np.ndarray]:
         """(N,) means over each step of s and r that swing around a goal."""
-        pushes = np.broadcast_to(_value(goal, names), names["t"].shape)
-        key = ("swing", pushes.tobytes(), form.constant, form.damping)
+        key = ("swing", goal, form.constant, form.damping)
         if key not in self._known:
-            step_s = self.own.floor.response.step_s
-            means = swung(self._in_the_middle(pushes), step_s, form.constant, form.damping)
-            self._known[key] = np.stack(means)
+            self._known[key] = self._each(
+                lambda own, step_s: swung(own, step_s, form.constant, form.damping),
+                self._in_the_middle(goal),
+                self._step_s,
+            )
         return dict(zip(("s", "r"), self._known[key], strict=True))
 
-    def _in_the_middle(self, values: np.ndarray) -> np.ndarray:
-        """(N,) of the middle of each step; a step of several poses has them from its last one."""
-        step_s = self.own.floor.response.step_s
-        last_s = self.own.measurement.track.timing.pose_period_s
-        sooner = np.clip(1 - last_s / np.where(step_s > 0, step_s, np.inf), 0, 1) / 2
-        return values - sooner * np.diff(values, prepend=values[:1]) * (step_s > 0)
+    def _in_the_middle(self, goal: str) -> np.ndarray:
+        """(N,) of a goal in the middle of each step.
+
+        A step of several poses has the values from its last one.
+        """
+        key = ("middle", goal)
+        if key not in self._known:
+            values = _value(goal, self.names)
+            self._known[key] = values - self._sooner * np.diff(values, prepend=values[:1])
+        return self._known[key]
+
+    @cached_property
+    def _sooner(self) -> np.ndarray:
+        """(N,) half the share of a step at the end of which a value is held; 0 without a step."""
+        last_s = [own.measurement.track.timing.pose_period_s for own in self.logs]
+        last_s = np.repeat(last_s, [p.stop - p.start for p in self.parts])
+        moved = self._step_s > 0
+        return np.clip(1 - last_s / np.where(moved, self._step_s, np.inf), 0, 1) / 2 * moved
 
     def _remembered(self, form: Form, names: Mapping[str, np.ndarray]) -> np.ndarray:
         """(N,) the state's mean over each step."""
-        step_s = self.own.floor.response.step_s
         goal, rate = (
-            np.broadcast_to(_value(form.filled(t or "0"), names), step_s.shape)
+            np.broadcast_to(_value(form.filled(t or "0"), names), self._step_s.shape)
             for t in (form.state.goal, form.state.rate)
         )
         if not form.state.goal:
-            return np.cumsum(rate * step_s) - rate * step_s / 2
-        keep = np.exp(-rate * step_s)
-        after = faded(keep, goal * (1 - keep))
-        return (after + np.append(0.0, after[:-1])) / 2
+            return self._each(np.cumsum, rate * self._step_s) - rate * self._step_s / 2
+        keep = np.exp(-rate * self._step_s)
+        return self._each(_mean_faded, keep, goal * (1 - keep))
 
-    def columns(self, forms: Sequence[Form]) -> np.ndarray:
-        """(W, H, 3, K) change of the log's errors by each number of some forms, in floors."""
-        parts = {to: [f for f in forms if f.adds_to == to] for to in {f.adds_to for f in forms}}
-        weight = np.nan_to_num(self.own.data.weight[:, self.horizons])[..., None]
-        found = np.empty((*weight.shape[:3], sum(len(f.shapes) for f in forms)))
-        place = dict(zip(forms, np.cumsum([0, *(len(f.shapes) for f in forms)]), strict=False))
-        for adds_to, own in parts.items():
-            where = np.concatenate([place[f] + np.arange(len(f.shapes)) for f in own])
-            found[..., where] = weight * self._displaced(adds_to, own)
+    def columns(self, forms: Sequence[Form], kept: Sequence[np.ndarray]) -> np.ndarray:
+        """(R, K) change of the logs' errors by each number of some forms, in floors.
+
+        Args:
+            forms: of known sizes.
+            kept: (W, H, 3) bool of each log: R in all of them.
+        """
+        ends = np.cumsum([0, *(len(f.shapes) for f in forms)])
+        pairs = zip(self.logs, kept, strict=True)
+        weights = [np.nan_to_num(o.data.weight[:, self.horizons][k])[:, None] for o, k in pairs]
+        found = np.empty((sum(np.count_nonzero(k) for k in kept), ends[-1]))
+        for adds_to in dict.fromkeys(f.adds_to for f in forms):
+            own = [k for k, f in enumerate(forms) if f.adds_to == adds_to]
+            for some in (own[n : n + TOGETHER] for n in range(0, len(own), TOGETHER)):
+                where = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in some])
+                changes, first = self._displaced(adds_to, [forms[k] for k in some]), 0
+                for change, inside, weight in zip(changes, kept, weights, strict=True):
+                    rows = change[inside] * weight
+                    found[first : first + len(rows), where] = rows
+                    first += len(rows)
         return found
 
-    def _displaced(self, adds_to: str, forms: Sequence[Form]) -> np.ndarray:
-        """(W, H, 3, K) change of displacements by some forms, all of one place."""
-        response = copy(self.own.floor.response)
-        response.ends = response.ends[:, self.horizons]
-        if adds_to == RIM:  # wheels and body are in proportion, and so are these forms
-            every = [np.hstack([self._along(f, a) * f.strengths for f in forms]) for a in SPEEDS]
-            return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
-        values = np.hstack([self.values(f) * f.strengths for f in forms])
-        if adds_to == "theta_rad":
-            return self._turned(response, values)
+    def _displaced(self, adds_to: str, forms: Sequence[Form]) -> Iterator[np.ndarray]:
+        """(W, H, 3, K) change of each log's displacements by some forms, all of one place."""
+        axes = SPEEDS if adds_to == RIM else ("vx",)  # wheels and body are in proportion
+        every = [[(self._along(f, axis), f.strengths[:, None]) for f in forms] for axis in axes]
+        for log, part in zip(self.logs, self.parts, strict=True):
+            response = copy(log.floor.response)
+            response.ends = response.ends[:, self.horizons]
+            rows = (np.concatenate([v[:, part] * s for v, s in known]) for known in every)
+            values = [np.ascontiguousarray(own.T) for own in rows]
+            if adds_to == "theta_rad":
+                yield _turned(response, values[0], log.data.measured[:, self.horizons])
+            else:
+                pushes = self._pushes(adds_to, values, part)
+                yield displaced_by(response, self.velocity[part], pushes)
+
+    def _pushes(
+        self, adds_to: str, values: Sequence[np.ndarray], part: slice
+    ) -> dict[int, np.ndarray]:
+        """(n, K) velocities in axes of the body, by (n, K) values at some points."""
+        velocity = self.velocity[part]
+        if adds_to == RIM:
+            return dict(enumerate(values))
+        (own,) = values
         if adds_to in CHANNELS:
-            return displaced(response, self.velocity, values, CHANNELS.index(adds_to))
+            return {CHANNELS.index(adds_to): own}
         if adds_to == ROOM:
-            every = self._in_body(values)
-            return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
+            return _in_body(own, self.names["theta"][part])
         if adds_to == "aside":
-            ahead, left = self.velocity[:, [0]], self.velocity[:, [1]]
-            every = (-left * values, ahead * values)
-            return sum(displaced(response, self.velocity, v, k) for k, v in enumerate(every))
-        axes = ALL_AXES[adds_to]
-        parts = (
-            displaced(response, self.velocity, self.velocity[:, [a]] * values, a) for a in axes
-        )
-        return sum(parts)
+            return {0: -velocity[:, [1]] * own, 1: velocity[:, [0]] * own}
+        return {axis: velocity[:, [axis]] * own for axis in ALL_AXES[adds_to]}
 
-    def _in_body(self, pushes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Two (N, K), ahead and to the left, of (N, K) along x and along y of the room in turn."""
-        theta = self.names["theta"][:, None]
-        along_x = np.arange(pushes.shape[1]) % 2 == 0
-        c, s = np.cos(theta), np.sin(theta)
-        return pushes * np.where(along_x, c, s), pushes * np.where(along_x, -s, c)
 
-    def _turned(self, response: Response, error_rad: np.ndarray) -> np.ndarray:
-        """The same by (N, K) errors of the captured heading."""
-        start = error_rad[response.starts][:, None]
-        end = error_rad[np.maximum(response.ends, 0)]
-        moved = np.nan_to_num(self.own.data.measured[:, self.horizons])
-        ahead, left = moved[..., 0, None], moved[..., 1, None]
-        return np.stack([start * left, -start * ahead, end - start], axis=2)
+def _mean_faded(keep: np.ndarray, pushes: np.ndarray) -> np.ndarray:
+    """(N,) means over each step of what fades."""
+    after = faded(keep, pushes)
+    return (after + np.append(0.0, after[:-1])) / 2
+
+
+def _in_body(pushes: np.ndarray, theta_rad: np.ndarray) -> dict[int, np.ndarray]:
+    """(N, K) ahead and to the left, of (N, K) along x and along y of the room in turn."""
+    along_x = np.arange(pushes.shape[1]) % 2 == 0
+    c, s = np.cos(theta_rad)[:, None], np.sin(theta_rad)[:, None]
+    return {0: pushes * np.where(along_x, c, s), 1: pushes * np.where(along_x, -s, c)}
+
+
+def _turned(response: Response, error_rad: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """(W, H, 3, K) change of (W, H, 3) measured displacements by (N, K) errors of the heading."""
+    start = error_rad[response.starts][:, None]
+    end = error_rad[np.maximum(response.ends, 0)]
+    moved = np.nan_to_num(measured)
+    ahead, left = moved[..., 0, None], moved[..., 1, None]
+    return np.stack([start * left, -start * ahead, end - start], axis=2)
 
 
 def _value(text: str, names: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -385,13 +446,14 @@ def _compiled(text: str) -> CodeType:
     return compile(text, text, "eval")
 
 
-def sized(forms: Sequence[Form], motions: Sequence[Motion]) -> list[Form]:
+def sized(forms: Sequence[Form], motion: Motion) -> list[Form]:
     """Forms with the sizes of their values over all logs; without those that are always zero."""
     found = []
-    every = 1 + sum(len(m.velocity) for m in motions) // MOST_POINTS
+    every = 1 + len(motion.velocity) // MOST_POINTS
+    some = np.concatenate([np.arange(p.start, p.stop, every) for p in motion.parts])
     for form in forms:
-        values = np.abs(np.concatenate([m.values(form)[::every] for m in motions]))
-        rms = np.sqrt(np.einsum("nk,nk->k", values, values) / len(values))
+        values = np.abs(motion.values(form).take(some, axis=1))
+        rms = np.sqrt(np.einsum("kn,kn->k", values, values) / len(some))
         sizes = np.maximum(large(values), rms)
         if np.isfinite(sizes).all() and (sizes > 1e-9).all():
             found.append(replace(form, sizes=tuple(float(s) for s in sizes)))
@@ -399,19 +461,16 @@ def sized(forms: Sequence[Form], motions: Sequence[Motion]) -> list[Form]:
 
 
 def large(values: np.ndarray) -> np.ndarray:
-    """(k,) what 95 % of (N, k) values are below: NumPy's percentile takes five times as long."""
-    last = len(values) - 1
+    """(k,) what 95 % of (k, N) values are below: NumPy's percentile takes five times as long."""
+    last = values.shape[1] - 1
     place = 0.95 * last
     below, above = int(place), min(int(place) + 1, last)
-    ordered = np.partition(values, [below, above], axis=0)
-    return ordered[below] + (place - below) * (ordered[above] - ordered[below])
+    ordered = np.partition(values, [below, above], axis=1)
+    return ordered[:, below] + (place - below) * (ordered[:, above] - ordered[:, below])
 
 
 def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:
-    """The library's terms that the effect `equation` can have.
-
-    Not what changes all speeds at once with time: the form `motion` says that without the wheels.
-    """
+    """The library's terms that are forms."""
     return [
         Form(
             t.adds_to,
@@ -422,22 +481,21 @@ def from_library(terms: Sequence[Term], command_unit: str) -> list[Form]:
             command_unit=command_unit if "u" in words(t.formula) else "",
         )
         for k, t in enumerate(terms)
-        if t.addable and not t.family and not t.formula.endswith("*rim")
+        if t.is_form
     ]
 
 
 def own_forms(
-    motions: Sequence[Motion], beat_radps: float, sideways: bool, wheels: bool
+    every: Mapping[str, np.ndarray], beat_radps: float, sideways: bool, wheels: bool
 ) -> list[Form]:
     """Forms beside the library's.
 
     Args:
-        motions: of all logs.
+        every: (N,) of all logs by the names of the motion.
         beat_radps: rate at which errors swing in time; 0 if at none.
         sideways: the robot can move to its left.
         wheels: the model has wheels.
     """
-    every = {n: np.concatenate([m.names[n] for m in motions]) for n in motions[0].names}
     return [
         *_of_room(every, sideways),
         *_of_time(every),

@@ -91,22 +91,22 @@ def formula_of(
         changes: of all logs' rows by each.
         rival: what the formula must outdo.
     """
-    pairs = zip(logs, velocities, strict=True)
-    motions = [Motion.of(own, v, HORIZONS) for (_, own), v in pairs]
+    opened = [own for _, own in logs]
+    motion = Motion.of(opened, velocities, HORIZONS)
     model = fit.models[logs[0][0]]
-    rows = Evidence(logs, motions, fit, changes)
+    rows = Evidence(logs, motion, fit, changes)
     if len(rows.parts) < FEWEST:
         return None
-    beat_radps = beat_of([m.own for m in motions])
-    own = own_forms(motions, beat_radps, drives_sideways(model), bool(model.wheels()))
+    own = own_forms(motion.names, beat_of(opened), drives_sideways(model), bool(model.wheels()))
     command_unit = "rad/s" if model.drive == "wheel_speed" else ""  # a duty is a plain figure
-    forms = [*from_library(terms, command_unit), *sized(own, motions)]
+    forms = [*from_library(terms, command_unit), *sized(own, motion)]
     pool = Pool(forms, rows.raw(forms))
+    alone = Sums.of(rows, pool, pool.raw[:, :0])
     clock = Recurring(rows)
     half = np.arange(len(rows.parts)) % 2 == 0
     found: list[Proof] = []
     for chooses in (half, ~half):
-        found += _proven(rows, pool, chooses, rival=rival, clock=clock)
+        found += _proven(rows, pool, alone, chooses, rival=rival, clock=clock)
     return _borne_out(rows, pool, clock, found)
 
 
@@ -175,7 +175,13 @@ def _net(rows: Evidence, proof: Proof) -> float:
 
 
 def _proven(
-    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: Rival | None, clock: Recurring
+    rows: Evidence,
+    pool: Pool,
+    alone: Sums,
+    half: np.ndarray,
+    *,
+    rival: Rival | None,
+    clock: Recurring,
 ) -> list[Proof]:
     """Chooses on a half and judges on the other; none where that does not bear it out.
 
@@ -186,18 +192,19 @@ def _proven(
     Args:
         rows: are weighed anew.
         pool: to choose from.
+        alone: of each form of it, as rows weigh at first.
         half: (S,) of the stretches.
         rival: what it must outdo.
         clock: over the same rows.
     """
     rows.weighed(np.ones(len(rows.stretch)))
-    net = _promised(rows, pool, half)
+    net = _promised(alone, pool.forms, half)
     best = np.argsort(-net)[:SHORTLIST]
     tested = []
     if net[best[0]] > 0:
         tested += _judged(rows, pool, pool.some(best), half, rival=rival, tests=2)
     if not any(_holds(proof) for proof in tested):
-        tested += _that_swings(rows, pool, half, rival=rival, before=len(tested))
+        tested += _that_swings(rows, pool, alone, half, rival=rival, before=len(tested))
     found = [proof for proof in tested if _holds(proof)]
     is_of_time = all(proof.chosen.forms[0].group == TIME for proof in found)
     if is_of_time and any(pool.forms[k].group == TIME for k in best[:NEAR]):
@@ -212,25 +219,32 @@ def _holds(proof: Proof) -> bool:
     return proof.chance <= SETTINGS.formula_chance and proof.takes >= SETTINGS.formula_takes
 
 
-def _promised(rows: Evidence, pool: Pool, half: np.ndarray) -> np.ndarray:
+def _promised(alone: Sums, forms: Sequence[Form], half: np.ndarray) -> np.ndarray:
     """(T,) what each form gains on left-out stretches of a half, less what its numbers cost."""
-    gains = Sums.of(rows, pool, pool.raw[:, :0]).held_out(half)
-    return gains - SETTINGS.each * np.array([f.numbers for f in pool.forms])
+    return alone.held_out(half) - SETTINGS.each * np.array([f.numbers for f in forms])
 
 
 def _that_swings(
-    rows: Evidence, pool: Pool, half: np.ndarray, *, rival: Rival | None, before: int
+    rows: Evidence,
+    pool: Pool,
+    alone: Sums,
+    half: np.ndarray,
+    *,
+    rival: Rival | None,
+    before: int,
 ) -> list[Proof]:
     """Of what swings alone, by rows that weigh more, after so many tests of a half."""
     rows.weighed(np.full(len(rows.stretch), HEAVY))
-    some = pool.some([k for k, f in enumerate(pool.forms) if f.damping])
-    net = _promised(rows, some, half)
+    swinging = np.flatnonzero([f.damping > 0 for f in pool.forms])
+    sums = alone.some(swinging).of_rows_that_weigh(HEAVY)
+    net = _promised(sums, [pool.forms[k] for k in swinging], half)
     best = np.argsort(-net)[:SHORTLIST]
     left = rows.left[half[rows.stretch]]
     if net[best[0]] <= SETTINGS.formula_takes * left @ left:
         return []
     tests = 2 * (before + 1)
-    return _judged(rows, pool, some.some(best), half, rival=rival, tests=tests, weight=HEAVY)
+    short = pool.some(swinging[best])
+    return _judged(rows, pool, short, half, rival=rival, tests=tests, weight=HEAVY)
 
 
 def _by_the_clock(rows: Evidence, half: np.ndarray, clock: Recurring) -> Pool:
@@ -344,7 +358,7 @@ def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen
     tops = dict.fromkeys([int(simplest), int(np.argmax(net))])
     polished = [_polished(rows, pool.some([k]), half, found) for k in tops]
     plainer = [f for c in polished if (f := c.forms[-1].plainer)]
-    for form in sized(plainer, rows.motions):
+    for form in sized(plainer, rows.motion):
         polished.append(_polished(rows, Pool([form], rows.raw([form])), half, found))
     most = max(c.net for c in polished)
     close = [c for c in polished if c.net >= most - _alike(most)]

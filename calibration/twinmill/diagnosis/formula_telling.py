@@ -43,7 +43,7 @@ def told(rows: Evidence, proof: Proof, tried: int, again: float) -> Formula:
             best = max(best, made(rows, near, every, found), key=lambda c: c.gain)
         found = best
     names = names_in([t for f in found.forms for t in (*f.texts, *f.rates)])
-    seen = {n: np.concatenate([m.names[n] for m in rows.motions]) for n in names}
+    seen = {n: rows.motion.names[n] for n in names}
     numbers = _numbers(rows, found)
     return Formula(
         forms=found.forms,
@@ -69,9 +69,11 @@ def drives_back(rows: Evidence, formula: Formula) -> bool:
     if axis is None or any(f.rates for f in forms) or (axis and others):
         return False
     numbers = np.array([n.value for n in formula.numbers if n.name])
-    for motion in rows.motions:
-        speed = motion.names[axis] if axis else np.ones(len(motion.velocity))
-        after = speed + np.hstack([motion.values(f) for f in forms]) @ numbers[: _shapes(forms)]
+    motion = rows.motion
+    every = motion.names[axis] if axis else np.ones(len(motion.velocity))
+    added = np.hstack([motion.values(f).T for f in forms]) @ numbers[: _shapes(forms)]
+    for part in motion.parts:
+        speed, after = every[part], every[part] + added[part]
         usual = np.sqrt(np.mean(speed[speed != 0] ** 2)) if speed.any() else np.inf
         if np.min(after * np.sign(speed)) < -SETTINGS.formula_back * usual:
             return True
@@ -85,7 +87,7 @@ def _shapes(forms: Sequence[Form]) -> int:
 def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> Curve:
     """What is left in bins of the first variable of the first term, and the formula there."""
     name, carrier = variable_of(forms)
-    at = np.concatenate([m.names[name] for m in rows.motions])
+    at = rows.motion.names[name]
     if name in ANGLES:
         middles = np.linspace(-np.pi, np.pi, BINS, endpoint=False)
         inside = [f"(cos({name} - {a:.4f}) > {np.cos(np.pi / BINS):.6f})" for a in middles]
@@ -111,9 +113,8 @@ def _drawn(
     rows: Evidence, forms: Sequence[Form], values: Sequence[float], bins: Sequence[Form]
 ) -> np.ndarray:
     """(B,) the formula in bins, as what is left there is fitted: by least squares on carriers."""
-    parts = [np.hstack([m.values(f) for f in forms]) @ np.array(values) for m in rows.motions]
-    whole = np.concatenate(parts)
-    weights = [np.concatenate([m.values(b)[:, 0] for m in rows.motions]) for b in bins]
+    whole = np.hstack([rows.motion.values(f).T for f in forms]) @ np.array(values)
+    weights = [rows.motion.values(b)[0] for b in bins]
     return np.array([w @ whole / max(w @ w, 1e-12) for w in weights])
 
 

@@ -5,7 +5,7 @@ Of the body: terms in its velocity, its changes, heading, place, time and voltag
 in its command. Each comes with how the rows of a fit change by it.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from twinmill.diagnosis.term import (
     CHANGE,
     CHANNELS,
     COUPLING,
+    NO_NAMES,
     PLACE,
     SPEEDS,
     STILL,
@@ -36,7 +37,7 @@ from twinmill.diagnosis.term import (
 from twinmill.fitting.dependence import fading, rates
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import Opened
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import effect_names, words
 from twinmill.predict.datasets import errors_of
 
 LEFT_OVER = 0.02  # share of a term's norm that must survive beside what is free
@@ -48,45 +49,65 @@ SHAPES = ("u*abs(u)", "abs(u)", "sign(u)", "sign(u)*max(0, abs(u) - h)")
 
 
 def library(
-    opened: Sequence[Opened], models: Sequence[native.Model]
+    opened: Sequence[Opened], models: Sequence[native.Model], *, forms_alone: bool = False
 ) -> tuple[list[Term], Columns, list[np.ndarray]]:
     """Terms, (R, T) change of the rows of all logs by each at its strength, (N, 3) velocities.
 
     Args:
         opened: logs over their floors.
         models: with what was found, one for each.
+        forms_alone: without terms that are no form.
     """
     pairs = list(zip(opened, models, strict=True))
     velocities = [body_velocity_at(own.data, m, own.floor.response.points) for own, m in pairs]
     middles = _middles(opened) | _bends(velocities)
     values = [_named_terms(own, v, middles) for own, v in zip(opened, velocities, strict=True)]
     sizes = _sizes(values)
+    if forms_alone:
+        sizes = {(group, f): size for (group, f), size in sizes.items() if not words(f) & NO_NAMES}
     terms = [
         Term(_across(g, f, CHANNELS[a]), CHANNELS[a], f, s)
         for (g, f), s in sizes.items()
         for a in range(3)
     ]
-    of_wheels = _wheel_terms(opened, models[0])
+    of_wheels = [t for t in _wheel_terms(opened, models[0]) if t.is_form or not forms_alone]
+    others, changes = ([], None) if forms_alone else _judged_together(opened, velocities, terms)
+
+    def pieces() -> Iterator[list[np.ndarray]]:
+        for k, (own, model) in enumerate(pairs):
+            body = _body_columns(own, velocities[k], values[k], sizes)
+            beside = changes(k, body) if changes else []
+            yield [body, *beside, _wheel_columns(own, model, of_wheels)]
+
+    columns = Columns.beside(pieces(), sum(own.data.weight.size for own in opened))
+    return [*terms, *others, *of_wheels], columns, velocities
+
+
+def _judged_together(
+    opened: Sequence[Opened], velocities: Sequence[np.ndarray], terms: Sequence[Term]
+) -> tuple[list[Term], Callable[[int, np.ndarray], list[np.ndarray]]]:
+    """What changes all speeds alike, waves and families, and from the k-th log to its columns.
+
+    Args:
+        opened: logs over their floors.
+        velocities: (N, 3) of the body in each.
+        terms: of the body, from whose (R, T) columns some of them follow.
+    """
     of_all, parts = _terms_of_all_speeds(terms)
     times_s = [own.floor.response.middle_s for own in opened]
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     families = families_of(opened, velocities)
 
-    def pieces() -> Iterator[list[np.ndarray]]:
-        for k, (own, model) in enumerate(pairs):
-            body = _body_columns(own, velocities[k], values[k], sizes)
-            swells = [
-                w.columns(own, velocities[k], a[k])
-                for w, a in zip(waves, (times_s, ways_m), strict=True)
-            ]
-            narrow = [f.columns(own, velocities[k]) for f in families]
-            yield [body, body @ parts, *swells, *narrow, _wheel_columns(own, model, of_wheels)]
+    def changes(k: int, body: np.ndarray) -> list[np.ndarray]:
+        own, velocity = opened[k], velocities[k]
+        swells = [
+            w.columns(own, velocity, along[k])
+            for w, along in zip(waves, (times_s, ways_m), strict=True)
+        ]
+        return [body @ parts, *swells, *(f.columns(own, velocity) for f in families)]
 
-    of_families = [t for f in families for t in f.terms]
-    every = [*terms, *of_all, *waves[0].terms, *waves[1].terms, *of_families, *of_wheels]
-    columns = Columns.beside(pieces(), sum(own.data.weight.size for own in opened))
-    return every, columns, velocities
+    return [*of_all, *(t for some in (*waves, *families) for t in some.terms)], changes
 
 
 def _across(group: str, formula: str, to: str) -> str:
@@ -179,7 +200,7 @@ def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
     for key in [k for k in values[0] if all(k in v for v in values)]:
         every = np.concatenate([v[key][::step] for v in values])
         # What all but the largest are below; of rare ones, which that would call nothing, the RMS.
-        high = float(large(np.abs(every)[:, None])[0])
+        high = float(large(np.abs(every)[None])[0])
         sizes[key] = max(high, float(np.sqrt(np.mean(every**2))), 1e-9)
     return sizes
 

@@ -39,7 +39,7 @@ class Recurring:
     @cached_property
     def edges_s(self) -> np.ndarray:
         """(BINS + 1,) of bins of the time of all logs."""
-        t_s = np.concatenate([m.names["t"] for m in self.rows.motions])
+        t_s = self.rows.motion.names["t"]
         return np.linspace(t_s.min(), t_s.max() + 1e-6, BINS + 1)
 
     @cached_property
@@ -94,7 +94,7 @@ class Recurring:
         for part in FINER:
             near = self._near(best, part)
             best = most(near, self._in_bins(near))
-        forms = sized([on_and_off(*best)], self.rows.motions)
+        forms = sized([on_and_off(*best)], self.rows.motion)
         return Pool(forms, self.rows.raw(forms))
 
     def goes_on(self, raw: np.ndarray) -> bool:

@@ -7,10 +7,10 @@ regression of the errors on groups of velocity terms without physics names, each
 that it was not fitted to.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -65,11 +65,25 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Tested:
-    """Terms of a group, (T,) bool, that are tested together, and their products."""
+    """Terms of a group that are tested together.
+
+    Attributes:
+        places: (k,) of the terms, ascending.
+        products: of all terms.
+        among: what is tested that has all of them; None if nothing has.
+    """
 
     group: str
-    own: np.ndarray
-    grams: "Grams"
+    places: np.ndarray
+    products: "Products"
+    among: "Tested | None" = None
+
+    @cached_property
+    def grams(self) -> "Grams":
+        """Their products with each other."""
+        if self.among is None:
+            return self.products.grams(self.places)
+        return self.among.grams.only(np.searchsorted(self.among.places, self.places))
 
 
 # Share of a test's evidence that counts, of (R,) errors that it leaves and those that it explained.
@@ -286,15 +300,23 @@ class Doubted:
         return replace(found, instead_of=self.names) if found else None
 
 
-def formulas_of(opened: Sequence[Opened], fit: ScoreFit) -> Formulas | None:
-    """Formulas over the logs of a fit; None if it has none whose floor told a smooth response."""
+def formulas_of(
+    opened: Sequence[Opened], fit: ScoreFit, *, forms_alone: bool = False
+) -> Formulas | None:
+    """Formulas over the logs of a fit; None if it has none whose floor told a smooth response.
+
+    Args:
+        opened: the fit's measurements, in its order.
+        fit: of them.
+        forms_alone: those alone of which one may be proven.
+    """
     seen = [(i, o) for i, o in enumerate(opened) if o.floor and o.floor.response]
     if not seen:
         return None
     places, logs = zip(*seen, strict=True)
     every = thinning([o.data for o in logs], SETTINGS.few_starts, SETTINGS.starts_apart_s)
     logs = thinned(logs, every)
-    found = library(logs, [fit.models[i] for i in places])
+    found = library(logs, [fit.models[i] for i in places], forms_alone=forms_alone)
     return Formulas(list(zip(places, logs, strict=True)), *found, seen, every)
 
 
@@ -490,10 +512,10 @@ def _tested(
     for of_ridge, beyond in zip(gains, sure, strict=True):
         for test, gain, is_sure in zip(tested, of_ridge, beyond, strict=True):
             group = test.group
-            this = Dependence(group, float(gain), bool(is_sure), test.own, group in apparent)
-            known = best.get(test.group)
-            if known is None or (this.sure, gain) > (known.sure, known.gain):
-                best[test.group] = this
+            known = best.get(group)
+            if known is None or (is_sure, gain) > (known.sure, known.gain):
+                own = np.isin(np.arange(len(terms)), test.places)
+                best[group] = Dependence(group, float(gain), bool(is_sure), own, group in apparent)
     return sorted(best.values(), key=lambda d: -d.gain)
 
 
@@ -535,7 +557,7 @@ def _fresh_of(logs: Sequence[tuple[int, Opened]], products: "Products") -> Fresh
     def fresh(test: Tested, left: np.ndarray, made: np.ndarray) -> float:
         if test.group not in SLOW:
             return 1.0
-        if test.group != PLACE and len(logs) == 1 and test.own.sum() > FOLLOWS:
+        if test.group != PLACE and len(logs) == 1 and len(test.places) > FOLLOWS:
             return 0.0
         fell, share = [], []
         errors = (_errors_of(logs, products, v) for v in (left, made))
@@ -568,27 +590,18 @@ def _errors_of(
 
 def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
     """Each family, and each formula that it has: the same of another group is something else."""
-    if not terms:
-        return
-    groups, kinds, formulas = (
-        _numbered(values)
-        for values in zip(*((t.group, (t.group, t.family), t.formula) for t in terms), strict=True)
-    )
-    for kind in range(kinds.max() + 1):
-        together = kinds == kind
-        of_group = groups == groups[together][0]
-        group, grams = terms[int(together.argmax())].group, products.grams(together)
-        yield Tested(group, together, grams)
-        for formula in dict.fromkeys(formulas[together].tolist()):
-            own = of_group & (formulas == formula)
-            inside = not np.any(own & ~together)
-            yield Tested(group, own, grams.only(own[together]) if inside else products.grams(own))
-
-
-def _numbered(values: Iterable[Hashable]) -> np.ndarray:
-    """(N,) which of all different values each is: numbers are compared far sooner than texts."""
-    known: dict[Hashable, int] = {}
-    return np.array([known.setdefault(value, len(known)) for value in values], int)
+    families: dict[tuple[str, str], list[int]] = {}
+    alike: dict[tuple[str, str], list[int]] = {}
+    for k, term in enumerate(terms):
+        families.setdefault((term.group, term.family), []).append(k)
+        alike.setdefault((term.group, term.formula), []).append(k)
+    for (group, _), together in families.items():
+        family = Tested(group, np.array(together), products)
+        yield family
+        for formula in dict.fromkeys(terms[k].formula for k in together):
+            own = alike[group, formula]
+            among = family if set(own) <= set(together) else None
+            yield Tested(group, np.array(own), products, among)
 
 
 def _gains(
@@ -596,12 +609,13 @@ def _gains(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
     gains, nulls = np.zeros((len(RIDGES), len(tested))), np.zeros((len(RIDGES), len(tested), flips))
-    widths = np.array([test.own.sum() for test in tested])
+    by_width: dict[int, list[int]] = {}
+    for n, test in enumerate(tested):
+        by_width.setdefault(len(test.places), []).append(n)
     for k, ridge in enumerate(RIDGES):
         alone, of_alone = products.each_held_out(flips, ridge)
-        for width in np.unique(widths):
-            own = np.flatnonzero(widths == width)
-            places = np.array([np.flatnonzero(tested[n].own) for n in own])
+        for width, own in by_width.items():
+            places = np.array([tested[n].places for n in own])
             if width == 1:
                 gains[k, own], nulls[k, own] = alone[places[:, 0]], of_alone[:, places[:, 0]].T
             else:
@@ -651,7 +665,7 @@ class Grams:
     folds: np.ndarray
 
     def only(self, own: np.ndarray) -> "Grams":
-        """Of some (k,) of them."""
+        """Of those of some numbers."""
         return Grams(self.blocks[:, own][:, :, own], self.folds[:, own][:, :, own])
 
 
@@ -702,14 +716,14 @@ class Products:
         self.along = self.across.sum(0)
         self.inside = squares(basis, self.parts)
         self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
-        more = self.along * (self.inside @ self.along - 2 * self.across)
-        self.energy = square + more.sum(1)
+        more = self.inside @ self.along - 2 * self.across
+        self.energy = square + np.einsum("bpt,pt->bt", more, self.along)
         before, after = square.sum(0), self.energy.sum(0)
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
         self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
 
     def grams(self, own: np.ndarray) -> Grams:
-        """Of some (T,) columns with each other."""
+        """Of some columns with each other, by their numbers or (T,) bool."""
         some = self.own[own]
         rows = self.weight * self.columns.some(some)
         blocks = squares(rows, self.parts)
@@ -718,9 +732,9 @@ class Products:
 
     def left_by(self, test: Tested, ridge: float) -> np.ndarray:
         """(R,) what some columns leave of the errors, fitted to other blocks."""
-        some = self.own[test.own]
+        some = self.own[test.places]
         rows = self.weight * self.columns.some(some) - self.basis @ self.along[:, some]
-        moments = self._by_fold(self.moments[:, test.own])
+        moments = self._by_fold(self.moments[:, test.places])
         left = self.left.copy()
         for k, own in enumerate(test.grams.folds):
             others = test.grams.folds.sum(0) - own + ridge * np.eye(len(own))
@@ -751,7 +765,7 @@ class Products:
 
         Args:
             grams: to be changed.
-            own: (T,) whose they are.
+            own: whose they are, by numbers or (T,) bool.
             across: (B, P, k) of what is free with them.
             inside: (B, P, P) of what is free with itself.
         """
@@ -787,15 +801,12 @@ class Products:
         without = (moments.sum(0) - moments) / (energy.sum(0) - energy + ridge)
         scatter = moments - energy * without
         signs = _signs(flips, len(energy))
-        gain = np.zeros((1 + flips, energy.shape[1]))
-        for k in range(FOLDS):
-            test = self.fold == k
-            fitted, judged = (
-                np.vstack([moments[own].sum(0), signs[:, own] @ scatter[own]])
-                for own in (~test, test)
-            )
-            size = fitted / (energy[~test].sum(0) + ridge)
-            gain += 2 * size * judged - size**2 * energy[test].sum(0)
+        tests = [self.fold == k for k in range(FOLDS)]
+        judged = [np.vstack([moments[own].sum(0), signs[:, own] @ scatter[own]]) for own in tests]
+        total, gain = sum(judged), 0.0
+        for own, here in zip(tests, judged, strict=True):
+            size = (total - here) / (energy[~own].sum(0) + ridge)
+            gain += size * (2 * here - size * energy[own].sum(0))
         return gain[0], gain[1:]
 
     def held_out(self, own: np.ndarray) -> float:
@@ -818,17 +829,20 @@ class Products:
         folds = np.array([g.folds for g in grams])  # (N, FOLDS, k, k)
         whole = folds.sum(1) + ridge * np.eye(places.shape[1])  # columns are in typical strengths
         tests = [self.fold == k for k in range(FOLDS)]
-        judged = np.stack([moments[:, test].sum(1) for test in tests], axis=1)[:, :, None]
+        judged = np.empty((len(places), FOLDS, 1 + flips, places.shape[1]))
+        for k, test in enumerate(tests):
+            judged[:, k, 0] = moments[:, test].sum(1)
         if flips:
             blocks = np.array([g.blocks for g in grams])
             others = moments.sum(1, keepdims=True) - moments
             numbers = np.linalg.solve(whole[:, None] - blocks, others[..., None])
-            scatter = moments - (blocks @ numbers)[..., 0]
+            scatter = np.moveaxis(moments - (blocks @ numbers)[..., 0], 1, 0)  # (B, N, k)
             signs = _signs(flips, len(self.fold))
-            by_chance = np.stack([signs[:, test] @ scatter[:, test] for test in tests], axis=1)
-            judged = np.concatenate([judged, by_chance], axis=2)  # (N, FOLDS, 1 + F, k)
+            for k, test in enumerate(tests):
+                by_chance = np.tensordot(signs[:, test], scatter[test], 1)
+                judged[:, k, 1:] = np.moveaxis(by_chance, 0, 1)
         fitted = (judged.sum(1, keepdims=True) - judged) @ np.linalg.inv(whole[:, None] - folds)
-        gain = np.sum(fitted * (2 * judged - fitted @ folds), axis=(1, 3))
+        gain = np.einsum("nfsk,nfsk->ns", fitted, 2 * judged - fitted @ folds)
         return gain[:, 0], gain[:, 1:]
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One candidate formula without a physics name, and what a velocity does to the errors of a log."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,6 +68,14 @@ class Term:
         return not words(self.formula) & NO_NAMES
 
     @property
+    def is_form(self) -> bool:
+        """A form of its own, which the effect `equation` can have.
+
+        Not what changes all speeds at once with time: the form `motion` says that without wheels.
+        """
+        return self.addable and not self.family and not self.formula.endswith("*rim")
+
+    @property
     def is_step(self) -> bool:
         """Before a moment it is the opposite of what it is after it."""
         return self.formula.startswith("sign(t - ")
@@ -102,3 +111,13 @@ def displaced(
         np.ascontiguousarray(np.maximum(response.ends, 0)),
         heading[response.data.windows.starts],
     )
+
+
+def displaced_by(
+    response: Response, velocity: np.ndarray, values: Mapping[int, np.ndarray]
+) -> np.ndarray:
+    """(W, H, 3, T) the same by (N, T) velocities in each of several body axes."""
+    first, *others = (displaced(response, velocity, v, axis) for axis, v in values.items())
+    for other in others:
+        first += other
+    return first

@@ -11,6 +11,7 @@ Levenberg and Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -719,13 +720,14 @@ class ScoreFit:
         """(B, P) Newton's steps without each block, (R,) of the rows of data set i."""
         rows, slopes, own = self.state[0][i], self.state[1][i], self.columns[i]
         order = np.argsort(block, kind="stable")
-        parts = np.split(order, 1 + np.flatnonzero(np.diff(block[order])))
-        weighted = slopes * self.weight(i, rows)[:, None]
+        edges = np.flatnonzero(np.diff(block[order], prepend=np.nan, append=np.nan))
+        parts = [slice(a, b) for a, b in pairwise(edges.tolist())]
+        weight, rows, slopes = self.weight(i, rows)[order], rows[order], slopes[order]
+        weighted = (slopes * weight[:, None]).T
         less = np.repeat(self._curvature[None], len(parts), axis=0)
+        less[:, own[:, None], own] -= [weighted[:, p] @ slopes[p] for p in parts]
         push = np.zeros((len(parts), len(self.x)))
-        for k, out in enumerate(parts):
-            less[k][np.ix_(own, own)] -= weighted[out].T @ slopes[out]
-            push[k, own] = weighted[out].T @ rows[out]
+        push[:, own] = [weighted[:, p] @ rows[p] for p in parts]
         try:
             moved = np.linalg.solve(less, push[..., None])[..., 0]
         except np.linalg.LinAlgError:

@@ -62,9 +62,8 @@ def test_what_swings_does_what_an_integrator_does(damping):
         ).y[:, -1]
         means.append([after[2] / step, (after[0] - now[0]) / step])
         now = after
-    assert np.stack(swung(pushes, step_s, rate, damping), axis=1) == pytest.approx(
-        np.array(means), abs=1e-8
-    )
+    found = swung(pushes, step_s, rate, damping)
+    assert found == pytest.approx(np.array(means).T, abs=1e-8)
 
 
 def integrated(velocity, heading_rad, step_s, start, end, at_rad):

@@ -163,7 +163,7 @@ def motion(tanh_robot, measure, one_clock_base) -> tuple:
     """A log as the base moves in it, at all horizons."""
     (own,) = open_measurements([measure(tanh_robot(), 2, 40.0)], one_clock_base)
     velocity = body_velocity_at(own.data, own.model, own.floor.response.points)
-    return own, Motion.of(own, velocity, range(5))
+    return own, Motion.of([own], [velocity], range(5))
 
 
 LAG = State("omega", "(1/{c})")
@@ -200,8 +200,8 @@ AROUND = "vx*max(0, 1 - abs(abs(vx)/{c} - 1)/0.4)"
 def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
     """The plant with the effect `equation`: another program, which integrates."""
     own, moves = motion
-    (form,) = sized([form], [moves])
-    columns = moves.columns([form]).reshape(-1, len(form.shapes))
+    (form,) = sized([form], moves)
+    columns = moves.columns([form], [np.ones(own.data.measured.shape, bool)])
     model = own.model.copy()
     model.add_effect("equation", joined([form]))
     names = ["equation.p0", "equation.p1"]
@@ -216,7 +216,7 @@ def test_a_form_changes_the_errors_as_the_plant_does_that_has_it(motion, form):
 
 def test_units_agree_in_every_form_and_are_told_of_its_numbers(motion):
     """By dimensions: a number in front of v |v| that gives a speed is in s/m."""
-    for form in own_forms([motion[1]], 5.0, True, True):
+    for form in own_forms(motion[1].names, 5.0, True, True):
         assert units_of(form)
     assert units_of(Form("vx_mps", ("vx*abs(vx)",), "speed")) == ["s/m"]
     assert units_of(Form("travel", ("(vx*vx + vy*vy)",), "speed")) == ["s^2/m^2"]

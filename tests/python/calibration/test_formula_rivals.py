@@ -110,7 +110,7 @@ def test_a_second_effect_that_is_there_is_no_rest_of_the_first(noise):
 
 
 def test_a_formula_may_stand_in_the_place_of_a_doubtful_effect_beside_a_sure_one(monkeypatch):
-    monkeypatch.setattr(diagnose, "formulas_of", lambda opened, fit: "formulas")
+    monkeypatch.setattr(diagnose, "formulas_of", lambda *_, forms_alone: "formulas")
     findings = [
         SimpleNamespace(effect="coasting", certainty="sure"),
         SimpleNamespace(effect="floor_tilt", certainty="doubtful"),

@@ -683,4 +683,5 @@ def test_columns_of_several_logs_stand_one_log_after_the_other():
     logs = [[random.normal(size=(rows, width)) for width in (2, 3)] for rows in (4, 6)]
     columns = Columns.beside(iter(logs), 10)
     assert np.array_equal(columns.some(np.arange(5)), np.vstack([np.hstack(own) for own in logs]))
-    assert Columns.beside(iter(logs[:1]), 4).pieces is logs[0]  # of one log nothing is copied
+    wide = random.normal(size=(4, 100))
+    assert Columns.beside(iter([[wide, *logs[0]]]), 4).pieces[0] is wide  # of one log no copy

@@ -3,11 +3,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
 
 import numpy as np
 
-from twinmill.diagnosis.term import STILL, TYPICAL, Term, displaced
+from twinmill.diagnosis.term import STILL, TYPICAL, Term, displaced_by
 from twinmill.fitting.opening import Opened
 
 HUMPS = 8  # over the range of a speed, or of a place
@@ -27,9 +26,7 @@ class Family:
     def columns(self, own: Opened, velocity: np.ndarray) -> np.ndarray:
         """(R, k) change of a log's rows, as (N, 3) `velocity` moves the robot."""
         values = self.values(own, np.where(np.abs(velocity) < STILL, 0.0, velocity))
-        response = own.floor.response
-        parts = (displaced(response, velocity, v, axis) for axis, v in values.items())
-        change = reduce(np.add, parts)
+        change = displaced_by(own.floor.response, velocity, values)
         change *= np.nan_to_num(own.data.weight)[..., None]
         return change.reshape(-1, len(self.terms))
 
