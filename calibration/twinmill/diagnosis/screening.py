@@ -297,15 +297,19 @@ def likely_pairs(
     Of two that hide each other, as a lag of the drive and one of turning the other way, either
     alone takes next to nothing: so of all.
     """
-    if before.held_score < 1.0 or before.state.of_cameras:
+    if before.held_score < 1.0 or before.state.of_cameras or len(screened) < 2:
         return []
     fit = _on_few(before.fit)
     left, *_ = fit.whitened(range(len(fit.datasets)))
+    whole = np.hstack([s.columns[: len(left)] for s in screened])
+    gram, moment = whole.T @ whole + 0.25 * np.eye(whole.shape[1]), whole.T @ left
+    ends = np.cumsum([s.columns.shape[1] for s in screened])
+    places = np.split(np.arange(whole.shape[1]), ends[:-1])
     worth = {}
-    for a, b in combinations(screened, 2):
-        both = np.hstack([a.columns, b.columns])[: len(left)]
-        gram = both.T @ both + 0.25 * np.eye(both.shape[1])
-        moment = both.T @ left
-        worth[a.name, b.name] = float(moment @ np.linalg.solve(gram, moment)) - max(a.gain, b.gain)
+    for (a, of_a), (b, of_b) in combinations(zip(screened, places, strict=True), 2):
+        own = np.concatenate([of_a, of_b])
+        pull = moment[own]
+        together = pull @ np.linalg.solve(gram[own[:, None], own], pull)
+        worth[a.name, b.name] = float(together) - max(a.gain, b.gain)
     best = sorted(worth, key=lambda pair: -worth[pair])
     return [p for p in best if worth[p] > settings.evidence][: settings.pairs]
