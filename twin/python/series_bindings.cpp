@@ -373,6 +373,8 @@ struct Between
         row = static_cast<size_t>(within);
         part = within - static_cast<double>(row);
     }
+
+    double Of(double from, double to) const { return from * (1 - part) + to * part; }
 };
 
 // (K, C) of a signal (G, C) at places (K,).
@@ -388,7 +390,7 @@ Array ReadAt(Matrix signal, Vector places)
         const Between here(place, rows);
         const double *from = signal.data() + here.row * width, *to = from + width;
         for (size_t c = 0; c < width; ++c)
-            *value++ = from[c] * (1 - here.part) + to[c] * here.part;
+            *value++ = here.Of(from[c], to[c]);
     }
     return ToNumpy(std::move(values), {places.size(), width});
 }
@@ -406,7 +408,7 @@ void SumProducts(std::span<const Between> at, const double *first, size_t width,
         const double *from = first + here.row * width, *to = from + width;
         for (size_t c = 0; c < kBeside; ++c)
         {
-            const double value = from[c] * (1 - here.part) + to[c] * here.part;
+            const double value = here.Of(from[c], to[c]);
             square[c] += value * value;
             product[c] += value * beside[c];
         }

@@ -17,6 +17,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     all_effect_parameters,
     base_parameters,
+    begun_about,
     catalogue_name,
     effect_names,
     effect_parameters,
@@ -149,8 +150,7 @@ def nearer(state: State) -> State:
     models = [m.copy() for m in state.models] if near else state.models
     for model, (name, value) in product(models, near.items()):
         model.set(name, value)
-    free = tuple(p.about(near[p.name]) if p.name in near else p for p in state.free)
-    return replace(state, models=models, free=free)
+    return replace(state, models=models, free=tuple(begun_about(state.free, near)))
 
 
 def with_effects(

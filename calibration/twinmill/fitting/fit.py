@@ -32,6 +32,7 @@ from twinmill.model.parameters import (
     all_effect_parameters,
     base_lag_is_identifiable,
     base_parameters,
+    begun_about,
     duty_table,
     gains_of,
 )
@@ -133,8 +134,7 @@ def fitted(
     known = judged(opened)
     data, models = [o.data for o in known], [o.model for o in known]
     near = ScoreFit(data, models, free).nearer()
-    free = [p.about(near[p.name]) if p.name in near else p for p in free]
-    fit = ScoreFit(data, models, free)
+    fit = ScoreFit(data, models, begun_about(free, near))
     if fresh:
         fit.begin_at_best(fresh)
     fit.fit()

@@ -89,10 +89,6 @@ class Parameter:
         """The same, begun elsewhere; no place or moment is usual: the prior of one goes with it."""
         return replace(self, value=value, usual=value if self.role in NO_SIZE else self.usual)
 
-    def about(self, value: float) -> "Parameter":
-        """The same, begun at a rough value, with a prior as wide as that is rough."""
-        return replace(self, value=value, usual=value, std=max(self.std, ROUGH * abs(value)))
-
 
 @dataclass(frozen=True)
 class ParameterEstimate:
@@ -364,6 +360,19 @@ def base_parameters(model: native.Model, names: Iterable[str]) -> list[Parameter
             )
         )
     return found
+
+
+def begun_about(parameters: Iterable[Parameter], near: Mapping[str, float]) -> list[Parameter]:
+    """Quantities, those of some names begun at rough values.
+
+    Their priors are there, and as wide as these are rough.
+    """
+    return [
+        replace(p, value=v, usual=v, std=max(p.std, ROUGH * abs(v)))
+        if (v := near.get(p.name)) is not None
+        else p
+        for p in parameters
+    ]
 
 
 def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -> list[Parameter]:
