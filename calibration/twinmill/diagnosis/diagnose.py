@@ -361,7 +361,7 @@ def _concluded(
     less, formulas = without.less, without.formulas
     start, last = done.rounds[0].before, done.last
     given = _as_given(before, opened, known)
-    findings, chain = findings_of(done, first, less)
+    findings, chain = findings_of(done, less)
     findings = with_stale_numbers(
         findings,
         last.state.model,
@@ -409,7 +409,7 @@ def _concluded(
     findings = of_many(beside_more(of_another_form(findings, rest), rest, cards))
     findings = of_no_right_model(findings, rest, last.held_score)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
-    steps = [(None, start.held_score), *steps_of(findings, chain, first, last)]
+    steps = [(None, start.held_score), *steps_of(findings, chain, done.start, last)]
     rest = rest.with_findings(findings)
     usual = model_file.usual_score(hashes)
     events = rest.moments or rest.events.later

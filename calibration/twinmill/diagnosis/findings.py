@@ -49,7 +49,7 @@ NOT_WEIGHED = "the search was stopped before what else may take the same errors 
 
 
 def findings_of(
-    done: Search, first: State, less: Mapping[str, Trial | None]
+    done: Search, less: Mapping[str, Trial | None]
 ) -> tuple[list[Finding], list[tuple[str, float]]]:
     """Findings in the order of a chain, and the held-out score after each of them.
 
@@ -61,14 +61,13 @@ def findings_of(
 
     Args:
         done: the search.
-        first: where it started.
         less: the final state refitted without each effect.
     """
     names = list(dict.fromkeys(done.found))
-    given = _as_given(done.last, first) if REFIT in names else None
+    given = _as_given(done.last, done.start) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
-    chains = _Chains(first, done.rounds[0].before, done.last)
+    chains = _Chains(done.start, done.rounds[0].before, done.last)
     chain = chains.of(names)
     if len(names) > 1:
         there = _takes(names, chain)

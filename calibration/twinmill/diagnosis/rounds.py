@@ -7,7 +7,7 @@ import numpy as np
 
 from twinmill.diagnosis.screening import Screened
 from twinmill.diagnosis.settings import Settings
-from twinmill.diagnosis.trials import REFIT, Trial
+from twinmill.diagnosis.trials import REFIT, State, Trial
 from twinmill.model.parameters import catalogue_name
 
 
@@ -31,9 +31,11 @@ class Search:
     """A whole search: rounds, the last trial, and what was dropped again.
 
     Attributes:
+        start: where it started, with gains of the base nearer that were far off.
         stopped: by Ctrl-C, before the diagnosis was whole.
     """
 
+    start: State
     rounds: list[Round]
     last: Trial
     dropped: list[str]

@@ -48,10 +48,11 @@ def search(
             evidence must be stronger where the score is no worse than that.
         begun: told the search as it begins; it grows, and is whole at any moment.
     """
-    first = fitted(nearer(state))
+    start = nearer(state)
+    first = fitted(start)
     if first.held_score < settings.news * known:
         settings = settings.stricter(settings.usual * known)
-    done = Search([], first, [], settings)
+    done = Search(start, [], first, [], settings)
     starts: dict[str, Starts] = {}
     begun(done)
     _forward(done, starts, progress)
@@ -141,7 +142,7 @@ def _exchanged(done: Search, starts: dict[str, Starts]) -> Search:
         last, gone = _pruned(best, kept, settings)
         kept = [*(n for n in kept if n not in gone), *best.names]
     accepted = [n for r in rounds if r.accepted for n in r.accepted.names]
-    return Search(rounds, last, [n for n in accepted if n not in kept], settings)
+    return Search(done.start, rounds, last, [n for n in accepted if n not in kept], settings)
 
 
 def _rivals(

@@ -12,10 +12,12 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.ties import of_levels
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.compare import GOOD, LACKING, MISSING
+from twinmill.fitting.score_fit import FAR
 
 CHANGED = (
     "What changed between them is outside the catalogue: look at battery, load, wheels and floor."
 )
+BEGUN_FAR = "The base model's numbers were far off, and were refitted first."
 
 
 @dataclass(frozen=True)
@@ -227,7 +229,15 @@ class VerdictInputs:
         """The verdict for people, after what the input and what robots or runs differ in."""
         apart = [self.apart.sentence] if self.apart else []
         apart += [CHANGED] if self._only_runs else []
-        return " ".join([*self.unsteady, *apart, self._own])
+        far = [BEGUN_FAR] if self._begun_far else []
+        return " ".join([*self.unsteady, *apart, *far, self._own])
+
+    @property
+    def _begun_far(self) -> bool:
+        """The base's gains were far off, no finding says so, and something else is left."""
+        told = len(self.effects) < len(self.findings)
+        far = self.score > FAR and drifted(self.score, self.first, self.known)
+        return far and not told and bool(self.effects or self._unexplained)
 
     @property
     def _nothing(self) -> str:

@@ -281,7 +281,7 @@ def test_a_lateness_is_as_unsure_as_what_stands_in_for_it_differs(model_file):
     delay = late_trial(model_file, "input_delay", delay_s=0.2)
     lag = late_trial(model_file, "motor_lag", extra_s=0.3)
     only = Round(delay, [], [delay, lag], accepted=delay, tied=[lag])
-    done = Search([only], delay, [], SETTINGS)
+    done = Search(delay.state, [only], delay, [], SETTINGS)
     found = Finding("input_delay", ("input_delay", "motor_lag"), [], 1.0, "group")
     late = lateness(done, [found], same_clock=True)
     assert late.sum_s == pytest.approx(delay.state.model.get("base.motor_lag_s") + 0.2)

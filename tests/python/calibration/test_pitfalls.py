@@ -120,14 +120,23 @@ def test_quite_another_speed_is_no_missing_effect(tanh_robot, measure, fitted, m
     assert {f.effect for f in others} <= {"motor_lag"}
 
 
-def test_wheels_that_stand_at_small_duties_and_go_as_usual_above(tanh_robot, measure, fitted):
-    """Duties are 25, 50, 75 and 100 %: the edge is told to lie between 50 and 75 %."""
+@pytest.mark.parametrize("times", [1.0, 2.0])
+def test_wheels_that_stand_at_small_duties_and_go_as_usual_above(
+    tanh_robot, measure, fitted, times
+):
+    """Duties are 25, 50, 75 and 100 %: the edge is told to lie between 50 and 75 %.
+
+    A robot that is twice as fast besides is said to be.
+    """
 
     class Sticks(tanh_robot):
         def speed_mps(self, duty):
             return np.where(np.abs(duty) > 0.6, super().speed_mps(duty), 0.0)
 
-    found = diagnose([measure(Sticks(), 4, 60.0)], fitted)
+    robot = Sticks()
+    run = measure(replace(robot, top_mps=times * robot.top_mps), 4, 60.0)
+    found = diagnose([run], fitted)
+    assert ("numbers were far off" in found.sentence) == (times > 1)
     first, *others = found.findings
     assert found.verdict == "effect_missing" and first.effect == "stiction"
     assert first.share > 0.98 and all(f.certainty == "doubtful" for f in others)
