@@ -49,7 +49,7 @@ LIMIT_STARTS = (np.geomspace(1 / 8, 8, 37), np.geomspace(1 / 1.1, 1.1, 7))  # fa
 ANGLES_RAD = np.radians(np.arange(-180.0, 180.0, 30.0))  # of wheels, where a fit may begin
 PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 15.0))  # of what recurs, likewise ...
 NEAR_RAD = np.radians(np.arange(-12.0, 13.0, 3.0))  # ... and around the best of these
-FAR = 5.0  # score from which on a fit of gains may begin elsewhere ...
+FAR = 3.0  # score from which on a fit of gains may begin elsewhere ...
 FACTORS = (1.0, 0.5, 2.0, 0.25, 4.0)  # ... namely at so many times what they are
 SEEN = 0.5  # times the prior's width: a wider estimate is the prior's
 AT_BOUND = 0.005  # share of the range
@@ -315,13 +315,16 @@ class ScoreFit:
         self._begin_at(points)
 
     def nearer(self) -> dict[str, float]:
-        """Values of the base's gains, by name, at the best of a few multiples, where far off.
+        """Values of the base's gains, by name, at the best of a few multiples, if any is far off.
 
         Far from all poses the cost hardly falls (it is their logarithm), and priors hold a fit.
-        All are tried together, then each alone; speeds of duties are one.
+        Where one is far off, what was known of the others was of another robot, too.
+        All are tried together, then each alone. Speeds of duties are one; a gain that is free
+        multiplies them all.
         """
         forward, *others = BASE_GAINS
-        speeds = {forward, *duty_table(self.models[0])}
+        gained = any(u.parameter.name == forward for u in self.unknowns)
+        speeds = {forward} if gained else {*duty_table(self.models[0])}
         kinds = [{*speeds, *others}, speeds, *({gain} for gain in others)]
         own = [np.array([u.parameter.name in kind for u in self.unknowns], bool) for kind in kinds]
         own = [columns for columns in own if columns.any()]
@@ -330,8 +333,8 @@ class ScoreFit:
         x = self.x
         for columns in own:
             x = self._best_of([np.where(columns, f * x, x) for f in FACTORS])[0]
-        moved = np.flatnonzero(x != self.x)
-        return {self.unknowns[c].parameter.name: float(x[c]) for c in moved}
+        gains = np.flatnonzero(own[0]) if np.any(x != self.x) else ()
+        return {self.unknowns[c].parameter.name: float(x[c]) for c in gains}
 
     def _score_at(self, x: np.ndarray) -> float:
         """Of all data sets together, at (P,) values."""
