@@ -319,13 +319,12 @@ class ScoreFit:
 
         Far from all poses the cost hardly falls (it is their logarithm), and priors hold a fit.
         Where one is far off, what was known of the others was of another robot, too.
-        All are tried together, then each alone. Speeds of duties are one; a gain that is free
-        multiplies them all.
+        What moves all of the robot is tried first, then each alone. That is all gains, or the
+        speeds of duties where no gain that is free multiplies them.
         """
-        forward, *others = BASE_GAINS
-        gained = any(u.parameter.name == forward for u in self.unknowns)
-        speeds = {forward} if gained else {*duty_table(self.models[0])}
-        kinds = [{*speeds, *others}, speeds, *({gain} for gain in others)]
+        gained = any(u.parameter.name == BASE_GAINS[0] for u in self.unknowns)
+        all_of_it = {*BASE_GAINS} if gained else {*duty_table(self.models[0])}
+        kinds = [all_of_it, *({gain} for gain in BASE_GAINS)]
         own = [np.array([u.parameter.name in kind for u in self.unknowns], bool) for kind in kinds]
         own = [columns for columns in own if columns.any()]
         if not own or self._score_at(self.x) < FAR:
@@ -333,7 +332,7 @@ class ScoreFit:
         x = self.x
         for columns in own:
             x = self._best_of([np.where(columns, f * x, x) for f in FACTORS])[0]
-        gains = np.flatnonzero(own[0]) if np.any(x != self.x) else ()
+        gains = np.flatnonzero(np.any(own, axis=0)) if np.any(x != self.x) else ()
         return {self.unknowns[c].parameter.name: float(x[c]) for c in gains}
 
     def _score_at(self, x: np.ndarray) -> float:
