@@ -480,6 +480,7 @@ NB_MODULE(twinmill_native, m)
           "would hand it out anew, page by page.");
     BindChance(m);
     BindEvents(m);
+    BindHeldOut(m);
     BindSeries(m);
     BindSwarms(m);
     BindThreshold(m);

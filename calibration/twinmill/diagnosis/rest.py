@@ -14,6 +14,7 @@ from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import HARDLY, Finding
@@ -608,22 +609,19 @@ def _gains(
     products: "Products", tested: Sequence[Tested], flips: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
-    gains, nulls = np.zeros((len(RIDGES), len(tested))), np.zeros((len(RIDGES), len(tested), flips))
+    found = np.zeros((len(RIDGES), len(tested), 1 + flips))
     by_width: dict[int, list[int]] = {}
     for n, test in enumerate(tested):
         by_width.setdefault(len(test.places), []).append(n)
-    for k, ridge in enumerate(RIDGES):
-        alone, of_alone = products.each_held_out(flips, ridge)
-        for width, own in by_width.items():
-            places = np.array([tested[n].places for n in own])
-            if width == 1:
-                gains[k, own], nulls[k, own] = alone[places[:, 0]], of_alone[:, places[:, 0]].T
+    for width, own in by_width.items():
+        places = np.array([tested[n].places for n in own])
+        grams = Grams.of([tested[n].grams for n in own]) if width > 1 else None
+        for k, ridge in enumerate(RIDGES):
+            if grams:
+                found[k, own] = products.together_held_out(places, grams, flips, ridge)
             else:
-                grams = [tested[n].grams for n in own]
-                gains[k, own], nulls[k, own] = products.together_held_out(
-                    places, grams, flips, ridge
-                )
-    return gains, nulls
+                found[k, own] = products.each_held_out(places[:, 0], flips, ridge)
+    return found[..., 0], found[..., 1:]
 
 
 def _without_redundant(
@@ -659,10 +657,18 @@ def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Ter
 
 @dataclass(frozen=True)
 class Grams:
-    """Products of k columns with each other: (B, k, k) by block, and (FOLDS, k, k) by fold."""
+    """Products of k columns with each other: (B, k, k) by block, and (FOLDS, k, k) by fold.
+
+    Of several sets of columns (N, B, k, k) and (N, FOLDS, k, k).
+    """
 
     blocks: np.ndarray
     folds: np.ndarray
+
+    @classmethod
+    def of(cls, each: Sequence["Grams"]) -> "Grams":
+        """Of several sets of as many columns."""
+        return cls(np.array([g.blocks for g in each]), np.array([g.folds for g in each]))
 
     def only(self, own: np.ndarray) -> "Grams":
         """Of those of some numbers."""
@@ -795,55 +801,39 @@ class Products:
         made = np.sum(across * np.linalg.solve(inside, across))
         return bool(many.sum() > few.sum() and made > HOLDS * np.trace(gram[np.ix_(few, few)]))
 
-    def each_held_out(self, flips: int = 0, ridge: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) and (F, T): what `together_held_out` gives for each column alone."""
-        energy, moments = self.energy, self.moments
-        without = (moments.sum(0) - moments) / (energy.sum(0) - energy + ridge)
-        scatter = moments - energy * without
-        signs = _signs(flips, len(energy))
-        tests = [self.fold == k for k in range(FOLDS)]
-        judged = [np.vstack([moments[own].sum(0), signs[:, own] @ scatter[own]]) for own in tests]
-        total, gain = sum(judged), 0.0
-        for own, here in zip(tests, judged, strict=True):
-            size = (total - here) / (energy[~own].sum(0) + ridge)
-            gain += size * (2 * here - size * energy[own].sum(0))
-        return gain[0], gain[1:]
+    def each_held_out(
+        self, own: np.ndarray | slice = slice(None), flips: int = 0, ridge: float = 1.0
+    ) -> np.ndarray:
+        """(k, 1 + F): what `together_held_out` gives for each of k columns alone."""
+        places = np.arange(len(self.seen))[own, None]
+        energy = self.energy[:, own]
+        grams = Grams(energy.T[..., None, None], self._by_fold(energy).T[..., None, None])
+        return self.together_held_out(places, grams, flips, ridge)
 
     def held_out(self, own: np.ndarray) -> float:
         """Fall of the cost by these columns on blocks not fitted to."""
         places = np.flatnonzero(own)[None]
-        grams = Grams(np.zeros((0, own.sum(), own.sum())), self._folds(own))
-        gains, _ = self.together_held_out(places, [grams], 0, 1.0)
-        return float(gains[0])
+        grams = Grams(np.zeros((1, 0, own.sum(), own.sum())), self._folds(own)[None])
+        return float(self.together_held_out(places, grams, 0, 1.0)[0, 0])
 
     def together_held_out(
-        self, places: np.ndarray, grams: Sequence[Grams], flips: int, ridge: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) fall by each of N sets of columns, (N, k) `places`, and (N, F) what chance brings.
+        self, places: np.ndarray, grams: Grams, flips: int, ridge: float
+    ) -> np.ndarray:
+        """(N, 1 + F) fall by each of N sets of columns, (N, k) `places`, and what chance brings.
 
         Chance: random signs of what each block scatters about a fit of the columns to all others.
         About a fit that has the block itself it scatters too little, where columns are many and
         blocks few (Cameron and Miller 2015, section VI.B).
+
+        Args:
+            places: of the columns.
+            grams: of each of the N sets.
+            flips: F.
+            ridge: of the fits; columns are in typical strengths.
         """
-        moments = np.moveaxis(self.moments[:, places], 1, 0)  # (N, B, k)
-        folds = np.array([g.folds for g in grams])  # (N, FOLDS, k, k)
-        whole = folds.sum(1) + ridge * np.eye(places.shape[1])  # columns are in typical strengths
-        tests = [self.fold == k for k in range(FOLDS)]
-        judged = np.empty((len(places), FOLDS, 1 + flips, places.shape[1]))
-        for k, test in enumerate(tests):
-            judged[:, k, 0] = moments[:, test].sum(1)
-        if flips:
-            blocks = np.array([g.blocks for g in grams])
-            others = moments.sum(1, keepdims=True) - moments
-            numbers = np.linalg.solve(whole[:, None] - blocks, others[..., None])
-            scatter = np.moveaxis(moments - (blocks @ numbers)[..., 0], 1, 0)  # (B, N, k)
-            signs = _signs(flips, len(self.fold))
-            for k, test in enumerate(tests):
-                by_chance = np.tensordot(signs[:, test], scatter[test], 1)
-                judged[:, k, 1:] = np.moveaxis(by_chance, 0, 1)
-        fitted = (judged.sum(1, keepdims=True) - judged) @ np.linalg.inv(whole[:, None] - folds)
-        gain = np.einsum("nfsk,nfsk->ns", fitted, 2 * judged - fitted @ folds)
-        return gain[:, 0], gain[:, 1:]
+        signs = _signs(flips, len(self.fold))
+        own = (np.ascontiguousarray(v) for v in (grams.blocks, grams.folds))
+        return native.held_out(np.ascontiguousarray(self.moments), places, *own, signs, ridge)
 
 
 @cache
