@@ -515,7 +515,8 @@ def _tested(
             group = test.group
             known = best.get(group)
             if known is None or (is_sure, gain) > (known.sure, known.gain):
-                own = np.isin(np.arange(len(terms)), test.places)
+                own = np.zeros(len(terms), bool)
+                own[test.places] = True
                 best[group] = Dependence(group, float(gain), bool(is_sure), own, group in apparent)
     return sorted(best.values(), key=lambda d: -d.gain)
 
@@ -708,7 +709,6 @@ class Products:
             blocks = blocks * MOST_BLOCKS // count
         edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
         self.parts = [slice(a, b) for a, b in pairwise(edges)]
-        self.fold = np.arange(len(self.parts)) % FOLDS
         self.columns, self.own = columns, np.arange(len(columns))
         self.weight, self.total = weight[:, None], float(left @ left)
         self.left, self.basis = left, np.linalg.qr(free)[0]
@@ -718,11 +718,9 @@ class Products:
             np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
             for f in (lambda p, own: weight[p] ** 2 @ own**2, lambda p, own: known[p].T @ own)
         )
-        self.moments, self.across = across[:, 0], across[:, 1:]
-        self.along = self.across.sum(0)
-        self.inside = squares(basis, self.parts)
+        self.moments, self.along = across[:, 0], across[:, 1:].sum(0)
         self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
-        more = self.inside @ self.along - 2 * self.across
+        more = squares(basis, self.parts) @ self.along - 2 * across[:, 1:]
         self.energy = square + np.einsum("bpt,pt->bt", more, self.along)
         before, after = square.sum(0), self.energy.sum(0)
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
@@ -730,55 +728,40 @@ class Products:
 
     def grams(self, own: np.ndarray) -> Grams:
         """Of some columns with each other, by their numbers or (T,) bool."""
-        some = self.own[own]
-        rows = self.weight * self.columns.some(some)
-        blocks = squares(rows, self.parts)
-        self._project(blocks, own, self.across[:, :, some], self.inside)
+        blocks = squares(self._rows(own), self.parts)
         return Grams(blocks, self._by_fold(blocks))
 
     def left_by(self, test: Tested, ridge: float) -> np.ndarray:
         """(R,) what some columns leave of the errors, fitted to other blocks."""
-        some = self.own[test.places]
-        rows = self.weight * self.columns.some(some) - self.basis @ self.along[:, some]
+        rows = self._rows(test.places)
         moments = self._by_fold(self.moments[:, test.places])
         left = self.left.copy()
         for k, own in enumerate(test.grams.folds):
             others = test.grams.folds.sum(0) - own + ridge * np.eye(len(own))
             numbers = np.linalg.solve(others, moments.sum(0) - moments[k])
-            for b in np.flatnonzero(self.fold == k):
-                left[self.parts[b]] -= rows[self.parts[b]] @ numbers
+            for part in self.parts[k::FOLDS]:
+                left[part] -= rows[part] @ numbers
         return left
+
+    def _rows(self, own: np.ndarray) -> np.ndarray:
+        """(R, k) of some columns, what is free projected out."""
+        some = self.own[own]
+        rows = self.weight * self.columns.some(some)
+        rows -= self.basis @ self.along[:, some]
+        rows[:, ~self.seen[own]] = 0.0
+        return rows
 
     def _folds(self, own: np.ndarray) -> np.ndarray:
         """(FOLDS, k, k) of the same, without blocks: of many columns those fill the memory."""
-        some = self.own[own]
-        rows = self.weight * self.columns.some(some)
-        found = np.zeros((FOLDS, len(some), len(some)))
+        rows = self._rows(own)
+        found = np.zeros((FOLDS, rows.shape[1], rows.shape[1]))
         for b, p in enumerate(self.parts):
-            found[self.fold[b]] += rows[p].T @ rows[p]
-        across, inside = self._by_fold(self.across[:, :, some]), self._by_fold(self.inside)
-        self._project(found, own, across, inside)
+            found[b % FOLDS] += rows[p].T @ rows[p]
         return found
 
     def _by_fold(self, blocks: np.ndarray) -> np.ndarray:
-        """(FOLDS, ...) sums of (B, ...)."""
-        return np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)])
-
-    def _project(
-        self, grams: np.ndarray, own: np.ndarray, across: np.ndarray, inside: np.ndarray
-    ) -> None:
-        """Takes what is free out of (B, k, k) products of columns.
-
-        Args:
-            grams: to be changed.
-            own: whose they are, by numbers or (T,) bool.
-            across: (B, P, k) of what is free with them.
-            inside: (B, P, P) of what is free with itself.
-        """
-        along = self.along[:, self.own[own]]
-        crossed = along.T @ (across - inside @ along / 2)
-        grams -= crossed + crossed.swapaxes(1, 2)
-        grams *= self.seen[own] * self.seen[own][:, None]
+        """(FOLDS, ...) sums of (B, ...): every so-many-th block is of one fold."""
+        return np.array([blocks[k::FOLDS].sum(0) for k in range(FOLDS)])
 
     def only(self, own: np.ndarray) -> "Products":
         """The same of some (T,) columns."""
@@ -831,7 +814,7 @@ class Products:
             flips: F.
             ridge: of the fits; columns are in typical strengths.
         """
-        signs = _signs(flips, len(self.fold))
+        signs = _signs(flips, len(self.parts))
         own = (np.ascontiguousarray(v) for v in (grams.blocks, grams.folds))
         return native.held_out(np.ascontiguousarray(self.moments), places, *own, signs, ridge)
 

@@ -100,7 +100,7 @@ def displaced(
     response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
 ) -> np.ndarray:
     """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
-    heading = np.nan_to_num(response.data.measurement.track.heading_smooth)
+    heading = response.data.measurement.track.heading_smooth
     return native.displaced_by(
         np.ascontiguousarray(values),
         np.ascontiguousarray(velocity),
@@ -109,7 +109,7 @@ def displaced(
         response.heading_rad,
         response.starts,
         np.ascontiguousarray(np.maximum(response.ends, 0)),
-        heading[response.data.windows.starts],
+        np.nan_to_num(heading[response.data.windows.starts]),
     )
 
 
