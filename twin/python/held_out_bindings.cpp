@@ -71,24 +71,86 @@ private:
     std::vector<double> rows_, shares_;
 };
 
-// Random signs (F, B) of blocks, every n-th of which is of one fold: those of a fold side by side.
+// Signs (F, B) of blocks, every n-th of which is of one fold: those of a fold side by side.
 struct Signs
 {
     size_t folds, per, count;
     std::vector<double> rows;
 
-    Signs(Matrix signs, size_t folds_of_all)
+    Signs(const std::vector<double> &signs, size_t blocks, size_t folds_of_all)
         : folds(folds_of_all),
-          per((signs.shape(1) + folds - 1) / folds),
-          count(signs.shape(0)),
+          per((blocks + folds - 1) / folds),
+          count(signs.size() / blocks),
           rows(folds * per * count)
     {
-        for (size_t b = 0; b < signs.shape(1); ++b)
+        for (size_t b = 0; b < blocks; ++b)
             for (size_t s = 0; s < count; ++s)
-                rows[Place(b) * count + s] = signs.data()[s * signs.shape(1) + b];
+                rows[Place(b) * count + s] = signs[s * blocks + b];
     }
 
     size_t Place(size_t block) const { return block % folds * per + block / folds; }
+};
+
+// Gains under random signs of B blocks, a quadratic form of these: of each sign by itself, or of
+// the form's parts (B, B), of which there are less where columns are many and blocks few.
+class Gains
+{
+public:
+    Gains(size_t blocks, size_t columns, Matrix signs, size_t folds)
+        : blocks_(blocks),
+          signs_(signs.data(), signs.data() + signs.size()),
+          by_block_(signs.shape(0) > blocks && 2 * folds * columns * columns > blocks * blocks),
+          parts_(by_block_ ? blocks * blocks : 0),
+          of_all_(signs_, blocks, 1)
+    {
+    }
+
+    // Those that the parts are made under.
+    Signs Asked(size_t folds) const
+    {
+        if (!by_block_)
+            return {signs_, blocks_, folds};
+        std::vector<double> each(blocks_ * blocks_);
+        for (size_t b = 0; b < blocks_; ++b)
+            each[b * (blocks_ + 1)] = 1;
+        return {each, blocks_, folds};
+    }
+
+    void Clear(double *gains)
+    {
+        std::fill_n(gains, 1 + of_all_.count, 0.0);
+        std::ranges::fill(parts_, 0.0);
+    }
+
+    // Adds products of values, the first of all blocks and then of each of what was asked.
+    void Add(std::span<const double> left, std::span<const double> right, double *gains)
+    {
+        for (size_t s = 0; s < (by_block_ ? 1 : left.size()); ++s)
+            gains[s] += left[s] * right[s];
+        for (size_t b = 0; by_block_ && b < blocks_; ++b)
+            AddRows(Part(b), left.subspan(1 + b, 1), right.data() + 1, 0);
+    }
+
+    void AddParts(double *gains)
+    {
+        std::vector<double> some(of_all_.count);
+        for (size_t b = 0; by_block_ && b < blocks_; ++b)
+        {
+            std::ranges::fill(some, 0.0);
+            AddRows(some, Part(b), of_all_.rows.data(), some.size());
+            for (size_t s = 0; s < some.size(); ++s)
+                gains[1 + s] += of_all_.rows[b * some.size() + s] * some[s];
+        }
+    }
+
+private:
+    std::span<double> Part(size_t b) { return {parts_.data() + b * blocks_, blocks_}; }
+
+    size_t blocks_;
+    std::vector<double> signs_;
+    bool by_block_;
+    std::vector<double> parts_;
+    Signs of_all_;
 };
 
 // What some columns lower the cost by on each fold when they are fitted to the others.
@@ -111,7 +173,7 @@ public:
 
     // Of columns with moments (B, count), products (B, count, count) and those (folds, ...).
     void Judge(const std::vector<double> &moments, const double *blocks, const double *folds,
-               double ridge, double *gains)
+               double ridge, Gains &form, double *gains)
     {
         Sum(moments, folds, ridge);
         if (signs_.count)
@@ -120,9 +182,10 @@ public:
         for (size_t f = 0; f < signs_.folds; ++f)
             for (size_t k = 0; k < total_.size(); ++k)
                 total_[k] += judged_[f * total_.size() + k];
-        std::fill_n(gains, sides_, 0.0);
+        form.Clear(gains);
         for (size_t f = 0; f < signs_.folds; ++f)
-            AddGains(folds + f * whole_.size(), judged_.data() + f * total_.size(), gains);
+            AddGains(folds + f * whole_.size(), judged_.data() + f * total_.size(), form, gains);
+        form.AddParts(gains);
     }
 
 private:
@@ -171,7 +234,7 @@ private:
                         signs_.rows.data() + f * signs_.per * signs_.count, signs_.count);
     }
 
-    void AddGains(const double *gram, const double *judged, double *gains)
+    void AddGains(const double *gram, const double *judged, Gains &form, double *gains)
     {
         for (size_t i = 0; i < count_; ++i)
         {
@@ -186,7 +249,8 @@ private:
             std::ranges::fill(some_, 0.0);
             all_.AddSides(some_, {gram + i * count_, count_});
             for (size_t s = 0; s < sides_; ++s)
-                gains[s] += all_.Sides(i)[s] * (2 * judged[i * sides_ + s] - some_[s]);
+                some_[s] = 2 * judged[i * sides_ + s] - some_[s];
+            form.Add(all_.Sides(i), some_, gains);
         }
     }
 
@@ -208,8 +272,9 @@ Array HeldOut(Matrix moments, IndexMatrix places, Cubes blocks, Cubes folds, Mat
                 "there must be products of each test's columns, of each block and fold");
     if (signs.shape(1) != moments.shape(0))
         throw std::invalid_argument("there must be a sign of each block");
-    const Signs by_fold(signs, folds.shape(1));
-    Regression regression(count, by_fold);
+    Gains form(moments.shape(0), count, signs, folds.shape(1));
+    const Signs asked = form.Asked(folds.shape(1));
+    Regression regression(count, asked);
     std::vector<double> own(moments.shape(0) * count);
     const size_t sides = 1 + signs.shape(0), square = count * count;
     auto gains = std::make_unique_for_overwrite<double[]>(tests * sides);
@@ -223,7 +288,7 @@ Array HeldOut(Matrix moments, IndexMatrix places, Cubes blocks, Cubes folds, Mat
             own[k] = moments.data()[k / count * columns + place];
         }
         regression.Judge(own, blocks.data() + n * blocks.shape(1) * square,
-                         folds.data() + n * folds.shape(1) * square, ridge,
+                         folds.data() + n * folds.shape(1) * square, ridge, form,
                          gains.get() + n * sides);
     }
     return ToNumpy(std::move(gains), {tests, sides});

@@ -703,7 +703,7 @@ def test_gains_are_those_on_folds_that_columns_were_not_fitted_to(count):
     every = np.arange(blocks)
     fold = every % FOLDS
     x, left = rng.normal(size=(2, blocks, 9, count)), rng.normal(size=(blocks, 9))
-    signs = rng.choice([-1.0, 1.0], (4, blocks))
+    signs = rng.choice([-1.0, 1.0], (9, blocks))
     grams = np.swapaxes(x, 2, 3) @ x
     folds = np.stack([grams[:, fold == k].sum(axis=1) for k in range(FOLDS)], axis=1)
     moments = np.hstack([np.einsum("brk,br->bk", own, left) for own in x])
