@@ -58,6 +58,9 @@ void BindChance(nb::module_ &m);
 // Adds regressions judged on what they were not fitted to.
 void BindHeldOut(nb::module_ &m);
 
+// Adds products of columns by block.
+void BindProducts(nb::module_ &m);
+
 // Adds what the module knows of swarms.
 void BindSwarms(nb::module_ &m);
 

@@ -481,6 +481,7 @@ NB_MODULE(twinmill_native, m)
     BindChance(m);
     BindEvents(m);
     BindHeldOut(m);
+    BindProducts(m);
     BindSeries(m);
     BindSwarms(m);
     BindThreshold(m);

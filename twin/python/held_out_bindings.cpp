@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "add_rows.h"
 #include "arrays.h"
 
 using namespace nanobind::literals;
@@ -11,23 +12,6 @@ namespace twin
 {
 namespace
 {
-
-// Adds rows, so many values apart, each times its share, to one row.
-void AddRows(std::span<double> sum, std::span<const double> shares, const double *rows,
-             size_t apart)
-{
-    size_t j = 0;
-    for (; j + 4 <= shares.size(); j += 4, rows += 4 * apart)
-    {
-        const double *second = rows + apart, *third = second + apart, *fourth = third + apart;
-        for (size_t k = 0; k < sum.size(); ++k)
-            sum[k] += shares[j] * rows[k] + shares[j + 1] * second[k] + shares[j + 2] * third[k] +
-                      shares[j + 3] * fourth[k];
-    }
-    for (; j < shares.size(); ++j, rows += apart)
-        for (size_t k = 0; k < sum.size(); ++k)
-            sum[k] += shares[j] * rows[k];
-}
 
 // A definite matrix (k, k), and behind it right sides (k, R), which become the solutions.
 class Equations
@@ -42,7 +26,7 @@ public:
     std::span<double> Sides(size_t i) { return {Row(i) + count_, width_ - count_}; }
 
     // Adds to a row those sides, each times its share.
-    void AddSides(std::span<double> sum, std::span<const double> shares, size_t first = 0)
+    void AddSides(std::span<double> sum, Shares shares, size_t first = 0)
     {
         AddRows(sum, shares, Row(first) + count_, width_);
     }
@@ -60,7 +44,7 @@ public:
             for (size_t j = i + 1; j < count_; ++j)
                 shares_[j] = -Row(i)[j];
             if (i + 1 < count_)
-                AddSides(Sides(i), std::span(shares_).subspan(i + 1), i + 1);
+                AddSides(Sides(i), {shares_.data() + i + 1, count_ - i - 1}, i + 1);
             for (double &side : Sides(i))
                 side /= Row(i)[i];
         }
@@ -128,7 +112,7 @@ public:
         for (size_t s = 0; s < (by_block_ ? 1 : left.size()); ++s)
             gains[s] += left[s] * right[s];
         for (size_t b = 0; by_block_ && b < blocks_; ++b)
-            AddRows(Part(b), left.subspan(1 + b, 1), right.data() + 1, 0);
+            AddRows(Part(b), {left.data() + 1 + b, 1}, right.data() + 1, 0);
     }
 
     void AddParts(double *gains)
@@ -137,7 +121,7 @@ public:
         for (size_t b = 0; by_block_ && b < blocks_; ++b)
         {
             std::ranges::fill(some, 0.0);
-            AddRows(some, Part(b), of_all_.rows.data(), some.size());
+            AddRows(some, {Part(b).data(), blocks_}, of_all_.rows.data(), some.size());
             for (size_t s = 0; s < some.size(); ++s)
                 gains[1 + s] += of_all_.rows[b * some.size() + s] * some[s];
         }

@@ -10,7 +10,7 @@ that it was not fitted to.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -70,21 +70,10 @@ class Tested:
 
     Attributes:
         places: (k,) of the terms, ascending.
-        products: of all terms.
-        among: what is tested that has all of them; None if nothing has.
     """
 
     group: str
     places: np.ndarray
-    products: "Products"
-    among: "Tested | None" = None
-
-    @cached_property
-    def grams(self) -> "Grams":
-        """Their products with each other."""
-        if self.among is None:
-            return self.products.grams(self.places)
-        return self.among.grams.only(np.searchsorted(self.among.places, self.places))
 
 
 # Share of a test's evidence that counts, of (R,) errors that it leaves and those that it explained.
@@ -497,13 +486,14 @@ def _tested(
         products: with what is left.
         fresh: share of the evidence that counts.
     """
-    tested = list(_tests(terms, products))
+    tested = list(_tests(terms))
     if not tested:
         return []
-    gains, nulls = _gains(products, tested, 0)
+    alike = _of_one_width(products, tested)
+    gains, nulls = _gains(products, alike, 0)
     sure = if_new = gains > _enough(tested)
     if sure.any():
-        _, nulls = _gains(products, tested, FLIPS)
+        _, nulls = _gains(products, alike, FLIPS)
         spread = np.maximum(nulls.std(axis=-1), 1e-12)
         highest = (nulls / spread[..., None]).max(axis=(0, 1))
         if_new = sure & (gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance))
@@ -590,7 +580,7 @@ def _errors_of(
         first = place.stop
 
 
-def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
+def _tests(terms: Sequence[Term]) -> Iterator[Tested]:
     """Each family, and each formula that it has: the same of another group is something else."""
     families: dict[tuple[str, str], list[int]] = {}
     alike: dict[tuple[str, str], list[int]] = {}
@@ -598,30 +588,37 @@ def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
         families.setdefault((term.group, term.family), []).append(k)
         alike.setdefault((term.group, term.formula), []).append(k)
     for (group, _), together in families.items():
-        family = Tested(group, np.array(together), products)
-        yield family
+        yield Tested(group, np.array(together))
         for formula in dict.fromkeys(terms[k].formula for k in together):
-            own = alike[group, formula]
-            among = family if set(own) <= set(together) else None
-            yield Tested(group, np.array(own), products, among)
+            yield Tested(group, np.array(alike[group, formula]))
 
 
-def _gains(
-    products: "Products", tested: Sequence[Tested], flips: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
-    found = np.zeros((len(RIDGES), len(tested), 1 + flips))
+@dataclass(frozen=True)
+class _Alike:
+    """Those of N tests that have k columns each: (n,) numbers, (n, k) columns, their products."""
+
+    numbers: list[int]
+    places: np.ndarray
+    grams: "Grams"
+
+
+def _of_one_width(products: "Products", tested: Sequence[Tested]) -> list[_Alike]:
     by_width: dict[int, list[int]] = {}
     for n, test in enumerate(tested):
         by_width.setdefault(len(test.places), []).append(n)
-    for width, own in by_width.items():
-        places = np.array([tested[n].places for n in own])
-        grams = Grams.of([tested[n].grams for n in own]) if width > 1 else None
+    each = ((own, np.array([tested[n].places for n in own])) for own in by_width.values())
+    return [_Alike(own, places, products.grams(places)) for own, places in each]
+
+
+def _gains(
+    products: "Products", alike: Sequence[_Alike], flips: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
+    found = np.zeros((len(RIDGES), sum(len(a.numbers) for a in alike), 1 + flips))
+    for own in alike:
         for k, ridge in enumerate(RIDGES):
-            if grams:
-                found[k, own] = products.together_held_out(places, grams, flips, ridge)
-            else:
-                found[k, own] = products.each_held_out(places[:, 0], flips, ridge)
+            gains = products.together_held_out(own.places, own.grams, flips, ridge)
+            found[k, own.numbers] = gains
     return found[..., 0], found[..., 1:]
 
 
@@ -658,22 +655,15 @@ def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Ter
 
 @dataclass(frozen=True)
 class Grams:
-    """Products of k columns with each other: (B, k, k) by block, and (FOLDS, k, k) by fold.
-
-    Of several sets of columns (N, B, k, k) and (N, FOLDS, k, k).
-    """
+    """Of N sets of k columns with each other: (N, B, k, k) by block, (N, FOLDS, k, k) by fold."""
 
     blocks: np.ndarray
     folds: np.ndarray
 
     @classmethod
-    def of(cls, each: Sequence["Grams"]) -> "Grams":
-        """Of several sets of as many columns."""
-        return cls(np.array([g.blocks for g in each]), np.array([g.folds for g in each]))
-
-    def only(self, own: np.ndarray) -> "Grams":
-        """Of those of some numbers."""
-        return Grams(self.blocks[:, own][:, :, own], self.folds[:, own][:, :, own])
+    def by_fold(cls, blocks: np.ndarray) -> "Grams":
+        """Of those by block: every so-many-th block is of one fold."""
+        return cls(blocks, np.stack([blocks[:, k::FOLDS].sum(1) for k in range(FOLDS)], axis=1))
 
 
 class Products:
@@ -707,38 +697,41 @@ class Products:
         count = blocks.max() + 1
         if count > MOST_BLOCKS:  # each has a sign: of many, neighbours are one
             blocks = blocks * MOST_BLOCKS // count
-        edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
-        self.parts = [slice(a, b) for a, b in pairwise(edges)]
+        self.edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
+        self.parts = [slice(a, b) for a, b in pairwise(self.edges)]
         self.columns, self.own = columns, np.arange(len(columns))
         self.weight, self.total = weight[:, None], float(left @ left)
-        self.left, self.basis = left, np.linalg.qr(free)[0]
-        basis = self.basis
+        basis = np.linalg.qr(free)[0]
+        self.left, self.basis = left, np.ascontiguousarray(basis.T)
         known = self.weight * np.column_stack([left, basis])
-        square, across = (
-            np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
-            for f in (lambda p, own: weight[p] ** 2 @ own**2, lambda p, own: known[p].T @ own)
-        )
+        each = (native.products_beside(c, known, weight, self.edges) for c in columns.pieces)
+        across, square = np.split(np.concatenate([*each], axis=-1), [-1], axis=1)
         self.moments, self.along = across[:, 0], across[:, 1:].sum(0)
         self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
         more = squares(basis, self.parts) @ self.along - 2 * across[:, 1:]
-        self.energy = square + np.einsum("bpt,pt->bt", more, self.along)
-        before, after = square.sum(0), self.energy.sum(0)
+        self.energy = square[:, 0] + np.einsum("bpt,pt->bt", more, self.along)
+        before, after = square.sum((0, 1)), self.energy.sum(0)
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
         self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
 
-    def grams(self, own: np.ndarray) -> Grams:
-        """Of some columns with each other, by their numbers or (T,) bool."""
-        blocks = squares(self._rows(own), self.parts)
-        return Grams(blocks, self._by_fold(blocks))
+    def grams(self, places: np.ndarray) -> Grams:
+        """Of sets of columns, (N, k) by their numbers, with each other."""
+        if places.shape[1] == 1:
+            return Grams.by_fold(np.ascontiguousarray(self.energy.T[places[:, 0]])[..., None, None])
+        pieces, own, seen = self.columns.pieces, self.own[places], self.seen[places]
+        weight = self.weight[:, 0]
+        blocks = native.products_left(pieces, own, weight, self.basis, self.along, self.edges)
+        blocks *= (seen[:, :, None] & seen[:, None])[:, None]
+        return Grams.by_fold(blocks)
 
     def left_by(self, test: Tested, ridge: float) -> np.ndarray:
         """(R,) what some columns leave of the errors, fitted to other blocks."""
-        rows = self._rows(test.places)
-        moments = self._by_fold(self.moments[:, test.places])
+        rows, moments = self._rows(test.places), self.moments[:, test.places]
+        folds = self.grams(test.places[None]).folds[0]
         left = self.left.copy()
-        for k, own in enumerate(test.grams.folds):
-            others = test.grams.folds.sum(0) - own + ridge * np.eye(len(own))
-            numbers = np.linalg.solve(others, moments.sum(0) - moments[k])
+        for k, own in enumerate(folds):
+            others = folds.sum(0) - own + ridge * np.eye(len(own))
+            numbers = np.linalg.solve(others, moments.sum(0) - moments[k::FOLDS].sum(0))
             for part in self.parts[k::FOLDS]:
                 left[part] -= rows[part] @ numbers
         return left
@@ -747,7 +740,7 @@ class Products:
         """(R, k) of some columns, what is free projected out."""
         some = self.own[own]
         rows = self.weight * self.columns.some(some)
-        rows -= self.basis @ self.along[:, some]
+        rows -= self.basis.T @ self.along[:, some]
         rows[:, ~self.seen[own]] = 0.0
         return rows
 
@@ -758,10 +751,6 @@ class Products:
         for b, p in enumerate(self.parts):
             found[b % FOLDS] += rows[p].T @ rows[p]
         return found
-
-    def _by_fold(self, blocks: np.ndarray) -> np.ndarray:
-        """(FOLDS, ...) sums of (B, ...): every so-many-th block is of one fold."""
-        return np.array([blocks[k::FOLDS].sum(0) for k in range(FOLDS)])
 
     def only(self, own: np.ndarray) -> "Products":
         """The same of some (T,) columns."""
@@ -784,14 +773,11 @@ class Products:
         made = np.sum(across * np.linalg.solve(inside, across))
         return bool(many.sum() > few.sum() and made > HOLDS * np.trace(gram[np.ix_(few, few)]))
 
-    def each_held_out(
-        self, own: np.ndarray | slice = slice(None), flips: int = 0, ridge: float = 1.0
-    ) -> np.ndarray:
-        """(k, 1 + F): what `together_held_out` gives for each of k columns alone."""
-        places = np.arange(len(self.seen))[own, None]
-        energy = self.energy[:, own]
-        grams = Grams(energy.T[..., None, None], self._by_fold(energy).T[..., None, None])
-        return self.together_held_out(places, grams, flips, ridge)
+    @property
+    def each_held_out(self) -> np.ndarray:
+        """(T,) fall of the cost by each column alone on blocks not fitted to."""
+        places = np.arange(len(self.seen))[:, None]
+        return self.together_held_out(places, self.grams(places), 0, 1.0)[:, 0]
 
     def held_out(self, own: np.ndarray) -> float:
         """Fall of the cost by these columns on blocks not fitted to."""
@@ -810,13 +796,13 @@ class Products:
 
         Args:
             places: of the columns.
-            grams: of each of the N sets.
+            grams: of the N sets.
             flips: F.
             ridge: of the fits; columns are in typical strengths.
         """
         signs = _signs(flips, len(self.parts))
-        own = (np.ascontiguousarray(v) for v in (grams.blocks, grams.folds))
-        return native.held_out(np.ascontiguousarray(self.moments), places, *own, signs, ridge)
+        moments = np.ascontiguousarray(self.moments)
+        return native.held_out(moments, places, grams.blocks, grams.folds, signs, ridge)
 
 
 @cache
