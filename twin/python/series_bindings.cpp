@@ -510,15 +510,30 @@ Array Wound(Vector way, double most)
     return ToNumpy(std::move(wound), {way.size()});
 }
 
-// s and r = ds/dt at the end of each step, from rest: dr/dt = w^2 (push - s) - 2 z w r.
-Array Swung(Vector pushes, Vector step_s, double rate, double damping)
+// (N, 2) by what a swing turns and fades over each step: cosine, and sine over its rate.
+Array SwingOf(Vector step_s, double rate, double damping)
 {
-    if (step_s.size() != pushes.size())
-        throw std::invalid_argument("there must be as many steps as pushes");
     const double fast = rate * std::sqrt(1 - damping * damping), fading = damping * rate;
+    std::vector<double> turned;
+    turned.reserve(2 * step_s.size());
+    for (const double dt_s : Span(step_s))
+    {
+        const double fade = std::exp(-fading * dt_s);
+        turned.push_back(fade * std::cos(fast * dt_s));
+        turned.push_back(fade * std::sin(fast * dt_s) / fast);
+    }
+    return ToNumpy(std::move(turned), {step_s.size(), 2});
+}
+
+// s and r = ds/dt at the end of each step, from rest: dr/dt = w^2 (push - s) - 2 z w r.
+Array Swung(Vector pushes, Vector step_s, Matrix turned, double rate, double damping)
+{
+    if (step_s.size() != pushes.size() || turned.shape(0) != pushes.size() || turned.shape(1) != 2)
+        throw std::invalid_argument("there must be as many steps as pushes, and what each turns");
+    const double fading = damping * rate;
     std::vector<double> out(2 * pushes.size());
     double *mean_s = out.data(), *mean_r = mean_s + pushes.size();
-    double s = 0, r = 0, last_s = -1, cos = 0, sin = 0;
+    double s = 0, r = 0;
     for (size_t n = 0; n < pushes.size(); ++n)
     {
         const double dt_s = step_s.data()[n], push = pushes.data()[n];
@@ -528,13 +543,7 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
             mean_r[n] = r;
             continue;
         }
-        if (dt_s != last_s)
-        {
-            const double fade = std::exp(-fading * dt_s);
-            cos = fade * std::cos(fast * dt_s);
-            sin = fade * std::sin(fast * dt_s) / fast;
-            last_s = dt_s;
-        }
+        const double cos = turned.data()[2 * n], sin = turned.data()[2 * n + 1];
         const double away = s - push, from_s = s, from_r = r;
         s = push + (cos + fading * sin) * away + sin * r;
         r = (cos - fading * sin) * r - rate * rate * sin * away;
@@ -629,9 +638,11 @@ void BindSeries(nb::module_ &m)
     m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
           "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
           "its diagonal and definite then, for right sides (M, F).");
-    m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
+    m.def("swing_of", &SwingOf, "step_s"_a, "rate"_a, "damping"_a,
+          "(N, 2) cosine, and sine over the rate, of what swings and fades over each step.");
+    m.def("swung", &Swung, "pushes"_a, "step_s"_a, "turned"_a, "rate"_a, "damping"_a,
           "(2, N) means of s and of ds/dt over each step, from rest, of what swings around each "
-          "push; a step of no length leaves both as they are.");
+          "push, by what it turns over each step; a step of no length leaves both as they are.");
     m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
           "direction"_a,
           "(R, F) how far each forward and left velocity leads along a `direction` (R, 2) from "

@@ -31,7 +31,7 @@ from twinmill.diagnosis.term import (
     displaced_by,
     times,
 )
-from twinmill.filters import faded, swung
+from twinmill.filters import Swing, faded
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
 from twinmill.model.parameters import words
@@ -252,6 +252,7 @@ class Motion:
     names: Mapping[str, np.ndarray]
     horizons: Sequence[int]
     _known: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False)
+    _swinging: dict[tuple, list[Swing]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -330,12 +331,18 @@ class Motion:
         """(N,) means over each step of s and r that swing around a goal."""
         key = ("swing", goal, form.constant, form.damping)
         if key not in self._known:
-            self._known[key] = self._each(
-                lambda own, step_s: swung(own, step_s, form.constant, form.damping),
-                self._in_the_middle(goal),
-                self._step_s,
-            )
+            pushes = self._in_the_middle(goal)
+            swings = zip(self._swings(form.constant, form.damping), self.parts, strict=True)
+            found = [swing.around(pushes[part]) for swing, part in swings]
+            self._known[key] = np.concatenate(found, axis=-1)
         return dict(zip(("s", "r"), self._known[key], strict=True))
+
+    def _swings(self, rate: float, damping: float) -> list[Swing]:
+        """Of each log, around any goal."""
+        if (rate, damping) not in self._swinging:
+            found = [Swing(self._step_s[part], rate, damping) for part in self.parts]
+            self._swinging[rate, damping] = found
+        return self._swinging[rate, damping]
 
     def _in_the_middle(self, goal: str) -> np.ndarray:
         """(N,) of a goal in the middle of each step.

@@ -8,7 +8,7 @@ from scipy import signal, stats
 from scipy.integrate import solve_ivp
 
 from twinmill import chance
-from twinmill.filters import faded, filtered, swung
+from twinmill.filters import Swing, faded, filtered
 from twinmill.fitting.dependence import held, wound
 
 
@@ -62,7 +62,7 @@ def test_what_swings_does_what_an_integrator_does(damping):
         ).y[:, -1]
         means.append([after[2] / step, (after[0] - now[0]) / step])
         now = after
-    found = swung(pushes, step_s, rate, damping)
+    found = Swing(step_s, rate, damping).around(pushes)
     assert found == pytest.approx(np.array(means).T, abs=1e-8)
 
 
