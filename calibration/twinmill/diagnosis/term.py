@@ -106,7 +106,7 @@ def displaced(
         np.ascontiguousarray(velocity),
         axis,
         response.step_s,
-        response.heading_rad,
+        response.ahead,
         response.starts,
         np.ascontiguousarray(np.maximum(response.ends, 0)),
         np.nan_to_num(heading[response.data.windows.starts]),
