@@ -384,16 +384,18 @@ class Motion:
         ends = np.cumsum([0, *(len(f.shapes) for f in forms)])
         pairs = zip(self.logs, kept, strict=True)
         weights = [np.nan_to_num(o.data.weight[:, self.horizons][k])[:, None] for o, k in pairs]
+        rows = [np.flatnonzero(k) for k in kept]
         found = np.empty((sum(np.count_nonzero(k) for k in kept), ends[-1]))
         for adds_to in dict.fromkeys(f.adds_to for f in forms):
             own = [k for k, f in enumerate(forms) if f.adds_to == adds_to]
             for some in (own[n : n + TOGETHER] for n in range(0, len(own), TOGETHER)):
                 where = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in some])
                 changes, first = self._displaced(adds_to, [forms[k] for k in some]), 0
-                for change, inside, weight in zip(changes, kept, weights, strict=True):
-                    rows = change[inside] * weight
-                    found[first : first + len(rows), where] = rows
-                    first += len(rows)
+                for change, inside, weight in zip(changes, rows, weights, strict=True):
+                    judged = change.reshape(-1, len(where)).take(inside, axis=0)
+                    judged *= weight
+                    found[first : first + len(inside), where] = judged
+                    first += len(inside)
         return found
 
     def _displaced(self, adds_to: str, forms: Sequence[Form]) -> Iterator[np.ndarray]:
