@@ -323,9 +323,10 @@ class Motion:
             states = [self._swung(form, goal) for goal in goals]
         elif form.state:
             states = [{"s": self._remembered(form, names)}]
-        pairs = zip(form.shapes, cycle(states), strict=False)
-        found = [_value(text, names | own) for text, own in pairs]
-        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found])
+        found = np.empty((len(form.shapes), len(names["t"])))
+        for row, text, own in zip(found, form.shapes, cycle(states), strict=False):
+            row[:] = _value(text, names | own)
+        return found
 
     def _swung(self, form: Form, goal: str) -> dict[str, np.ndarray]:
         """(N,) means over each step of s and r that swing around a goal."""

@@ -73,7 +73,7 @@ class Term:
 
         Not what changes all speeds at once with time: the form `motion` says that without wheels.
         """
-        return self.addable and not self.family and not self.formula.endswith("*rim")
+        return not self.family and not self.formula.endswith("*rim") and self.addable
 
     @property
     def is_step(self) -> bool:
