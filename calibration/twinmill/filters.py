@@ -29,18 +29,24 @@ def filtered(
     return np.moveaxis(found.reshape(x.shape), 0, axis)
 
 
-def swung(pushes: np.ndarray, step_s: np.ndarray, rate: float, damping: float) -> np.ndarray:
-    """(2, N) means over steps of s and of r = ds/dt, from rest: dr/dt = w^2 (push - s) - 2 z w r.
+class Swing:
+    """What swings around a push, over steps: dr/dt = w^2 (push - s) - 2 z w r.
 
-    Exact where each push holds for its step. A step of no length leaves both as they are.
+    Exact where each push holds for its step. A step of no length leaves all as it is.
 
     Args:
-        pushes: (N,) what s tends to.
         step_s: (N,)
         rate: w, 1/s.
         damping: z, below 1.
     """
-    return native.swung(pushes, step_s, rate, damping)
+
+    def __init__(self, step_s: np.ndarray, rate: float, damping: float) -> None:
+        self._step_s, self._rate, self._damping = step_s, rate, damping
+        self._turned = native.swing_of(step_s, rate, damping)
+
+    def around(self, pushes: np.ndarray) -> np.ndarray:
+        """(2, N) means over steps of s and of r = ds/dt, from rest, around (N,) pushes."""
+        return native.swung(pushes, self._step_s, self._turned, self._rate, self._damping)
 
 
 def faded(keep: np.ndarray, pushes: np.ndarray) -> np.ndarray:

@@ -480,6 +480,8 @@ NB_MODULE(twinmill_native, m)
           "would hand it out anew, page by page.");
     BindChance(m);
     BindEvents(m);
+    BindHeldOut(m);
+    BindProducts(m);
     BindSeries(m);
     BindSwarms(m);
     BindThreshold(m);

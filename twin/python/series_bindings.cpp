@@ -155,7 +155,7 @@ Array LedBetween(const std::vector<Product> &forward, const std::vector<Product>
 // A motion over N steps, and the windows (W, H) in which it is seen.
 struct Seen
 {
-    std::span<const double> step_s, heading_rad, at_rad;  // (N), (N), (W)
+    std::span<const double> step_s, ahead, at_rad;  // (N), (N, 2) cosine and sine, (W)
     std::span<const int64_t> starts, ends;
 
     size_t Horizons() const { return starts.empty() ? 0 : ends.size() / starts.size(); }
@@ -212,8 +212,8 @@ std::unique_ptr<double[]> DisplacedByDriving(Matrix values, const Seen &seen, bo
     Places places(seen, sums.size());
     for (size_t n = 0; n < count; ++n)
     {
-        const double c = seen.step_s[n] * std::cos(seen.heading_rad[n]);
-        const double s = seen.step_s[n] * std::sin(seen.heading_rad[n]);
+        const double c = seen.step_s[n] * seen.ahead[2 * n];
+        const double s = seen.step_s[n] * seen.ahead[2 * n + 1];
         const double along = left ? -s : c, aside = left ? c : s;
         const double *value = values.data() + n * width;
         for (size_t t = 0; t < width; ++t)
@@ -245,8 +245,7 @@ std::unique_ptr<double[]> DisplacedByTurning(Matrix values, Matrix velocity, con
     for (size_t n = 0; n < count; ++n)
     {
         const double *v = velocity.data() + 3 * n, *value = values.data() + n * width;
-        const double c = std::cos(seen.heading_rad[n]), s = std::sin(seen.heading_rad[n]);
-        const double step = seen.step_s[n];
+        const double c = seen.ahead[2 * n], s = seen.ahead[2 * n + 1], step = seen.step_s[n];
         const double x = -step * (s * v[0] + c * v[1]), y = step * (c * v[0] - s * v[1]);
         for (size_t t = 0; t < width; ++t)
         {
@@ -275,17 +274,17 @@ std::unique_ptr<double[]> DisplacedByTurning(Matrix values, Matrix velocity, con
         });
 }
 
-Array DisplacedBy(Matrix values, Matrix velocity, int axis, Vector step_s, Vector heading_rad,
+Array DisplacedBy(Matrix values, Matrix velocity, int axis, Vector step_s, Matrix ahead,
                   Indices starts, IndexMatrix ends, Vector at_rad)
 {
     const size_t count = values.shape(0);
-    if (step_s.size() != count || heading_rad.size() != count || velocity.shape(0) != count ||
-        velocity.shape(1) != 3)
+    if (step_s.size() != count || ahead.shape(0) != count || ahead.shape(1) != 2 ||
+        velocity.shape(0) != count || velocity.shape(1) != 3)
         throw std::invalid_argument(
-            "velocity must be (N, 3), steps and headings (N), as many as rows of values");
+            "velocity must be (N, 3), `ahead` (N, 2) and steps (N), as many as rows of values");
     if (ends.shape(0) != starts.size() || at_rad.size() != starts.size())
         throw std::invalid_argument("ends and first headings must have one row per start");
-    const Seen seen{Span(step_s), Span(heading_rad), Span(at_rad), Span(starts), Span(ends)};
+    const Seen seen{Span(step_s), Span(ahead), Span(at_rad), Span(starts), Span(ends)};
     auto displaced = axis < 2 ? DisplacedByDriving(values, seen, axis == 1)
                               : DisplacedByTurning(values, velocity, seen);
     return ToNumpy(std::move(displaced), {starts.size(), ends.shape(1), 3, values.shape(1)});
@@ -510,15 +509,30 @@ Array Wound(Vector way, double most)
     return ToNumpy(std::move(wound), {way.size()});
 }
 
-// s and r = ds/dt at the end of each step, from rest: dr/dt = w^2 (push - s) - 2 z w r.
-Array Swung(Vector pushes, Vector step_s, double rate, double damping)
+// (N, 2) by what a swing turns and fades over each step: cosine, and sine over its rate.
+Array SwingOf(Vector step_s, double rate, double damping)
 {
-    if (step_s.size() != pushes.size())
-        throw std::invalid_argument("there must be as many steps as pushes");
     const double fast = rate * std::sqrt(1 - damping * damping), fading = damping * rate;
+    std::vector<double> turned;
+    turned.reserve(2 * step_s.size());
+    for (const double dt_s : Span(step_s))
+    {
+        const double fade = std::exp(-fading * dt_s);
+        turned.push_back(fade * std::cos(fast * dt_s));
+        turned.push_back(fade * std::sin(fast * dt_s) / fast);
+    }
+    return ToNumpy(std::move(turned), {step_s.size(), 2});
+}
+
+// s and r = ds/dt at the end of each step, from rest: dr/dt = w^2 (push - s) - 2 z w r.
+Array Swung(Vector pushes, Vector step_s, Matrix turned, double rate, double damping)
+{
+    if (step_s.size() != pushes.size() || turned.shape(0) != pushes.size() || turned.shape(1) != 2)
+        throw std::invalid_argument("there must be as many steps as pushes, and what each turns");
+    const double fading = damping * rate;
     std::vector<double> out(2 * pushes.size());
     double *mean_s = out.data(), *mean_r = mean_s + pushes.size();
-    double s = 0, r = 0, last_s = -1, cos = 0, sin = 0;
+    double s = 0, r = 0;
     for (size_t n = 0; n < pushes.size(); ++n)
     {
         const double dt_s = step_s.data()[n], push = pushes.data()[n];
@@ -528,13 +542,7 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
             mean_r[n] = r;
             continue;
         }
-        if (dt_s != last_s)
-        {
-            const double fade = std::exp(-fading * dt_s);
-            cos = fade * std::cos(fast * dt_s);
-            sin = fade * std::sin(fast * dt_s) / fast;
-            last_s = dt_s;
-        }
+        const double cos = turned.data()[2 * n], sin = turned.data()[2 * n + 1];
         const double away = s - push, from_s = s, from_r = r;
         s = push + (cos + fading * sin) * away + sin * r;
         r = (cos - fading * sin) * r - rate * rate * sin * away;
@@ -600,12 +608,12 @@ Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
 
 void BindSeries(nb::module_ &m)
 {
-    m.def("displaced_by", &DisplacedBy, "values"_a, "velocity"_a, "axis"_a, "step_s"_a,
-          "heading_rad"_a, "starts"_a, "ends"_a, "at_rad"_a,
+    m.def("displaced_by", &DisplacedBy, "values"_a, "velocity"_a, "axis"_a, "step_s"_a, "ahead"_a,
+          "starts"_a, "ends"_a, "at_rad"_a,
           "(W, H, 3, T) how far a robot that moves at `velocity` (N, 3) gets elsewhere, forward, "
           "left and turned as seen from headings `at_rad` (W,), from after row `starts` (W,) up to "
           "row `ends` (W, H), by other speeds (N, T) in a body axis: 0, 1, or 2 for turning, of "
-          "first order.");
+          "first order. `ahead` (N, 2) is the cosine and sine of its heading in each step.");
     m.def("filtered", &Filtered, "numerator"_a, "denominator"_a, "signal"_a,
           "(N, F) of a recursive filter that begins at rest.");
     m.def("faded", &Faded, "keep"_a, "pushes"_a,
@@ -629,9 +637,11 @@ void BindSeries(nb::module_ &m)
     m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
           "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
           "its diagonal and definite then, for right sides (M, F).");
-    m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
+    m.def("swing_of", &SwingOf, "step_s"_a, "rate"_a, "damping"_a,
+          "(N, 2) cosine, and sine over the rate, of what swings and fades over each step.");
+    m.def("swung", &Swung, "pushes"_a, "step_s"_a, "turned"_a, "rate"_a, "damping"_a,
           "(2, N) means of s and of ds/dt over each step, from rest, of what swings around each "
-          "push; a step of no length leaves both as they are.");
+          "push, by what it turns over each step; a step of no length leaves both as they are.");
     m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
           "direction"_a,
           "(R, F) how far each forward and left velocity leads along a `direction` (R, 2) from "

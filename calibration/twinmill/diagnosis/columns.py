@@ -53,20 +53,24 @@ class Columns:
         return self._place.shape[1]
 
     def some(self, wanted: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
-        """(r, k) of rows of these (r,) numbers, or of all, the columns of these (k,) numbers."""
+        """(r, k) of rows of these (r,) numbers, or of all, the columns of these (k,) numbers.
+
+        To be read alone: neighbours are not copied.
+        """
         piece, place = self._place[:, wanted]
-        numbers = np.unique(piece)
-        if len(numbers) == 1:
-            return self._of_piece(numbers[0], place, rows)
+        if (piece == piece[0]).all():
+            return self._of_piece(piece[0], place, rows)
         found = np.empty((len(self.pieces[0]) if rows is None else len(rows), len(piece)))
-        for n in numbers:
+        for n in np.unique(piece):
             own = piece == n
             found[:, own] = self._of_piece(n, place[own], rows)
         return found
 
     def _of_piece(self, n: int, place: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
-        piece = self.pieces[n]
-        return (piece if rows is None else piece.take(rows, axis=0)).take(place, axis=1)
+        piece = self.pieces[n] if rows is None else self.pieces[n].take(rows, axis=0)
+        if (np.diff(place) == 1).all():
+            return piece[:, place[0] : place[-1] + 1]
+        return piece.take(place, axis=1)
 
 
 def _joined(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:

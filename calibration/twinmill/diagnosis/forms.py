@@ -31,7 +31,7 @@ from twinmill.diagnosis.term import (
     displaced_by,
     times,
 )
-from twinmill.filters import faded, swung
+from twinmill.filters import Swing, faded
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.response import Response
 from twinmill.model.parameters import words
@@ -63,6 +63,7 @@ MOST_NUMBERS = 4  # the effect `equation` has p0 to p3
 C, D, L = "{c}", "{d}", "{l}"  # the constant, the damping and the lever in texts
 A = "{a}"  # the angle of a period at time 0
 PLACES = {"constant": C, "damping": D, "phase": A}
+NAMES = str.maketrans("", "", "{}")  # makes names of these
 SWINGS_HZ = (0.55, 0.75, 1.0, 1.35, 1.8, 2.4, 3.2, 4.3)
 DAMPINGS = (0.07, 0.3)
 DAMPED = 2.2  # times which a better damping may differ
@@ -143,7 +144,7 @@ class Form:
     figures: int = 0
     phase: float | None = None
 
-    @property
+    @cached_property
     def texts(self) -> tuple[str, ...]:
         """The shapes with their constant."""
         return tuple(self.filled(s) for s in self.shapes)
@@ -158,7 +159,7 @@ class Form:
         """Of the body's motion it changes one quantity, which can be drawn over a variable."""
         return self.of_body and self.adds_to != ROOM
 
-    @property
+    @cached_property
     def names_time(self) -> bool:
         """It holds of one run: no other shares its moments."""
         return "t" in names_in([*self.texts, *self.rates])
@@ -168,7 +169,7 @@ class Form:
         """It is there for a part of each period, by the clock."""
         return self.phase is not None
 
-    @property
+    @cached_property
     def rates(self) -> tuple[str, ...]:
         """Of its states with its constants; none if it has no state."""
         texts = (self.state.text, self.state.second_text) if self.state else ()
@@ -191,7 +192,7 @@ class Form:
         """Names of the constants that it has."""
         return tuple(name for name in ("constant", "damping") if getattr(self, name))
 
-    @property
+    @cached_property
     def numbers(self) -> int:
         """Fitted ones, constants among them."""
         return self.places + len(self.searched) + self.figures
@@ -200,6 +201,12 @@ class Form:
     def places(self) -> int:
         """Numbers of the effect `equation` that it takes: of its shapes, and its phase."""
         return len(self.shapes) + self.recurs
+
+    @cached_property
+    def constants(self) -> dict[str, str]:
+        """As its texts have them."""
+        found = {"constant": f"{self.constant:.4g}", "damping": f"{self.damping:.3g}"}
+        return found if self.phase is None else found | {"phase": f"{self.phase:.3f}"}
 
     @property
     def strengths(self) -> np.ndarray:
@@ -219,10 +226,9 @@ class Form:
 
     def filled(self, text: str, names: Mapping[str, str] = MappingProxyType({})) -> str:
         """A text of it with its constants; those that have a name there have that."""
-        figures = {"constant": f"{self.constant:.4g}", "damping": f"{self.damping:.3g}"}
-        if self.phase is not None:
-            figures["phase"] = f"{self.phase:.3f}"
-        for key, value in (figures | {**names}).items():
+        if "{" not in text:
+            return text
+        for key, value in (self.constants | {**names}).items():
             text = text.replace(PLACES[key], value)
         return text.replace(L, f"{LEVER_M:g}")
 
@@ -246,6 +252,7 @@ class Motion:
     names: Mapping[str, np.ndarray]
     horizons: Sequence[int]
     _known: dict[tuple, np.ndarray] = field(default_factory=dict, repr=False)
+    _swinging: dict[tuple, list[Swing]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -299,13 +306,15 @@ class Motion:
 
     def _along(self, form: Form, axis: str) -> np.ndarray:
         """The same, with a speed of the body in the place of the wheels'."""
-        key = (form.adds_to, axis if not form.of_body else "", form.texts, form.rates)
+        wheels = axis if not form.of_body else ""
+        key = (form.adds_to, wheels, form.shapes, form.state, *form.constants.values())
         if key not in self._known:
             self._known[key] = self._computed(form, axis)
         return self._known[key]
 
     def _computed(self, form: Form, axis: str) -> np.ndarray:
-        names = {**self.names, TARGET: self.names[axis]}
+        names = {**self.names, TARGET: self.names[axis], L.translate(NAMES): LEVER_M}
+        names |= {PLACES[k].translate(NAMES): float(v) for k, v in form.constants.items()}
         if form.adds_to == "theta_rad":
             names["theta"] = self._captured_rad
         states = [{}]
@@ -314,20 +323,27 @@ class Motion:
             states = [self._swung(form, goal) for goal in goals]
         elif form.state:
             states = [{"s": self._remembered(form, names)}]
-        pairs = zip(form.texts, cycle(states), strict=False)
-        found = [_value(text, names | own) for text, own in pairs]
-        return np.stack([np.broadcast_to(v, names["t"].shape) for v in found])
+        found = np.empty((len(form.shapes), len(names["t"])))
+        for row, text, own in zip(found, form.shapes, cycle(states), strict=False):
+            row[:] = _value(text, names | own)
+        return found
 
     def _swung(self, form: Form, goal: str) -> dict[str, np.ndarray]:
         """(N,) means over each step of s and r that swing around a goal."""
         key = ("swing", goal, form.constant, form.damping)
         if key not in self._known:
-            self._known[key] = self._each(
-                lambda own, step_s: swung(own, step_s, form.constant, form.damping),
-                self._in_the_middle(goal),
-                self._step_s,
-            )
+            pushes = self._in_the_middle(goal)
+            swings = zip(self._swings(form.constant, form.damping), self.parts, strict=True)
+            found = [swing.around(pushes[part]) for swing, part in swings]
+            self._known[key] = np.concatenate(found, axis=-1)
         return dict(zip(("s", "r"), self._known[key], strict=True))
+
+    def _swings(self, rate: float, damping: float) -> list[Swing]:
+        """Of each log, around any goal."""
+        if (rate, damping) not in self._swinging:
+            found = [Swing(self._step_s[part], rate, damping) for part in self.parts]
+            self._swinging[rate, damping] = found
+        return self._swinging[rate, damping]
 
     def _in_the_middle(self, goal: str) -> np.ndarray:
         """(N,) of a goal in the middle of each step.
@@ -351,7 +367,7 @@ class Motion:
     def _remembered(self, form: Form, names: Mapping[str, np.ndarray]) -> np.ndarray:
         """(N,) the state's mean over each step."""
         goal, rate = (
-            np.broadcast_to(_value(form.filled(t or "0"), names), self._step_s.shape)
+            np.broadcast_to(_value(t or "0", names), self._step_s.shape)
             for t in (form.state.goal, form.state.rate)
         )
         if not form.state.goal:
@@ -369,16 +385,18 @@ class Motion:
         ends = np.cumsum([0, *(len(f.shapes) for f in forms)])
         pairs = zip(self.logs, kept, strict=True)
         weights = [np.nan_to_num(o.data.weight[:, self.horizons][k])[:, None] for o, k in pairs]
+        rows = [np.flatnonzero(k) for k in kept]
         found = np.empty((sum(np.count_nonzero(k) for k in kept), ends[-1]))
         for adds_to in dict.fromkeys(f.adds_to for f in forms):
             own = [k for k, f in enumerate(forms) if f.adds_to == adds_to]
             for some in (own[n : n + TOGETHER] for n in range(0, len(own), TOGETHER)):
                 where = np.concatenate([np.arange(ends[k], ends[k + 1]) for k in some])
                 changes, first = self._displaced(adds_to, [forms[k] for k in some]), 0
-                for change, inside, weight in zip(changes, kept, weights, strict=True):
-                    rows = change[inside] * weight
-                    found[first : first + len(rows), where] = rows
-                    first += len(rows)
+                for change, inside, weight in zip(changes, rows, weights, strict=True):
+                    judged = change.reshape(-1, len(where)).take(inside, axis=0)
+                    judged *= weight
+                    found[first : first + len(inside), where] = judged
+                    first += len(inside)
         return found
 
     def _displaced(self, adds_to: str, forms: Sequence[Form]) -> Iterator[np.ndarray]:
@@ -436,24 +454,27 @@ def _turned(response: Response, error_rad: np.ndarray, measured: np.ndarray) -> 
 
 
 def _value(text: str, names: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Of a formula of this file or of the library, which Python and the plant read alike."""
+    """Of a formula of this file or of the library, which Python and the plant read alike.
+
+    Constants have names here, so that the forms of many constants are one text.
+    """
     return eval(_compiled(text), {"__builtins__": {}, **FUNCTIONS}, dict(names)) * 1.0
 
 
 @cache
 def _compiled(text: str) -> CodeType:
-    """Of each robot the same formula is asked for."""
-    return compile(text, text, "eval")
+    return compile(text.translate(NAMES), text, "eval")
 
 
 def sized(forms: Sequence[Form], motion: Motion) -> list[Form]:
     """Forms with the sizes of their values over all logs; without those that are always zero."""
     found = []
     every = 1 + len(motion.velocity) // MOST_POINTS
-    some = np.concatenate([np.arange(p.start, p.stop, every) for p in motion.parts])
+    some = [slice(p.start, p.stop, every) for p in motion.parts]
     for form in forms:
-        values = np.abs(motion.values(form).take(some, axis=1))
-        rms = np.sqrt(np.einsum("kn,kn->k", values, values) / len(some))
+        known = motion.values(form)
+        values = np.abs(np.concatenate([known[:, p] for p in some], axis=1))
+        rms = np.sqrt(np.einsum("kn,kn->k", values, values) / values.shape[1])
         sizes = np.maximum(large(values), rms)
         if np.isfinite(sizes).all() and (sizes > 1e-9).all():
             found.append(replace(form, sizes=tuple(float(s) for s in sizes)))

@@ -325,7 +325,7 @@ def _chosen(rows: Evidence, pool: Pool, short: Pool, half: np.ndarray) -> Chosen
         if best is None or not _worth(best, found, len(short.forms)):
             break
         found = best
-        fitting = [k for k, f in enumerate(pool.forms) if _fits_beside(f, found)]
+        fitting = _fitting_beside(pool.forms, found)
         if not fitting:
             break
         short = pool.some(fitting)
@@ -340,11 +340,15 @@ def _worth(more: Chosen, less: Chosen, tried: int) -> bool:
     return rise > max(2 * np.log(tried), SETTINGS.formula_beside * less.gain)
 
 
-def _fits_beside(form: Form, found: Chosen) -> bool:
-    states = bool(form.state) + sum(bool(f.state) for f in found.forms)
-    places = form.places + sum(f.places for f in found.forms)
-    same = form.adds_to == found.forms[0].adds_to
-    return same and states < 2 and places <= MOST_NUMBERS and form not in found.forms
+def _fitting_beside(forms: Sequence[Form], found: Chosen) -> list[int]:
+    """Numbers of those that one effect `equation` can have with what was found."""
+    to, state = found.forms[0].adds_to, any(f.state for f in found.forms)
+    most = MOST_NUMBERS - sum(f.places for f in found.forms)
+    return [
+        k
+        for k, f in enumerate(forms)
+        if f.adds_to == to and not (state and f.state) and f.places <= most and f not in found.forms
+    ]
 
 
 def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen | None:

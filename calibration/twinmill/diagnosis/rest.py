@@ -10,10 +10,11 @@ that it was not fitted to.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import HARDLY, Finding
@@ -69,21 +70,10 @@ class Tested:
 
     Attributes:
         places: (k,) of the terms, ascending.
-        products: of all terms.
-        among: what is tested that has all of them; None if nothing has.
     """
 
     group: str
     places: np.ndarray
-    products: "Products"
-    among: "Tested | None" = None
-
-    @cached_property
-    def grams(self) -> "Grams":
-        """Their products with each other."""
-        if self.among is None:
-            return self.products.grams(self.places)
-        return self.among.grams.only(np.searchsorted(self.among.places, self.places))
 
 
 # Share of a test's evidence that counts, of (R,) errors that it leaves and those that it explained.
@@ -496,13 +486,14 @@ def _tested(
         products: with what is left.
         fresh: share of the evidence that counts.
     """
-    tested = list(_tests(terms, products))
+    tested = list(_tests(terms))
     if not tested:
         return []
-    gains, nulls = _gains(products, tested, 0)
+    alike = _of_one_width(products, tested)
+    gains, nulls = _gains(products, alike, 0)
     sure = if_new = gains > _enough(tested)
     if sure.any():
-        _, nulls = _gains(products, tested, FLIPS)
+        _, nulls = _gains(products, alike, FLIPS)
         spread = np.maximum(nulls.std(axis=-1), 1e-12)
         highest = (nulls / spread[..., None]).max(axis=(0, 1))
         if_new = sure & (gains / spread > np.quantile(highest, 1 - SETTINGS.dependence_chance))
@@ -514,7 +505,8 @@ def _tested(
             group = test.group
             known = best.get(group)
             if known is None or (is_sure, gain) > (known.sure, known.gain):
-                own = np.isin(np.arange(len(terms)), test.places)
+                own = np.zeros(len(terms), bool)
+                own[test.places] = True
                 best[group] = Dependence(group, float(gain), bool(is_sure), own, group in apparent)
     return sorted(best.values(), key=lambda d: -d.gain)
 
@@ -588,7 +580,7 @@ def _errors_of(
         first = place.stop
 
 
-def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
+def _tests(terms: Sequence[Term]) -> Iterator[Tested]:
     """Each family, and each formula that it has: the same of another group is something else."""
     families: dict[tuple[str, str], list[int]] = {}
     alike: dict[tuple[str, str], list[int]] = {}
@@ -596,34 +588,38 @@ def _tests(terms: Sequence[Term], products: "Products") -> Iterator[Tested]:
         families.setdefault((term.group, term.family), []).append(k)
         alike.setdefault((term.group, term.formula), []).append(k)
     for (group, _), together in families.items():
-        family = Tested(group, np.array(together), products)
-        yield family
+        yield Tested(group, np.array(together))
         for formula in dict.fromkeys(terms[k].formula for k in together):
-            own = alike[group, formula]
-            among = family if set(own) <= set(together) else None
-            yield Tested(group, np.array(own), products, among)
+            yield Tested(group, np.array(alike[group, formula]))
 
 
-def _gains(
-    products: "Products", tested: Sequence[Tested], flips: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
-    gains, nulls = np.zeros((len(RIDGES), len(tested))), np.zeros((len(RIDGES), len(tested), flips))
+@dataclass(frozen=True)
+class _Alike:
+    """Those of N tests that have k columns each: (n,) numbers, (n, k) columns, their products."""
+
+    numbers: list[int]
+    places: np.ndarray
+    grams: "Grams"
+
+
+def _of_one_width(products: "Products", tested: Sequence[Tested]) -> list[_Alike]:
     by_width: dict[int, list[int]] = {}
     for n, test in enumerate(tested):
         by_width.setdefault(len(test.places), []).append(n)
-    for k, ridge in enumerate(RIDGES):
-        alone, of_alone = products.each_held_out(flips, ridge)
-        for width, own in by_width.items():
-            places = np.array([tested[n].places for n in own])
-            if width == 1:
-                gains[k, own], nulls[k, own] = alone[places[:, 0]], of_alone[:, places[:, 0]].T
-            else:
-                grams = [tested[n].grams for n in own]
-                gains[k, own], nulls[k, own] = products.together_held_out(
-                    places, grams, flips, ridge
-                )
-    return gains, nulls
+    each = ((own, np.array([tested[n].places for n in own])) for own in by_width.values())
+    return [_Alike(own, places, products.grams(places)) for own, places in each]
+
+
+def _gains(
+    products: "Products", alike: Sequence[_Alike], flips: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """(K, N) of N tests at K ridges, and (K, N, F) what chance brings."""
+    found = np.zeros((len(RIDGES), sum(len(a.numbers) for a in alike), 1 + flips))
+    for own in alike:
+        for k, ridge in enumerate(RIDGES):
+            gains = products.together_held_out(own.places, own.grams, flips, ridge)
+            found[k, own.numbers] = gains
+    return found[..., 0], found[..., 1:]
 
 
 def _without_redundant(
@@ -659,14 +655,15 @@ def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Ter
 
 @dataclass(frozen=True)
 class Grams:
-    """Products of k columns with each other: (B, k, k) by block, and (FOLDS, k, k) by fold."""
+    """Of N sets of k columns with each other: (N, B, k, k) by block, (N, FOLDS, k, k) by fold."""
 
     blocks: np.ndarray
     folds: np.ndarray
 
-    def only(self, own: np.ndarray) -> "Grams":
-        """Of those of some numbers."""
-        return Grams(self.blocks[:, own][:, :, own], self.folds[:, own][:, :, own])
+    @classmethod
+    def by_fold(cls, blocks: np.ndarray) -> "Grams":
+        """Of those by block: every so-many-th block is of one fold."""
+        return cls(blocks, np.stack([blocks[:, k::FOLDS].sum(1) for k in range(FOLDS)], axis=1))
 
 
 class Products:
@@ -700,79 +697,60 @@ class Products:
         count = blocks.max() + 1
         if count > MOST_BLOCKS:  # each has a sign: of many, neighbours are one
             blocks = blocks * MOST_BLOCKS // count
-        edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
-        self.parts = [slice(a, b) for a, b in pairwise(edges)]
-        self.fold = np.arange(len(self.parts)) % FOLDS
+        self.edges = np.searchsorted(blocks, np.arange(blocks.max() + 2))
+        self.parts = [slice(a, b) for a, b in pairwise(self.edges)]
         self.columns, self.own = columns, np.arange(len(columns))
         self.weight, self.total = weight[:, None], float(left @ left)
-        self.left, self.basis = left, np.linalg.qr(free)[0]
-        basis = self.basis
+        basis = np.linalg.qr(free)[0]
+        self.left, self.basis = left, np.ascontiguousarray(basis.T)
         known = self.weight * np.column_stack([left, basis])
-        square, across = (
-            np.concatenate([[f(p, c[p]) for p in self.parts] for c in columns.pieces], axis=-1)
-            for f in (lambda p, own: weight[p] ** 2 @ own**2, lambda p, own: known[p].T @ own)
-        )
-        self.moments, self.across = across[:, 0], across[:, 1:]
-        self.along = self.across.sum(0)
-        self.inside = squares(basis, self.parts)
+        each = (native.products_beside(c, known, weight, self.edges) for c in columns.pieces)
+        across, square = np.split(np.concatenate([*each], axis=-1), [-1], axis=1)
+        self.moments, self.along = across[:, 0], across[:, 1:].sum(0)
         self.moments -= np.array([left[p] @ basis[p] for p in self.parts]) @ self.along
-        more = self.inside @ self.along - 2 * self.across
-        self.energy = square + np.einsum("bpt,pt->bt", more, self.along)
-        before, after = square.sum(0), self.energy.sum(0)
+        more = squares(basis, self.parts) @ self.along - 2 * across[:, 1:]
+        self.energy = square[:, 0] + np.einsum("bpt,pt->bt", more, self.along)
+        before, after = square.sum((0, 1)), self.energy.sum(0)
         self.seen = (after > LEFT_OVER**2 * np.maximum(before, 1e-24)) & (before > 1e-18)
         self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
 
-    def grams(self, own: np.ndarray) -> Grams:
-        """Of some columns with each other, by their numbers or (T,) bool."""
-        some = self.own[own]
-        rows = self.weight * self.columns.some(some)
-        blocks = squares(rows, self.parts)
-        self._project(blocks, own, self.across[:, :, some], self.inside)
-        return Grams(blocks, self._by_fold(blocks))
+    def grams(self, places: np.ndarray) -> Grams:
+        """Of sets of columns, (N, k) by their numbers, with each other."""
+        if places.shape[1] == 1:
+            return Grams.by_fold(np.ascontiguousarray(self.energy.T[places[:, 0]])[..., None, None])
+        pieces, own, seen = self.columns.pieces, self.own[places], self.seen[places]
+        weight = self.weight[:, 0]
+        blocks = native.products_left(pieces, own, weight, self.basis, self.along, self.edges)
+        blocks *= (seen[:, :, None] & seen[:, None])[:, None]
+        return Grams.by_fold(blocks)
 
     def left_by(self, test: Tested, ridge: float) -> np.ndarray:
         """(R,) what some columns leave of the errors, fitted to other blocks."""
-        some = self.own[test.places]
-        rows = self.weight * self.columns.some(some) - self.basis @ self.along[:, some]
-        moments = self._by_fold(self.moments[:, test.places])
+        rows, moments = self._rows(test.places), self.moments[:, test.places]
+        folds = self.grams(test.places[None]).folds[0]
         left = self.left.copy()
-        for k, own in enumerate(test.grams.folds):
-            others = test.grams.folds.sum(0) - own + ridge * np.eye(len(own))
-            numbers = np.linalg.solve(others, moments.sum(0) - moments[k])
-            for b in np.flatnonzero(self.fold == k):
-                left[self.parts[b]] -= rows[self.parts[b]] @ numbers
+        for k, own in enumerate(folds):
+            others = folds.sum(0) - own + ridge * np.eye(len(own))
+            numbers = np.linalg.solve(others, moments.sum(0) - moments[k::FOLDS].sum(0))
+            for part in self.parts[k::FOLDS]:
+                left[part] -= rows[part] @ numbers
         return left
+
+    def _rows(self, own: np.ndarray) -> np.ndarray:
+        """(R, k) of some columns, what is free projected out."""
+        some = self.own[own]
+        rows = self.weight * self.columns.some(some)
+        rows -= self.basis.T @ self.along[:, some]
+        rows[:, ~self.seen[own]] = 0.0
+        return rows
 
     def _folds(self, own: np.ndarray) -> np.ndarray:
         """(FOLDS, k, k) of the same, without blocks: of many columns those fill the memory."""
-        some = self.own[own]
-        rows = self.weight * self.columns.some(some)
-        found = np.zeros((FOLDS, len(some), len(some)))
+        rows = self._rows(own)
+        found = np.zeros((FOLDS, rows.shape[1], rows.shape[1]))
         for b, p in enumerate(self.parts):
-            found[self.fold[b]] += rows[p].T @ rows[p]
-        across, inside = self._by_fold(self.across[:, :, some]), self._by_fold(self.inside)
-        self._project(found, own, across, inside)
+            found[b % FOLDS] += rows[p].T @ rows[p]
         return found
-
-    def _by_fold(self, blocks: np.ndarray) -> np.ndarray:
-        """(FOLDS, ...) sums of (B, ...)."""
-        return np.array([blocks[self.fold == k].sum(0) for k in range(FOLDS)])
-
-    def _project(
-        self, grams: np.ndarray, own: np.ndarray, across: np.ndarray, inside: np.ndarray
-    ) -> None:
-        """Takes what is free out of (B, k, k) products of columns.
-
-        Args:
-            grams: to be changed.
-            own: whose they are, by numbers or (T,) bool.
-            across: (B, P, k) of what is free with them.
-            inside: (B, P, P) of what is free with itself.
-        """
-        along = self.along[:, self.own[own]]
-        crossed = along.T @ (across - inside @ along / 2)
-        grams -= crossed + crossed.swapaxes(1, 2)
-        grams *= self.seen[own] * self.seen[own][:, None]
 
     def only(self, own: np.ndarray) -> "Products":
         """The same of some (T,) columns."""
@@ -795,55 +773,36 @@ class Products:
         made = np.sum(across * np.linalg.solve(inside, across))
         return bool(many.sum() > few.sum() and made > HOLDS * np.trace(gram[np.ix_(few, few)]))
 
-    def each_held_out(self, flips: int = 0, ridge: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """(T,) and (F, T): what `together_held_out` gives for each column alone."""
-        energy, moments = self.energy, self.moments
-        without = (moments.sum(0) - moments) / (energy.sum(0) - energy + ridge)
-        scatter = moments - energy * without
-        signs = _signs(flips, len(energy))
-        tests = [self.fold == k for k in range(FOLDS)]
-        judged = [np.vstack([moments[own].sum(0), signs[:, own] @ scatter[own]]) for own in tests]
-        total, gain = sum(judged), 0.0
-        for own, here in zip(tests, judged, strict=True):
-            size = (total - here) / (energy[~own].sum(0) + ridge)
-            gain += size * (2 * here - size * energy[own].sum(0))
-        return gain[0], gain[1:]
+    @property
+    def each_held_out(self) -> np.ndarray:
+        """(T,) fall of the cost by each column alone on blocks not fitted to."""
+        places = np.arange(len(self.seen))[:, None]
+        return self.together_held_out(places, self.grams(places), 0, 1.0)[:, 0]
 
     def held_out(self, own: np.ndarray) -> float:
         """Fall of the cost by these columns on blocks not fitted to."""
         places = np.flatnonzero(own)[None]
-        grams = Grams(np.zeros((0, own.sum(), own.sum())), self._folds(own))
-        gains, _ = self.together_held_out(places, [grams], 0, 1.0)
-        return float(gains[0])
+        grams = Grams(np.zeros((1, 0, own.sum(), own.sum())), self._folds(own)[None])
+        return float(self.together_held_out(places, grams, 0, 1.0)[0, 0])
 
     def together_held_out(
-        self, places: np.ndarray, grams: Sequence[Grams], flips: int, ridge: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(N,) fall by each of N sets of columns, (N, k) `places`, and (N, F) what chance brings.
+        self, places: np.ndarray, grams: Grams, flips: int, ridge: float
+    ) -> np.ndarray:
+        """(N, 1 + F) fall by each of N sets of columns, (N, k) `places`, and what chance brings.
 
         Chance: random signs of what each block scatters about a fit of the columns to all others.
         About a fit that has the block itself it scatters too little, where columns are many and
         blocks few (Cameron and Miller 2015, section VI.B).
+
+        Args:
+            places: of the columns.
+            grams: of the N sets.
+            flips: F.
+            ridge: of the fits; columns are in typical strengths.
         """
-        moments = np.moveaxis(self.moments[:, places], 1, 0)  # (N, B, k)
-        folds = np.array([g.folds for g in grams])  # (N, FOLDS, k, k)
-        whole = folds.sum(1) + ridge * np.eye(places.shape[1])  # columns are in typical strengths
-        tests = [self.fold == k for k in range(FOLDS)]
-        judged = np.empty((len(places), FOLDS, 1 + flips, places.shape[1]))
-        for k, test in enumerate(tests):
-            judged[:, k, 0] = moments[:, test].sum(1)
-        if flips:
-            blocks = np.array([g.blocks for g in grams])
-            others = moments.sum(1, keepdims=True) - moments
-            numbers = np.linalg.solve(whole[:, None] - blocks, others[..., None])
-            scatter = np.moveaxis(moments - (blocks @ numbers)[..., 0], 1, 0)  # (B, N, k)
-            signs = _signs(flips, len(self.fold))
-            for k, test in enumerate(tests):
-                by_chance = np.tensordot(signs[:, test], scatter[test], 1)
-                judged[:, k, 1:] = np.moveaxis(by_chance, 0, 1)
-        fitted = (judged.sum(1, keepdims=True) - judged) @ np.linalg.inv(whole[:, None] - folds)
-        gain = np.einsum("nfsk,nfsk->ns", fitted, 2 * judged - fitted @ folds)
-        return gain[:, 0], gain[:, 1:]
+        signs = _signs(flips, len(self.parts))
+        moments = np.ascontiguousarray(self.moments)
+        return native.held_out(moments, places, grams.blocks, grams.folds, signs, ridge)
 
 
 @cache

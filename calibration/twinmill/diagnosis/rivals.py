@@ -134,7 +134,7 @@ def rival_of(formulas: Formulas, name: str, less: Trial, whole: Trial) -> Rival 
         whole: with it; the way from one to the other is the effect as it was found.
     """
     products = formulas.products(less.fit, formulas.changed(less.fit, whole.fit))
-    (own, *gains), _ = products.each_held_out()
+    own, *gains = products.each_held_out
     if is_local(name):  # one block may hold all of it, so that the others tell nothing of its size
         own = products.taken[0]
     own = max(own, 0.0)

@@ -73,7 +73,7 @@ class Term:
 
         Not what changes all speeds at once with time: the form `motion` says that without wheels.
         """
-        return self.addable and not self.family and not self.formula.endswith("*rim")
+        return not self.family and not self.formula.endswith("*rim") and self.addable
 
     @property
     def is_step(self) -> bool:
@@ -100,16 +100,16 @@ def displaced(
     response: Response, velocity: np.ndarray, values: np.ndarray, axis: int
 ) -> np.ndarray:
     """(W, H, 3, T) change of windows' displacements by (N, T) velocities in a body axis, linear."""
-    heading = np.nan_to_num(response.data.measurement.track.heading_smooth)
+    heading = response.data.measurement.track.heading_smooth
     return native.displaced_by(
         np.ascontiguousarray(values),
         np.ascontiguousarray(velocity),
         axis,
         response.step_s,
-        response.heading_rad,
+        response.ahead,
         response.starts,
         np.ascontiguousarray(np.maximum(response.ends, 0)),
-        heading[response.data.windows.starts],
+        np.nan_to_num(heading[response.data.windows.starts]),
     )
 
 

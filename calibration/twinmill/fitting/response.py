@@ -234,6 +234,11 @@ class Response:
         return linear, shapes, axes
 
     @cached_property
+    def ahead(self) -> np.ndarray:
+        """(N, 2) cosine and sine of the headings."""
+        return np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+
+    @cached_property
     def edges_s(self) -> np.ndarray:
         """Edges of the intervals that velocity is averaged over: wider where poses are rare."""
         slow = self.data.measurement.track.timing.pose_period_s >= SLOW_POSES_S

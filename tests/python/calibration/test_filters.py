@@ -8,7 +8,7 @@ from scipy import signal, stats
 from scipy.integrate import solve_ivp
 
 from twinmill import chance
-from twinmill.filters import faded, filtered, swung
+from twinmill.filters import Swing, faded, filtered
 from twinmill.fitting.dependence import held, wound
 
 
@@ -62,7 +62,7 @@ def test_what_swings_does_what_an_integrator_does(damping):
         ).y[:, -1]
         means.append([after[2] / step, (after[0] - now[0]) / step])
         now = after
-    found = swung(pushes, step_s, rate, damping)
+    found = Swing(step_s, rate, damping).around(pushes)
     assert found == pytest.approx(np.array(means).T, abs=1e-8)
 
 
@@ -94,9 +94,8 @@ STARTS, ENDS, AT_RAD = np.array([0, 7, 7]), np.array([[0, 4], [8, 49], [9, 7]]),
 def test_other_speeds_lead_where_the_steps_add_up_to(drive, axis):
     velocity, heading_rad, step_s = drive
     values = 1e-6 * np.random.default_rng(2).normal(size=(50, 3))
-    found = native.displaced_by(
-        values, velocity, axis, step_s, heading_rad, STARTS, ENDS, 1.0 * AT_RAD
-    )
+    ahead = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
+    found = native.displaced_by(values, velocity, axis, step_s, ahead, STARTS, ENDS, 1.0 * AT_RAD)
     for w, (start, at_rad) in enumerate(zip(STARTS, AT_RAD, strict=True)):
         for h, end in enumerate(ENDS[w]):
             for t, value in enumerate(values.T):

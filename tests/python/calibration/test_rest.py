@@ -16,7 +16,15 @@ from twinmill.diagnosis.library import SHAPES, _wheel_terms
 from twinmill.diagnosis.moments import Events
 from twinmill.diagnosis.notes import _no_more_than_left, irregularity, is_random
 from twinmill.diagnosis.place import HORIZON, comes_again
-from twinmill.diagnosis.rest import FIRM, Dependence, Products, Rest, _standing_out, _tested
+from twinmill.diagnosis.rest import (
+    FIRM,
+    FOLDS,
+    Dependence,
+    Products,
+    Rest,
+    _standing_out,
+    _tested,
+)
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import Term
@@ -669,8 +677,8 @@ def test_products_are_those_of_what_is_left_beside_what_is_free():
     rows = weight[:, None] * np.hstack(pieces)
     rows -= free @ np.linalg.lstsq(free, rows, rcond=None)[0]
     assert products.seen.tolist() == [True] * 4 + [False]
-    own = np.array([True, False, True, True, False])
-    for k, grams in enumerate(products.grams(own).blocks):
+    own = np.array([0, 2, 3])
+    for k, grams in enumerate(products.grams(own[None]).blocks[0]):
         here = blocks == k
         assert grams == pytest.approx(rows[here][:, own].T @ rows[here][:, own])
         assert products.moments[k, :4] == pytest.approx(left[here] @ rows[here][:, :4])
@@ -685,3 +693,32 @@ def test_columns_of_several_logs_stand_one_log_after_the_other():
     assert np.array_equal(columns.some(np.arange(5)), np.vstack([np.hstack(own) for own in logs]))
     wide = random.normal(size=(4, 100))
     assert Columns.beside(iter([[wide, *logs[0]]]), 4).pieces[0] is wide  # of one log no copy
+
+
+@pytest.mark.parametrize("count", [1, 3, 8])
+def test_gains_are_those_on_folds_that_columns_were_not_fitted_to(count):
+    """Truth: ridge regressions of the rows themselves, on all other blocks, or all other folds."""
+    rng = np.random.default_rng(count)
+    blocks, ridge = 7, 0.5
+    every = np.arange(blocks)
+    fold = every % FOLDS
+    x, left = rng.normal(size=(2, blocks, 9, count)), rng.normal(size=(blocks, 9))
+    signs = rng.choice([-1.0, 1.0], (9, blocks))
+    grams = np.swapaxes(x, 2, 3) @ x
+    folds = np.stack([grams[:, fold == k].sum(axis=1) for k in range(FOLDS)], axis=1)
+    moments = np.hstack([np.einsum("brk,br->bk", own, left) for own in x])
+    places = np.arange(2 * count).reshape(2, count)
+    found = native.held_out(moments, places, grams, folds, signs, ridge)
+    for own, gains in zip(x, found, strict=True):
+
+        def fitted(pushes, kept, own=own):
+            rows = own[kept].reshape(-1, count)
+            return np.linalg.solve(rows.T @ rows + ridge * np.eye(count), pushes[kept].sum(axis=0))
+
+        pushes = np.einsum("brk,br->bk", own, left)
+        after = [left[b] - own[b] @ fitted(pushes, every != b) for b in every]
+        scatter = np.einsum("brk,br->bk", own, after)
+        for pushed, gain in zip([pushes, *(signs[..., None] * scatter)], gains, strict=True):
+            numbers = [fitted(pushed, fold != k) for k in fold]
+            made = np.einsum("brk,bk->br", own, numbers)
+            assert gain == pytest.approx(2 * np.sum(numbers * pushed) - np.sum(made**2))
