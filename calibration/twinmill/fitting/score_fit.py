@@ -201,26 +201,21 @@ class ScoreFit:
         both = self.central & (x + self.step <= self.high) & (x - self.step >= self.low)
         rows, slopes = [], []
         for i, own in enumerate(self.columns):
-            points = [x]
+            points = [] if known and len(own) else [x]
             for c in own:
                 for sign in (1, -1) if both[c] else (1,):
                     point = x.copy()
                     point[c] += sign * up[c]
                     points.append(point)
-            if known and len(own):
-                values = np.vstack([known[i], self.batch(i, np.array(points[1:]))])
-            else:
-                values = self.batch(i, np.array(points))
-            columns, k = [], 1
-            for c in own:
-                if both[c]:
-                    columns.append((values[k] - values[k + 1]) / (2 * up[c]))
-                    k += 2
-                else:
-                    columns.append((values[k] - values[0]) / up[c])
-                    k += 1
-            rows.append(values[0])
-            slopes.append(np.array(columns).T.reshape(len(values[0]), len(own)))
+            values = iter(self.batch(i, np.array(points)))
+            at_x = known[i] if known and len(own) else next(values)
+            columns = np.empty((len(own), len(at_x)))
+            for column, c in zip(columns, own, strict=True):
+                beside = next(values)
+                column[:] = beside - (next(values) if both[c] else at_x)
+                column /= 2 * up[c] if both[c] else up[c]
+            rows.append(at_x)
+            slopes.append(columns.T)
         return rows, slopes
 
     # -- cost -----------------------------------------------------------------------------------
