@@ -83,16 +83,19 @@ bool RelaxAlike(const WheelSignals &s)
     return alike;
 }
 
-// As Approach(), of all wheels at once; those that a robot has not stand and are told to.
-void ApproachAlike(const Wheels &rim_mps, const Wheels &target_mps, const Decay &decay,
-                   Wheels &mean_mps, Wheels &end_mps)
+// As Approach(), of all wheels at once; those that a robot has not stand and are told to. Returns
+// their means.
+Wheels ApproachAlike(Wheels &rim_mps, const Wheels &target_mps, const Decay &decay)
 {
+    const Wheels begun_mps = rim_mps, told_mps = target_mps;
+    Wheels mean_mps;
     for (size_t k = 0; k < kMaxWheels; ++k)
     {
-        const double target = target_mps[k], away = rim_mps[k] - target;
-        end_mps[k] = target + away * decay.end;
-        mean_mps[k] = target + away * decay.mean;
+        const double away = begun_mps[k] - told_mps[k];
+        rim_mps[k] = told_mps[k] + away * decay.end;
+        mean_mps[k] = told_mps[k] + away * decay.mean;
     }
+    return mean_mps;
 }
 
 double SignOf(double place_m)
@@ -305,9 +308,7 @@ WheelMotion DriveChain::DriveWheels(const Command &command, double t_s, double d
 // Wheels that all lag alike on their way to what they are asked for.
 WheelMotion DriveChain::Approached(const Decay &decay, double t_s, RobotState &state) const
 {
-    Wheels mean_mps, end_mps;
-    ApproachAlike(state.rim_mps, state.asked_mps, decay, mean_mps, end_mps);
-    return Turned(t_s, decay.dt_s, mean_mps, end_mps, state);
+    return Turned(t_s, decay.dt_s, ApproachAlike(state.rim_mps, state.asked_mps, decay), state);
 }
 
 std::vector<Rolling> DriveChain::RollThrough(std::span<const DriveStep> steps,
@@ -322,11 +323,19 @@ std::vector<Rolling> DriveChain::RollThrough(std::span<const DriveStep> steps,
             RollBy(DriveWheels(command, t_s, dt_s, state), rolled.emplace_back());
         return rolled;
     }
+    // Of wheels whose angles nothing asks for the speeds alone are followed.
+    const bool plain = rolling_.empty() && !kinematics_.steers();
+    WheelMotion mean;
+    Wheels rim_mps{};
     for (size_t i = 0; i < steps.size(); ++i)
     {
         if (state.told != steps[i].command.value)
             Ask(steps[i].command, state);
-        RollBy(Approached(decays[i], steps[i].t_s, state), rolled.emplace_back());
+        if (plain)
+            mean.rim_mps = ApproachAlike(rim_mps, state.asked_mps, decays[i]);
+        else
+            mean = Approached(decays[i], steps[i].t_s, state);
+        RollBy(mean, rolled.emplace_back());
     }
     return rolled;
 }
@@ -343,29 +352,24 @@ WheelMotion DriveChain::DrivePart(const DutySignals &duty, RobotState &state) co
     }
     if (wheel_.empty())
         return Approached(state.decays.Over(duty.dt_s, base_.motor_lag_s), duty.t_s, state);
-    Wheels mean_mps{}, end_mps{};
-    TurnWheels(duty, state, mean_mps, end_mps);
-    return Turned(duty.t_s, duty.dt_s, mean_mps, end_mps, state);
+    return Turned(duty.t_s, duty.dt_s, TurnWheels(duty, state), state);
 }
 
-// The motion of wheels with these speeds over a part of a step, and at its end.
+// The motion of wheels with these speeds over a part of a step.
 WheelMotion DriveChain::Turned(double t_s, double dt_s, const Wheels &mean_mps,
-                               const Wheels &end_mps, RobotState &state) const
+                               RobotState &state) const
 {
     WheelMotion motion{mean_mps, 0};
     if (!rolling_.empty())
     {
-        RollSignals roll{robot_, t_s, dt_s, state.duty, mean_mps, end_mps, state.wheel_rad};
+        RollSignals roll{robot_, t_s, dt_s, state.duty, mean_mps, state.rim_mps, state.wheel_rad};
         Run(rolling_, roll, state);
         for (size_t k = 0; k < kMaxWheels; ++k)
             motion.rim_mps[k] *= roll.radius_ratio[k];
     }
     const double rad_per_mps = dt_s / robot_.wheel_radius_m;
     for (size_t k = 0; k < kMaxWheels; ++k)
-    {
-        state.rim_mps[k] = end_mps[k];
         state.wheel_rad[k] += mean_mps[k] * rad_per_mps;
-    }
     if (kinematics_.steers())
     {
         const Relaxed steering = Approach(state.steering_rad, state.asked_steering_rad,
@@ -376,24 +380,24 @@ WheelMotion DriveChain::Turned(double t_s, double dt_s, const Wheels &mean_mps,
     return motion;
 }
 
-// Rim speeds over that part with the effects on wheels.
-void DriveChain::TurnWheels(const DutySignals &duty, RobotState &state, Wheels &mean_mps,
-                            Wheels &end_mps) const
+// Takes rim speeds over that part with the effects on wheels, and returns their means.
+Wheels DriveChain::TurnWheels(const DutySignals &duty, RobotState &state) const
 {
     WheelSignals s{robot_,    duty.t_s,      duty.dt_s,       duty.battery_V,
                    duty.duty, state.rim_mps, state.wheel_rad, state.asked_mps};
     s.tau_s.fill(base_.motor_lag_s);
     Run(wheel_, s, state);
     if (RelaxAlike(s))
-        return ApproachAlike(s.rim_mps, s.target_mps, state.decays.Over(s.dt_s, s.tau_s[0]),
-                             mean_mps, end_mps);
+        return ApproachAlike(state.rim_mps, s.target_mps, state.decays.Over(s.dt_s, s.tau_s[0]));
+    Wheels mean_mps{};
     for (int k = 0; k < robot_.wheels; ++k)
     {
         const Relaxed rim = Relax(state.rim_mps[k], s.target_mps[k], s.tau_s[k],
                                   s.max_decel_mps2[k], s.dt_s, state.decays);
         mean_mps[k] = rim.mean;
-        end_mps[k] = rim.end;
+        state.rim_mps[k] = rim.end;
     }
+    return mean_mps;
 }
 
 // First-order (Ornstein-Uhlenbeck) velocity noise, mean over a step taken as its value: steps are

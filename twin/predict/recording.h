@@ -98,10 +98,11 @@ inline std::shared_ptr<const Recording> RecordingOf(const std::shared_ptr<const 
             return late.front();
         }
     }
-    const bool own_lag = chain->IsPrompt() && chain->LagS() != plan->lag_s;
+    std::vector<Decay> own;
+    if (chain->IsPrompt() && chain->LagS() != plan->lag_s)
+        own = plan->DecaysOf(chain->LagS());
     const auto made = std::make_shared<const Recording>(
-        chain, plan,
-        chain->RollThrough(plan->steps, own_lag ? plan->DecaysOf(chain->LagS()) : plan->decays));
+        chain, plan, chain->RollThrough(plan->steps, own.empty() ? plan->decays : own));
     if (kept)
     {
         const std::scoped_lock lock(recordings.held);

@@ -305,11 +305,24 @@ def likely_pairs(
     gram, moment = whole.T @ whole + 0.25 * np.eye(whole.shape[1]), whole.T @ left
     ends = np.cumsum([s.columns.shape[1] for s in screened])
     places = np.split(np.arange(whole.shape[1]), ends[:-1])
-    worth = {}
-    for (a, of_a), (b, of_b) in combinations(zip(screened, places, strict=True), 2):
-        own = np.concatenate([of_a, of_b])
-        pull = moment[own]
-        together = pull @ np.linalg.solve(gram[own[:, None], own], pull)
-        worth[a.name, b.name] = float(together) - max(a.gain, b.gain)
+    pairs = [*combinations(range(len(screened)), 2)]
+    together = _taken([np.concatenate([places[a], places[b]]) for a, b in pairs], gram, moment)
+    worth = {
+        (screened[a].name, screened[b].name): float(taken) - max(screened[a].gain, screened[b].gain)
+        for (a, b), taken in zip(pairs, together, strict=True)
+    }
     best = sorted(worth, key=lambda pair: -worth[pair])
     return [p for p in best if worth[p] > settings.evidence][: settings.pairs]
+
+
+def _taken(sets: Sequence[np.ndarray], gram: np.ndarray, moment: np.ndarray) -> np.ndarray:
+    """(S,) what each set of columns explains; those of one size are solved together."""
+    taken = np.empty(len(sets))
+    sizes = np.array([len(own) for own in sets])
+    for size in np.unique(sizes):
+        members = np.flatnonzero(sizes == size)
+        own = np.array([sets[k] for k in members])
+        pull = moment[own]
+        square = gram[own[:, :, None], own[:, None, :]]
+        taken[members] = np.sum(pull * np.linalg.solve(square, pull[..., None])[..., 0], axis=1)
+    return taken

@@ -201,26 +201,21 @@ class ScoreFit:
         both = self.central & (x + self.step <= self.high) & (x - self.step >= self.low)
         rows, slopes = [], []
         for i, own in enumerate(self.columns):
-            points = [x]
+            points = [] if known and len(own) else [x]
             for c in own:
                 for sign in (1, -1) if both[c] else (1,):
                     point = x.copy()
                     point[c] += sign * up[c]
                     points.append(point)
-            if known and len(own):
-                values = np.vstack([known[i], self.batch(i, np.array(points[1:]))])
-            else:
-                values = self.batch(i, np.array(points))
-            columns, k = [], 1
-            for c in own:
-                if both[c]:
-                    columns.append((values[k] - values[k + 1]) / (2 * up[c]))
-                    k += 2
-                else:
-                    columns.append((values[k] - values[0]) / up[c])
-                    k += 1
-            rows.append(values[0])
-            slopes.append(np.array(columns).T.reshape(len(values[0]), len(own)))
+            values = iter(self.batch(i, np.array(points)))
+            at_x = known[i] if known and len(own) else next(values)
+            columns = np.empty((len(own), len(at_x)))
+            for column, c in zip(columns, own, strict=True):
+                beside = next(values)
+                column[:] = beside - (next(values) if both[c] else at_x)
+                column /= 2 * up[c] if both[c] else up[c]
+            rows.append(at_x)
+            slopes.append(columns.T)
         return rows, slopes
 
     # -- cost -----------------------------------------------------------------------------------
@@ -258,7 +253,7 @@ class ScoreFit:
         for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
             weighted = j * self.weight(i, r)[:, None]
             own = self.columns[i]
-            gram[np.ix_(own, own)] += weighted.T @ j
+            gram[own[:, None], own] += weighted.T @ j
             pull[own] += weighted.T @ r
         return gram, pull
 
@@ -451,8 +446,9 @@ class ScoreFit:
         while free.any():
             held = moved - x
             held[free] = 0.0
-            push = pull[free] + gram[np.ix_(free, ~free)] @ held[~free]
-            moved[free] = x[free] - np.linalg.solve(gram[np.ix_(free, free)], push)
+            own = gram[free]
+            push = pull[free] + own[:, ~free] @ held[~free]
+            moved[free] = x[free] - np.linalg.solve(own[:, free], push)
             outside = free & ((moved < self.low) | (moved > self.high))
             if not outside.any():
                 break
@@ -505,16 +501,19 @@ class ScoreFit:
         if not len(self.x):
             return rows
         gram, pull = self._normal(rows, slopes, self.x)
-        weights = [self.weight(i, r) for i, r in enumerate(rows)]
-        points = []
+        weighted = [
+            j * self.weight(i, r)[:, None]
+            for i, (r, j) in enumerate(zip(rows, slopes, strict=True))
+        ]
+        points, local = [], self._own_to(is_local)
         for k in range(PARTS):
             g, p = gram.copy(), pull.copy()
             for i, (r, j) in enumerate(zip(rows, slopes, strict=True)):
-                out = self.datasets[i].part == k
-                weighted, own = j[out] * weights[i][out, None], self.columns[i]
-                g[np.ix_(own, own)] -= weighted.T @ j[out]
-                p[own] -= weighted.T @ r[out]
-            points.append(self._stepped(g, p, self.x, self._own_to(is_local)))
+                out, own = np.flatnonzero(self.datasets[i].part == k), self.columns[i]
+                left_out = weighted[i][out].T
+                g[own[:, None], own] -= left_out @ j[out]
+                p[own] -= left_out @ r[out]
+            points.append(self._stepped(g, p, self.x, local))
         self._find_phases_elsewhere(points)
         if sum(len(r) for r in rows) < FEW_ROWS:
             points = [self._without_part(k, x) for k, x in enumerate(points)]

@@ -8,6 +8,7 @@ linear.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -118,6 +119,37 @@ class Left:
             gram = gram + whitened @ whitened.swapaxes(1, 2)
             free = free + whitened @ basis
         return moment, gram - free @ np.swapaxes(free, 1, 2)
+
+    def products_of_shares(
+        self, changes: Sequence[np.ndarray], shares: Sequence[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same of changes that are there for a share of each prediction's time.
+
+        A share is that of all channels of a prediction, so that these are summed first.
+
+        Args:
+            changes: (k, R) of each data set.
+            shares: (S, W, H) of each data set.
+        """
+        moment, gram, free = 0.0, 0.0, 0.0
+        parts = zip(self.weights, self.rests, self.bases, changes, shares, strict=True)
+        for w, rest, basis, change, share in parts:
+            share = share.reshape(len(share), -1).astype(float)
+            whitened, rest, basis = (
+                a.reshape(len(a) // len(CHANNELS), len(CHANNELS), a.shape[1])
+                for a in ((w * change).T, rest[:, None], basis)
+            )
+            moment = moment + share @ _over_channels(whitened, rest)
+            gram = gram + share**2 @ _over_channels(whitened, whitened)
+            free = free + share @ _over_channels(whitened, basis)
+        count, k = len(shares[0]), len(changes[0])
+        free = free.reshape(count, k, self.bases[0].shape[1])
+        return moment, gram.reshape(count, k, k) - free @ free.swapaxes(1, 2)
+
+
+def _over_channels(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(P, k * j) sums over channels of products of (P, C, k) and (P, C, j)."""
+    return (a.swapaxes(1, 2) @ b).reshape(len(a), a.shape[2] * b.shape[2])
 
 
 def projected(fit: ScoreFit) -> tuple[np.ndarray, np.ndarray]:
@@ -231,8 +263,8 @@ class Switched:
 
     def best(self, left: Left) -> dict[str, float]:
         """See Starts."""
-        columns = (c * _of_rows(s)[:, None] for c, s in zip(self.changes, self.shares, strict=True))
-        return self.starts[int(np.argmax(_gains(*left.products(columns))))]
+        products = left.products_of_shares(self.changes, self.shares)
+        return self.starts[int(np.argmax(_gains(*products)))]
 
 
 @dataclass(frozen=True)
@@ -323,12 +355,13 @@ def _places(candidate: Candidate, rows: Sequence[np.ndarray]) -> Switched:
     xy = np.concatenate([t.pose[t.segment >= 0, :2] for t in tracks])
     low, high = np.nanquantile(xy, 0.03, axis=0), np.nanquantile(xy, 0.97, axis=0)
     side_m = float(np.max(high - low))
+    places = [*product(*np.linspace(low, high, PLACES).T)]
+    nearest_m = [np.nanmin(np.hypot(*(xy[::20] - place).T)) for place in places]
     circles = [
-        (x, y, radius_m)
+        (*place, radius_m)
         for radius_m in sorted({max(LEAST_RADIUS_M, share * side_m) for share in RADII})
-        for x in np.linspace(low[0], high[0], PLACES)
-        for y in np.linspace(low[1], high[1], PLACES)
-        if np.nanmin(np.hypot(*(xy[::20] - (x, y)).T)) < radius_m
+        for place, away_m in zip(places, nearest_m, strict=True)
+        if away_m < radius_m
     ]
     entry = {p["name"]: p for p in catalogue()[candidate.name]["parameters"]}
     middle = (low + high) / 2
@@ -348,9 +381,12 @@ def _inside(dataset: Dataset, circles: np.ndarray) -> np.ndarray:
     last = np.maximum(dataset.windows.ends, first)
     steps = np.maximum(last - first, 1)
     shares = np.empty((len(circles), *last.shape), np.float32)
-    for share, (x, y, radius_m) in zip(shares, circles, strict=True):  # all at once fill the memory
-        count = np.cumsum((x_m - x) ** 2 + (y_m - y) ** 2 < radius_m**2, dtype=np.int32)
-        share[:] = (count[last] - count[first]) / steps
+    places, at = np.unique(circles[:, :2], axis=0, return_inverse=True)
+    for number, (x, y) in enumerate(places):  # all at once fill the memory
+        square = (x_m - x) ** 2 + (y_m - y) ** 2
+        for s in np.flatnonzero(at == number):
+            count = np.cumsum(square < circles[s, 2] ** 2, dtype=np.int32)
+            shares[s] = (count[last] - count[first]) / steps
     return shares
 
 

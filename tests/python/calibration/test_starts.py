@@ -152,6 +152,28 @@ def test_one_pass_with_it_always_on_finds_where_it_is_on(name, values, opened):
         assert value == pytest.approx(values[key.split(".")[1]], abs=near), best
 
 
+@pytest.mark.parametrize("free", [0, 4])
+def test_products_of_shares_are_those_of_the_columns_that_they_make(free):
+    rng = np.random.default_rng(1)
+    sizes, windows, horizons, starts = 2, (7, 5), 3, 6
+    rows = [w * horizons * 3 for w in windows]
+    weights, rests = ([rng.random(r) for r in rows] for _ in range(2))
+    left = Left(weights, rests, [rng.normal(size=(r, free)) for r in rows])
+    changes = [rng.normal(size=(sizes, r)) for r in rows]
+    shares = [rng.random((starts, w, horizons)) for w in windows]
+    moment, gram = left.products_of_shares(changes, shares)
+    for s in range(starts):
+        columns = np.hstack(
+            [
+                c * w * np.repeat(on[s].ravel(), 3)
+                for c, w, on in zip(changes, weights, shares, strict=True)
+            ]
+        )
+        along = columns @ np.vstack(left.bases)
+        assert moment[s] == pytest.approx(columns @ np.concatenate(rests))
+        assert gram[s] == pytest.approx(columns @ columns.T - along @ along.T)
+
+
 def test_no_search_begins_beyond_the_bounds_of_a_limit(opened):
     """Fast robots have their limits, and their duties that do nothing, far from the usual ones."""
     card = catalogue_of(opened.model)["stiction"]["parameters"][0]

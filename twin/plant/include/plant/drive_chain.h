@@ -146,11 +146,9 @@ private:
     WheelMotion Target(const Wheels &command) const;
     void Ask(const Command &command, RobotState &state) const;
     WheelMotion DrivePart(const DutySignals &duty, RobotState &state) const;
-    void TurnWheels(const DutySignals &duty, RobotState &state, Wheels &mean_mps,
-                    Wheels &end_mps) const;
+    Wheels TurnWheels(const DutySignals &duty, RobotState &state) const;
     WheelMotion Approached(const Decay &decay, double t_s, RobotState &state) const;
-    WheelMotion Turned(double t_s, double dt_s, const Wheels &mean_mps, const Wheels &end_mps,
-                       RobotState &state) const;
+    WheelMotion Turned(double t_s, double dt_s, const Wheels &mean_mps, RobotState &state) const;
     void Disturb(Twist &twist, double dt_s, RobotState &state, Random &random) const;
 
     Base base_;
