@@ -378,12 +378,16 @@ class Response:
         def factors(of: np.ndarray | Product) -> tuple[np.ndarray, np.ndarray]:
             return (of.gains, of.signals) if isinstance(of, Product) else (of, alone)
 
-        columns, steps = [[factors(f[axis]) for f in features] for axis in AXES[part]], alone
-        if part == 0:
-            steps = np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+        columns = [[factors(f[axis]) for f in features] for axis in AXES[part]]
         forward, left = columns if part == 0 else (*columns, [])
-        steps = steps * self.step_s[:, None]
+        steps = self._steps[part]
         return native.led_between(forward, left, steps, rows.starts, rows.ends, rows.direction)
+
+    @cached_property
+    def _steps(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 2) length of each step times the direction in which the robot heads; (N, 1) alone."""
+        ahead = np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+        return ahead * self.step_s[:, None], self.step_s[:, None].copy()
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
         return np.floor(t_s / self.block_s).astype(int) % self.folds
