@@ -100,8 +100,8 @@ private:
     size_t width_ = 0;
 };
 
-// Adds steps (N, ways) times rows (N, F), for a few of the columns, which stay in registers, to sums
-// (ways, F) `from`, and writes these sums.
+// Adds steps (N, ways) times rows (N, F), for a few of the columns, which stay in registers, to
+// sums (ways, F) `from`, and writes these sums.
 template <size_t kWays, size_t kFew>
 void AddFew(const double *steps, const double *rows, size_t count, size_t width, const double *from,
             double *to)
@@ -601,21 +601,45 @@ Array Swung(Vector pushes, Vector step_s, double rate, double damping)
     return ToNumpy(std::move(out), {2, pushes.size()});
 }
 
+constexpr size_t kTogether = 4;  // rows, that another row is loaded and stored for once
+
+// Takes shares of a few rows (width apart) out of columns [begin, end) of another one.
+template <size_t kFew>
+void TakeOut(const double *share, const double *rows, size_t width, size_t begin, size_t end,
+             double *row)
+{
+    for (size_t k = begin; k < end; ++k)
+    {
+        double left = row[k];
+        for (size_t p = 0; p < kFew; ++p)
+            left -= share[p] * rows[p * width + k];
+        row[k] = left;
+    }
+}
+
+// Takes the unknowns of a few rows from `first` on, which are done, out of row i.
+template <size_t kFew>
+void TakeUnknownsOut(double *rows, size_t width, size_t first, size_t i)
+{
+    const double *done = rows + first * width;
+    double share[kFew];
+    for (size_t p = 0; p < kFew; ++p)
+        share[p] = done[p * width + i] / done[p * width + first + p];
+    TakeOut<kFew>(share, done, width, i, width, rows + i * width);
+}
+
 // Solves the count equations in rows of count + 1, the last of each the right side: of a definite
 // matrix, whose upper half alone is looked at.
 void Eliminate(std::span<double> rows, size_t count, double *solution)
 {
     const size_t width = count + 1;
-    for (size_t j = 0; j < count; ++j)
+    for (size_t i = 1; i < count; ++i)
     {
-        const double *pivot = rows.data() + j * width;
-        for (size_t i = j + 1; i < count; ++i)
-        {
-            const double share = pivot[i] / pivot[j];
-            double *row = rows.data() + i * width;
-            for (size_t k = i; k < width; ++k)
-                row[k] -= share * pivot[k];
-        }
+        size_t first = 0;
+        for (; first + kTogether <= i; first += kTogether)
+            TakeUnknownsOut<kTogether>(rows.data(), width, first, i);
+        for (; first < i; ++first)
+            TakeUnknownsOut<1>(rows.data(), width, first, i);
     }
     for (size_t j = count; j-- > 0;)
     {
@@ -651,6 +675,31 @@ Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
     return ToNumpy(std::move(solved), {matrices, trials, count});
 }
 
+// Row by row of the identity what lies below the diagonal is taken out.
+Array LowerInverse(Cube lower)
+{
+    const size_t matrices = lower.shape(0), count = lower.shape(1);
+    if (lower.shape(2) != count)
+        throw std::invalid_argument("matrices must be square");
+    std::vector<double> inverse(matrices * count * count);
+    for (size_t m = 0; m < matrices; ++m)
+        for (size_t i = 0; i < count; ++i)
+        {
+            const double *own = lower.data() + (m * count + i) * count;
+            double *rows = inverse.data() + m * count * count, *row = rows + i * count;
+            row[i] = 1;
+            size_t first = 0;
+            for (; first + kTogether <= i; first += kTogether)
+                TakeOut<kTogether>(own + first, rows + first * count, count, 0, first + kTogether,
+                                   row);
+            for (; first < i; ++first)
+                TakeOut<1>(own + first, rows + first * count, count, 0, first + 1, row);
+            for (size_t k = 0; k <= i; ++k)
+                row[k] /= own[i];
+        }
+    return ToNumpy(std::move(inverse), {matrices, count, count});
+}
+
 }  // namespace
 
 void BindSeries(nb::module_ &m)
@@ -684,6 +733,9 @@ void BindSeries(nb::module_ &m)
     m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
           "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
           "its diagonal and definite then, for right sides (M, F).");
+    m.def("lower_inverse", &LowerInverse, "lower"_a,
+          "(M, F, F) inverses of lower triangular matrices, of which no more than that half is "
+          "looked at.");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "rate"_a, "damping"_a,
           "(2, N) means of s and of ds/dt over each step, from rest, of what swings around each "
           "push; a step of no length leaves both as they are.");

@@ -46,7 +46,7 @@ GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
-WORTH_HALVING = 16  # features in half of a matrix
+WORTH_HALVING = 48  # features in half of a matrix
 WIDE = 32  # features whose rows are made at once
 AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
@@ -97,17 +97,17 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Equations:
-    """Normal equations of all rows, and of the rows that touch each of K parts or lie inside it.
+    """Normal equations of all rows, and of the rows inside each of K parts or apart from it.
 
     Attributes:
         gram, moment: (F, F) and (F,) of all.
-        touching, inside: (K, F, F) and (K, F) of each part.
+        others, inside: (K, F, F) and (K, F) of rows that do not touch each part, and inside it.
         square: of the wanted values of all.
     """
 
     gram: np.ndarray
     moment: np.ndarray
-    touching: tuple[np.ndarray, np.ndarray]
+    others: tuple[np.ndarray, np.ndarray]
     inside: tuple[np.ndarray, np.ndarray]
     square: float
 
@@ -117,9 +117,9 @@ class Equations:
         cells = rows.parts.cells
         moments = np.array([rows.wanted[k] @ x[k] for k in cells])
         sums = (rows.parts.summed(m) for m in (squares(x, cells), moments))
-        inside, touching = zip(*sums, strict=True)
+        inside, others = zip(*sums, strict=True)
         square = float(rows.wanted @ rows.wanted)
-        return cls(*(m.sum(axis=0) for m in inside), touching, inside, square)
+        return cls(*(m.sum(axis=0) for m in inside), others, inside, square)
 
 
 class Response:
@@ -668,12 +668,7 @@ class _LeftOut:
 
     def __init__(self, equations: Equations, mean: np.ndarray, groups: np.ndarray) -> None:
         self.mean, self.groups = mean, groups
-        self.grams, self.moments = (
-            whole - part
-            for whole, part in zip(
-                (equations.gram, equations.moment), equations.touching, strict=True
-            )
-        )
+        self.grams, self.moments = equations.others
         self.inner, self.push = equations.inside
         self.square = equations.square
 
@@ -684,9 +679,9 @@ class _LeftOut:
         """
         self.ridge = ridge
         self.used = np.flatnonzero(ridge[self.groups] < OUT)
-        used = np.ix_(range(len(self.grams)), self.used, self.used)
-        rise = np.diag((self.mean * ridge[self.groups])[self.used])
-        self.inverse = _inverse(self.grams[used] + rise)
+        grams = self.grams[:, self.used[:, None], self.used]
+        np.einsum("kuu->ku", grams)[:] += (self.mean * ridge[self.groups])[self.used]
+        self.inverse = _inverse(grams)
         return self._fitted()
 
     def moved(self, group: int, value: float) -> float:
@@ -760,7 +755,7 @@ def _lower_inverse(lower: np.ndarray) -> np.ndarray:
     """(K, F, F) of triangular matrices, by halves."""
     half = lower.shape[1] // 2
     if half < WORTH_HALVING:
-        return np.linalg.inv(lower)
+        return native.lower_inverse(np.ascontiguousarray(lower))
     found = np.zeros_like(lower)
     found[:, :half, :half] = first = _lower_inverse(lower[:, :half, :half])
     found[:, half:, half:] = last = _lower_inverse(lower[:, half:, half:])
