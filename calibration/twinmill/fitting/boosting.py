@@ -72,7 +72,8 @@ class Parts:
 
     def summed(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(K, ...) of (S, ...) sums over cells: inside each part, and of all apart from it."""
-        both = np.tensordot(self._owners, cells, 1)
+        flat = self._owners @ cells.reshape(len(cells), -1)
+        both = flat.reshape(-1, *cells.shape[1:])
         return both[: self.count], both[self.count :]
 
 

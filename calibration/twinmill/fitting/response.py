@@ -547,7 +547,8 @@ class Response:
         each = [(axis, f[axis]) for axis in AXES[part] for f in self.features]
         edges = np.cumsum([f.shape[1] for _, f in each])
         for (axis, f), own in zip(each, np.split(coefficients, edges[:-1]), strict=True):
-            self.velocities[axis] += f @ own
+            if own.any():  # none of a group that is out
+                self.velocities[axis] += f @ own
 
     def predict(self, velocities: Sequence[np.ndarray], which: np.ndarray) -> np.ndarray:
         """(W, H, 3) displacements, the heading integrated by the response itself.
