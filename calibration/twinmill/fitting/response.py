@@ -450,15 +450,23 @@ class Response:
         """At what rate errors of its gains, pushes along its axes or along the room's swing."""
         there = (self.ends[:, BEAT_HORIZONS] >= 0).all(axis=1)
         at = self.starts[there]
-        swings, done = [], [*self.pose[at, :2].T]
-        for horizon in BEAT_HORIZONS:
-            errors, made = self._at_horizon(horizon, there)
-            swings += _swings(errors, made, self.heading_rad[at])
-            done += [*made, *np.abs(made)]
+        errors, made = zip(*(self._at_horizon(h, there) for h in BEAT_HORIZONS), strict=True)
+        swings = [
+            swing
+            for own, ways in zip(errors, made, strict=True)
+            for swing in _swings(own, ways, self.heading_rad[at])
+        ]
+        self.beat_radps = beat_radps(self.data.start_s[there], swings, self._done(at, made))
+
+    def _done(self, at: np.ndarray, made: Sequence[np.ndarray]) -> Iterator[np.ndarray]:
+        """(W,) each: what the robot did, from points (W,) on, with displacements (3, W) made."""
+        yield from self.pose[at, :2].T
+        for ways in made:
+            yield from (*ways, *np.abs(ways))
         moved = self.moved
-        done += [wave for w in self.wheels for wave in w.waves(moved)[at].T]
-        done += [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
-        self.beat_radps = beat_radps(self.data.start_s[there], swings, done)
+        for wheel in self.wheels:
+            yield from wheel.waves(moved)[at].T
+        yield from (f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4))
 
     def _at_horizon(self, horizon: int, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(3, W) errors over their size, and displacements that were predicted, of some windows."""
