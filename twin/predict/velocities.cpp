@@ -49,6 +49,17 @@ std::vector<size_t> Needed(const Track &track, const std::vector<size_t> &usable
     return found;
 }
 
+// What was measured at some poses, as the robot's own.
+std::vector<Sample> MeasuredAt(const DriveChain &chain, const Track &track,
+                               const std::vector<size_t> &poses)
+{
+    std::vector<Sample> measured;
+    measured.reserve(poses.size());
+    for (const size_t k : poses)
+        measured.push_back(Measured(chain, track, k));
+    return measured;
+}
+
 // Directions of the headings at some poses of a track. What models observe turns few headings, so
 // that one cosine and sine serve all models.
 class Headings
@@ -99,15 +110,19 @@ std::vector<double> PredictVelocities(const std::vector<Model> &models, const Tr
     const std::vector<size_t> before = BeforeEach(track, usable);
     const Headings headings(track, usable);
     std::vector<double> velocities(3 * models.size() * poses.size(), 0.0);
+    if (models.empty())
+        return velocities;
+    const auto first = std::make_shared<const DriveChain>(models[0]);
+    const std::vector<Sample> usual = MeasuredAt(*first, track, usable);
     Recordings own;
     Recordings &recordings = track.recordings ? *track.recordings : own;
     const auto predict = [&](size_t b) {
-        const auto robot = std::make_shared<const DriveChain>(models[b]);
+        const auto robot = b == 0 ? first : std::make_shared<const DriveChain>(models[b]);
         const DriveChain &chain = *robot;
-        std::vector<Sample> measured;
-        measured.reserve(usable.size());
-        for (const size_t k : usable)
-            measured.push_back(Measured(chain, track, k));
+        std::vector<Sample> other;
+        if (!chain.IsSeenAs(*first))
+            other = MeasuredAt(chain, track, usable);
+        const std::vector<Sample> &measured = other.empty() ? usual : other;
         const auto plan = PlanOf(track, chain, measured, nullptr, recordings);
         const auto recording = RecordingOf(robot, plan, b == 0, recordings);
         RobotState state = chain.Start({});
@@ -135,8 +150,6 @@ std::vector<double> PredictVelocities(const std::vector<Model> &models, const Tr
                           &velocities[3 * (b * poses.size() + i)]);
         }
     };
-    if (models.empty())
-        return velocities;
     predict(0);
     InParallel(models.size() - 1, [&](size_t b) { predict(b + 1); });
     return velocities;

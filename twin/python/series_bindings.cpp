@@ -62,23 +62,35 @@ public:
             const size_t width = gains.shape(1), count = signals.shape(1);
             const double *gain = gains.data() + first * width;
             const double *signal = signals.data() + first * count;
-            double *row = out;
-            for (size_t n = first; n < last; ++n, gain += width, signal += count, row += apart)
-                for (size_t k = 0; k < count; ++k)
-                    Times(gain, width, signal[k], row + k * width);
+            if (width == 2)  // as most are: a cosine and a sine
+                WriteRows<2>(gain, signal, width, count, last - first, apart, out);
+            else
+                WriteRows<0>(gain, signal, width, count, last - first, apart, out);
             out += width * count;
         }
     }
 
 private:
-    // Two at a time: most gains are pairs, a cosine and a sine.
+    // Gains of a width that is known before, or 0.
+    template <size_t kWidth>
+    static void WriteRows(const double *gain, const double *signal, size_t width, size_t count,
+                          size_t rows, size_t apart, double *out)
+    {
+        if constexpr (kWidth > 0)
+            width = kWidth;
+        for (size_t n = 0; n < rows; ++n, gain += width, signal += count, out += apart)
+            for (size_t k = 0; k < count; ++k)
+                Times(gain, width, signal[k], out + k * width);
+    }
+
+    // Two at a time.
     static void Times(const double *gain, size_t width, double signal, double *out)
     {
         size_t f = 0;
         for (; f + 2 <= width; f += 2)
         {
-            out[f] = gain[f] * signal;
-            out[f + 1] = gain[f + 1] * signal;
+            const double pair[2] = {gain[f] * signal, gain[f + 1] * signal};
+            std::copy_n(pair, 2, out + f);
         }
         if (f < width)
             out[f] = gain[f] * signal;
@@ -87,6 +99,70 @@ private:
     const std::vector<Product> &products_;
     size_t width_ = 0;
 };
+
+// Adds steps (N, ways) times rows (N, F), for a few of the columns, which stay in registers, to
+// sums (ways, F) `from`, and writes these sums.
+template <size_t kWays, size_t kFew>
+void AddFew(const double *steps, const double *rows, size_t count, size_t width, const double *from,
+            double *to)
+{
+    double sums[kWays][kFew];
+    for (size_t k = 0; k < kWays; ++k)
+        std::copy_n(from + k * width, kFew, sums[k]);
+    for (size_t n = 0; n < count; ++n, steps += kWays, rows += width)
+        for (size_t k = 0; k < kWays; ++k)
+            for (size_t f = 0; f < kFew; ++f)
+                sums[k][f] += steps[k] * rows[f];
+    for (size_t k = 0; k < kWays; ++k)
+        std::copy_n(sums[k], kFew, to + k * width);
+}
+
+// The same for all columns.
+template <size_t kWays>
+void Add(const double *steps, const double *rows, size_t count, size_t width, const double *from,
+         double *to)
+{
+    constexpr size_t kFew = 4;
+    size_t f = 0;
+    for (; f + kFew <= width; f += kFew)
+        AddFew<kWays, kFew>(steps, rows + f, count, width, from + f, to + f);
+    for (; f < width; ++f)
+        AddFew<kWays, 1>(steps, rows + f, count, width, from + f, to + f);
+}
+
+// Sums (ways, F) of columns times steps (N, ways) up to each row that has a place, which becomes
+// where they are.
+template <size_t kWays>
+std::unique_ptr<double[]> SumUpTo(std::vector<size_t> &place, const double *steps,
+                                  const Columns &before, const Columns &beside)
+{
+    const size_t width = before.Width() + beside.Width(), apart = kWays * width;
+    const auto places = static_cast<size_t>(std::ranges::count(place, 0U));
+    auto kept = std::make_unique_for_overwrite<double[]>((places + 2) * apart);
+    std::vector<double> rows(kRows * width);
+    const double *from = kept.get();
+    double *to = std::fill_n(kept.get(), apart, 0.0);
+    for (size_t first = 0; first < place.size(); first += kRows)
+    {
+        const size_t last = std::min(first + kRows, place.size());
+        before.Write(first, last, width, rows.data());
+        beside.Write(first, last, width, rows.data() + before.Width());
+        for (size_t n = first; n < last;)
+        {
+            const size_t begin = n;
+            while (n < last && place[n++] == kNoPlace)
+                ;
+            Add<kWays>(steps + kWays * begin, rows.data() + (begin - first) * width, n - begin,
+                       width, from, to);
+            from = to;
+            if (place[n - 1] == kNoPlace)
+                continue;
+            place[n - 1] = static_cast<size_t>(to - kept.get());
+            to += apart;
+        }
+    }
+    return kept;
+}
 
 // Writes what lies between two sums of a count of values, of each along both axes of the plane,
 // the second axis' so many places behind: along a direction.
@@ -110,34 +186,13 @@ Array LedBetween(const std::vector<Product> &forward, const std::vector<Product>
     const Columns before(forward, count), beside(left, count);
     const size_t ahead = before.Width(), aside = beside.Width(), width = ahead + aside;
     std::vector<size_t> place = Wanted(count, {Span(starts), Span(ends)});
-    std::vector<double> some(kRows * width), sums(ways * width), kept;
-    kept.reserve(sums.size() * static_cast<size_t>(std::ranges::count(place, 0U)));
-    for (size_t n = 0; n < count; ++n)
-    {
-        if (n % kRows == 0)
-        {
-            const size_t last = std::min(n + kRows, count);
-            before.Write(n, last, width, some.data());
-            beside.Write(n, last, width, some.data() + ahead);
-        }
-        const double *row = some.data() + n % kRows * width;
-        for (size_t k = 0; k < ways; ++k)
-        {
-            const double step = steps.data()[ways * n + k];
-            double *sum = sums.data() + k * width;
-            for (size_t f = 0; f < width; ++f)
-                sum[f] += step * row[f];
-        }
-        if (place[n] == kNoPlace)
-            continue;
-        place[n] = kept.size();
-        kept.insert(kept.end(), sums.begin(), sums.end());
-    }
+    const auto kept = ways == 2 ? SumUpTo<2>(place, steps.data(), before, beside)
+                                : SumUpTo<1>(place, steps.data(), before, beside);
     auto led = std::make_unique_for_overwrite<double[]>(rows * width);
     for (size_t r = 0; r < rows; ++r)
     {
-        const double *from = kept.data() + place[static_cast<size_t>(starts.data()[r])];
-        const double *to = kept.data() + place[static_cast<size_t>(ends.data()[r])];
+        const double *from = kept.get() + place[static_cast<size_t>(starts.data()[r])];
+        const double *to = kept.get() + place[static_cast<size_t>(ends.data()[r])];
         const double *along = direction.data() + ways * r;
         double *out = led.get() + r * width;
         if (ways == 2)
@@ -554,21 +609,45 @@ Array Swung(Vector pushes, Vector step_s, Matrix turned, double rate, double dam
     return ToNumpy(std::move(out), {2, pushes.size()});
 }
 
+constexpr size_t kTogether = 4;  // rows, that another row is loaded and stored for once
+
+// Takes shares of a few rows (width apart) out of columns [begin, end) of another one.
+template <size_t kFew>
+void TakeOut(const double *share, const double *rows, size_t width, size_t begin, size_t end,
+             double *row)
+{
+    for (size_t k = begin; k < end; ++k)
+    {
+        double left = row[k];
+        for (size_t p = 0; p < kFew; ++p)
+            left -= share[p] * rows[p * width + k];
+        row[k] = left;
+    }
+}
+
+// Takes the unknowns of a few rows from `first` on, which are done, out of row i.
+template <size_t kFew>
+void TakeUnknownsOut(double *rows, size_t width, size_t first, size_t i)
+{
+    const double *done = rows + first * width;
+    double share[kFew];
+    for (size_t p = 0; p < kFew; ++p)
+        share[p] = done[p * width + i] / done[p * width + first + p];
+    TakeOut<kFew>(share, done, width, i, width, rows + i * width);
+}
+
 // Solves the count equations in rows of count + 1, the last of each the right side: of a definite
 // matrix, whose upper half alone is looked at.
 void Eliminate(std::span<double> rows, size_t count, double *solution)
 {
     const size_t width = count + 1;
-    for (size_t j = 0; j < count; ++j)
+    for (size_t i = 1; i < count; ++i)
     {
-        const double *pivot = rows.data() + j * width;
-        for (size_t i = j + 1; i < count; ++i)
-        {
-            const double share = pivot[i] / pivot[j];
-            double *row = rows.data() + i * width;
-            for (size_t k = i; k < width; ++k)
-                row[k] -= share * pivot[k];
-        }
+        size_t first = 0;
+        for (; first + kTogether <= i; first += kTogether)
+            TakeUnknownsOut<kTogether>(rows.data(), width, first, i);
+        for (; first < i; ++first)
+            TakeUnknownsOut<1>(rows.data(), width, first, i);
     }
     for (size_t j = count; j-- > 0;)
     {
@@ -604,6 +683,31 @@ Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
     return ToNumpy(std::move(solved), {matrices, trials, count});
 }
 
+// Row by row of the identity what lies below the diagonal is taken out.
+Array LowerInverse(Cube lower)
+{
+    const size_t matrices = lower.shape(0), count = lower.shape(1);
+    if (lower.shape(2) != count)
+        throw std::invalid_argument("matrices must be square");
+    std::vector<double> inverse(matrices * count * count);
+    for (size_t m = 0; m < matrices; ++m)
+        for (size_t i = 0; i < count; ++i)
+        {
+            const double *own = lower.data() + (m * count + i) * count;
+            double *rows = inverse.data() + m * count * count, *row = rows + i * count;
+            row[i] = 1;
+            size_t first = 0;
+            for (; first + kTogether <= i; first += kTogether)
+                TakeOut<kTogether>(own + first, rows + first * count, count, 0, first + kTogether,
+                                   row);
+            for (; first < i; ++first)
+                TakeOut<1>(own + first, rows + first * count, count, 0, first + 1, row);
+            for (size_t k = 0; k <= i; ++k)
+                row[k] /= own[i];
+        }
+    return ToNumpy(std::move(inverse), {matrices, count, count});
+}
+
 }  // namespace
 
 void BindSeries(nb::module_ &m)
@@ -637,6 +741,9 @@ void BindSeries(nb::module_ &m)
     m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
           "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
           "its diagonal and definite then, for right sides (M, F).");
+    m.def("lower_inverse", &LowerInverse, "lower"_a,
+          "(M, F, F) inverses of lower triangular matrices, of which no more than that half is "
+          "looked at.");
     m.def("swing_of", &SwingOf, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) cosine, and sine over the rate, of what swings and fades over each step.");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "turned"_a, "rate"_a, "damping"_a,

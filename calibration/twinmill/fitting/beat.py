@@ -5,7 +5,7 @@ A line in the spectrum of a log's errors stands far above its neighbours, and no
 did has one there: neither its motion nor its heading, its place, or the angles of its wheels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -23,13 +23,13 @@ IN_THE_DRIVE = 6.0  # the same of what the robot did ...
 FAR_BEYOND_THE_DRIVE = 10.0  # ... unless the errors' line is so many times as far above its noise
 
 
-def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.ndarray]) -> float:
+def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Iterable[np.ndarray]) -> float:
     """Rate at which errors swing and nothing that the robot did does, rad/s; 0 if there is none.
 
     Args:
         t_s: (W,) of windows, in order.
         errors: (W,) of each channel that may swing.
-        done: (W,) of each thing that the robot did.
+        done: (W,) of each thing that the robot did; made only if they are looked at.
     """
     bins = np.rint((t_s - t_s[0]) / BIN_S).astype(int)
     lines = PADDED * (bins[-1] + 1)
@@ -46,7 +46,7 @@ def beat_radps(t_s: np.ndarray, errors: Sequence[np.ndarray], done: Sequence[np.
     return float(2 * np.pi * rate_hz[best]) if power[best] > BEYOND_CHANCE else 0.0
 
 
-def _highest(bins: np.ndarray, signals: Sequence[np.ndarray], count: int) -> np.ndarray:
+def _highest(bins: np.ndarray, signals: Iterable[np.ndarray], count: int) -> np.ndarray:
     """(K,) highest power over noise that one of some signals has in each of the first K lines.
 
     The noise is the mean around each line.

@@ -24,7 +24,7 @@ class Parts:
     """Which of R rows lie in each of K parts, and which touch it from another.
 
     Rows that are inside one part and touch the same others are a cell: what is summed over the rows
-    of each cell gives the sums over all rows inside a part, and over all that touch it.
+    of each cell gives the sums over all rows inside a part, and over all that do not touch it.
 
     Attributes:
         inside: (R,) part of each row.
@@ -61,18 +61,19 @@ class Parts:
 
     @cached_property
     def _owners(self) -> np.ndarray:
-        """(2 K, S): 1 where a cell is inside a part, and where it touches one or is inside it."""
+        """(2 K, S): 1 where a cell is inside a part, and where it neither is nor touches it."""
         first = np.array([cell.start for cell in self.cells])
         own = [of[first] == np.arange(self.count)[:, None] for of in self._names]
-        return np.vstack([own[0], own[0] | own[1] | own[2]]).astype(float)
+        return np.vstack([own[0], ~(own[0] | own[1] | own[2])]).astype(float)
 
     @property
     def _names(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return self.inside, self.ends, self.begins
 
     def summed(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(K, ...) of (S, ...) sums over cells: inside each part, and of all that touch it."""
-        both = np.tensordot(self._owners, cells, 1)
+        """(K, ...) of (S, ...) sums over cells: inside each part, and of all apart from it."""
+        flat = self._owners @ cells.reshape(len(cells), -1)
+        both = flat.reshape(-1, *cells.shape[1:])
         return both[: self.count], both[self.count :]
 
 
@@ -93,16 +94,22 @@ class _Alike:
     Args:
         numbers: (L,) of the groups.
         columns: (L, F) of each among all features.
-        inside, touching: (L, K, F, F) products of the rows inside each part, and touching it.
+        inside, others: (K, L, F, F) products of the rows inside each part, and of those that do not
+            touch it.
     """
 
     def __init__(
-        self, numbers: np.ndarray, columns: np.ndarray, inside: np.ndarray, touching: np.ndarray
+        self, numbers: np.ndarray, columns: np.ndarray, inside: np.ndarray, others: np.ndarray
     ) -> None:
-        self.numbers, self.columns, self.inside = numbers, columns, inside
-        total = inside.sum(axis=1)
-        self.mean = np.maximum(np.trace(total, axis1=1, axis2=2) / columns.shape[1], 1e-30)
-        self.others = total[:, None] - touching
+        self.numbers, self.columns, self.inside, self.others = numbers, columns, inside, others
+        self.mean = np.maximum(np.einsum("klff->l", inside) / columns.shape[1], 1e-30)
+
+    @classmethod
+    def joined(cls, some: Sequence[tuple[np.ndarray, ...]]) -> "_Alike":
+        """Of what each batch of features has of them."""
+        numbers, columns, *products = zip(*some, strict=True)
+        products = (np.concatenate(own, axis=1) for own in products)
+        return cls(np.concatenate(numbers), np.concatenate(columns), *products)
 
     def gains(self, push: np.ndarray, pull: np.ndarray) -> np.ndarray:
         """(L, ridges) by how much each lowers the squared error on left-out parts.
@@ -111,24 +118,26 @@ class _Alike:
             push: (K, all features) moments of the rows inside each part.
             pull: of those that do not touch it.
         """
-        push, pull = (self._own(m) for m in (push, pull))
-        each = zip(self.others, self.mean, pull, strict=True)
-        beta = np.array([at_ridges(gram, mean * LADDER, own) for gram, mean, own in each])
-        return np.einsum("lkrf,lkrf->lr", beta, 2 * push[:, :, None] - beta @ self.inside)
+        beta = at_ridges(self.others, self.mean[:, None] * LADDER, pull[:, self.columns])
+        left = 2 * push[:, self.columns][:, :, None] - beta @ self.inside
+        return np.einsum("klrf,klrf->lr", beta, left)
 
     def fitted(self, k: int, pull: np.ndarray, ridge: float) -> np.ndarray:
         """(K, F) coefficients of the k-th without each part."""
-        return at_ridges(self.others[k], self.mean[k] * np.array([ridge]), self._own(pull)[k])[:, 0]
-
-    def _own(self, moments: np.ndarray) -> np.ndarray:
-        """(L, K, F) of (K, all features)."""
-        return moments[:, self.columns].swapaxes(0, 1)
+        rise = self.mean[k] * np.array([ridge])
+        return at_ridges(self.others[:, k], rise, pull[:, self.columns[k]])[:, 0]
 
 
 def at_ridges(grams: np.ndarray, ridges: np.ndarray, moments: np.ndarray) -> np.ndarray:
-    """(K, V, F) coefficients by (K, F, F) products and (K, F) moments, at each of V ridges."""
-    rises = np.repeat(ridges[None], len(grams), axis=0)
-    return native.solved_risen(np.ascontiguousarray(grams), rises, np.ascontiguousarray(moments))
+    """(..., V, F) coefficients by (..., F, F) products, (..., F) moments, at ridges (..., V)."""
+    *each, count = moments.shape
+    rises = np.broadcast_to(ridges, (*each, ridges.shape[-1])).reshape(-1, ridges.shape[-1])
+    found = native.solved_risen(
+        np.ascontiguousarray(grams).reshape(-1, count, count),
+        np.ascontiguousarray(rises),
+        np.ascontiguousarray(moments).reshape(-1, count),
+    )
+    return found.reshape(*each, -1, count)
 
 
 class Learners:
@@ -149,13 +158,15 @@ class Learners:
         first = 0
         for x, groups in batches:
             grams = parts.summed(squares(x, parts.cells))
-            for own in groups:
-                products = [gram[:, own[:, None], own] for gram in grams]
-                found.setdefault(len(own), []).append((len(self), first + own, *products))
-                self._places.append((len(self._rows), own))
+            for width in dict.fromkeys(map(len, groups)):
+                alike = np.flatnonzero([len(own) == width for own in groups])
+                own = np.array([groups[k] for k in alike])
+                products = (gram[:, own[:, :, None], own[:, None]] for gram in grams)
+                found.setdefault(width, []).append((len(self) + alike, first + own, *products))
+            self._places += [(len(self._rows), own) for own in groups]
             self._rows.append(x.astype(np.float32))
             first += x.shape[1]
-        self._alike = [_Alike(*map(np.array, zip(*own, strict=True))) for own in found.values()]
+        self._alike = [_Alike.joined(some) for some in found.values()]
 
     def __len__(self) -> int:
         return len(self._places)
@@ -187,9 +198,7 @@ class Learners:
     def _moments(self, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(K, all features) of the rows of each part, and of those that do not touch it."""
         batches = [[wanted[k] @ x[k] for k in self.parts.cells] for x in self._rows]
-        cells = np.concatenate(batches, axis=1, dtype=float)
-        inside, touching = self.parts.summed(cells)
-        return inside, inside.sum(axis=0) - touching
+        return self.parts.summed(np.concatenate(batches, axis=1, dtype=float))
 
 
 def boosted(

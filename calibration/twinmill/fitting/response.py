@@ -46,7 +46,7 @@ GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
-WORTH_HALVING = 16  # features in half of a matrix
+WORTH_HALVING = 48  # features in half of a matrix
 WIDE = 32  # features whose rows are made at once
 AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
@@ -97,17 +97,17 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Equations:
-    """Normal equations of all rows, and of the rows that touch each of K parts or lie inside it.
+    """Normal equations of all rows, and of the rows inside each of K parts or apart from it.
 
     Attributes:
         gram, moment: (F, F) and (F,) of all.
-        touching, inside: (K, F, F) and (K, F) of each part.
+        others, inside: (K, F, F) and (K, F) of rows that do not touch each part, and inside it.
         square: of the wanted values of all.
     """
 
     gram: np.ndarray
     moment: np.ndarray
-    touching: tuple[np.ndarray, np.ndarray]
+    others: tuple[np.ndarray, np.ndarray]
     inside: tuple[np.ndarray, np.ndarray]
     square: float
 
@@ -117,9 +117,9 @@ class Equations:
         cells = rows.parts.cells
         moments = np.array([rows.wanted[k] @ x[k] for k in cells])
         sums = (rows.parts.summed(m) for m in (squares(x, cells), moments))
-        inside, touching = zip(*sums, strict=True)
+        inside, others = zip(*sums, strict=True)
         square = float(rows.wanted @ rows.wanted)
-        return cls(*(m.sum(axis=0) for m in inside), touching, inside, square)
+        return cls(*(m.sum(axis=0) for m in inside), others, inside, square)
 
 
 class Response:
@@ -383,12 +383,16 @@ class Response:
         def factors(of: np.ndarray | Product) -> tuple[np.ndarray, np.ndarray]:
             return (of.gains, of.signals) if isinstance(of, Product) else (of, alone)
 
-        columns, steps = [[factors(f[axis]) for f in features] for axis in AXES[part]], alone
-        if part == 0:
-            steps = np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+        columns = [[factors(f[axis]) for f in features] for axis in AXES[part]]
         forward, left = columns if part == 0 else (*columns, [])
-        steps = steps * self.step_s[:, None]
+        steps = self._steps[part]
         return native.led_between(forward, left, steps, rows.starts, rows.ends, rows.direction)
+
+    @cached_property
+    def _steps(self) -> tuple[np.ndarray, np.ndarray]:
+        """(N, 2) length of each step times the direction in which the robot heads; (N, 1) alone."""
+        ahead = np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
+        return ahead * self.step_s[:, None], self.step_s[:, None].copy()
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
         return np.floor(t_s / self.block_s).astype(int) % self.folds
@@ -451,15 +455,23 @@ class Response:
         """At what rate errors of its gains, pushes along its axes or along the room's swing."""
         there = (self.ends[:, BEAT_HORIZONS] >= 0).all(axis=1)
         at = self.starts[there]
-        swings, done = [], [*self.pose[at, :2].T]
-        for horizon in BEAT_HORIZONS:
-            errors, made = self._at_horizon(horizon, there)
-            swings += _swings(errors, made, self.heading_rad[at])
-            done += [*made, *np.abs(made)]
+        errors, made = zip(*(self._at_horizon(h, there) for h in BEAT_HORIZONS), strict=True)
+        swings = [
+            swing
+            for own, ways in zip(errors, made, strict=True)
+            for swing in _swings(own, ways, self.heading_rad[at])
+        ]
+        self.beat_radps = beat_radps(self.data.start_s[there], swings, self._done(at, made))
+
+    def _done(self, at: np.ndarray, made: Sequence[np.ndarray]) -> Iterator[np.ndarray]:
+        """(W,) each: what the robot did, from points (W,) on, with displacements (3, W) made."""
+        yield from self.pose[at, :2].T
+        for ways in made:
+            yield from (*ways, *np.abs(ways))
         moved = self.moved
-        done += [wave for w in self.wheels for wave in w.waves(moved)[at].T]
-        done += [f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4)]
-        self.beat_radps = beat_radps(self.data.start_s[there], swings, done)
+        for wheel in self.wheels:
+            yield from wheel.waves(moved)[at].T
+        yield from (f(n * self.heading_rad[at]) for f in (np.cos, np.sin) for n in (1, 2, 4))
 
     def _at_horizon(self, horizon: int, there: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(3, W) errors over their size, and displacements that were predicted, of some windows."""
@@ -548,7 +560,8 @@ class Response:
         each = [(axis, f[axis]) for axis in AXES[part] for f in self.features]
         edges = np.cumsum([f.shape[1] for _, f in each])
         for (axis, f), own in zip(each, np.split(coefficients, edges[:-1]), strict=True):
-            self.velocities[axis] += f @ own
+            if own.any():  # none of a group that is out
+                self.velocities[axis] += f @ own
 
     def predict(self, velocities: Sequence[np.ndarray], which: np.ndarray) -> np.ndarray:
         """(W, H, 3) displacements, the heading integrated by the response itself.
@@ -669,12 +682,7 @@ class _LeftOut:
 
     def __init__(self, equations: Equations, mean: np.ndarray, groups: np.ndarray) -> None:
         self.mean, self.groups = mean, groups
-        self.grams, self.moments = (
-            whole - part
-            for whole, part in zip(
-                (equations.gram, equations.moment), equations.touching, strict=True
-            )
-        )
+        self.grams, self.moments = equations.others
         self.inner, self.push = equations.inside
         self.square = equations.square
 
@@ -685,9 +693,9 @@ class _LeftOut:
         """
         self.ridge = ridge
         self.used = np.flatnonzero(ridge[self.groups] < OUT)
-        used = np.ix_(range(len(self.grams)), self.used, self.used)
-        rise = np.diag((self.mean * ridge[self.groups])[self.used])
-        self.inverse = _inverse(self.grams[used] + rise)
+        grams = self.grams[:, self.used[:, None], self.used]
+        np.einsum("kuu->ku", grams)[:] += (self.mean * ridge[self.groups])[self.used]
+        self.inverse = _inverse(grams)
         return self._fitted()
 
     def moved(self, group: int, value: float) -> float:
@@ -761,7 +769,7 @@ def _lower_inverse(lower: np.ndarray) -> np.ndarray:
     """(K, F, F) of triangular matrices, by halves."""
     half = lower.shape[1] // 2
     if half < WORTH_HALVING:
-        return np.linalg.inv(lower)
+        return native.lower_inverse(np.ascontiguousarray(lower))
     found = np.zeros_like(lower)
     found[:, :half, :half] = first = _lower_inverse(lower[:, :half, :half])
     found[:, half:, half:] = last = _lower_inverse(lower[:, half:, half:])

@@ -155,15 +155,15 @@ def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None
 
     Of the shortest stretches all are taken where it never moves for so long.
     """
-    everywhere = [
-        at
-        for part in grid.slices
-        for at in range(part.start + TRANSIENT, part.stop - chunk, chunk // 2)
+    each = [
+        np.arange(part.start + TRANSIENT, part.stop - chunk, chunk // 2) for part in grid.slices
     ]
-    starts = [at for at in everywhere if moving[at : at + chunk].mean() > 0.9]
+    everywhere = np.concatenate([np.zeros(0, int), *each])
+    moved = np.concatenate([[0], np.cumsum(moving)])  # steps so far
+    starts = everywhere[moved[everywhere + chunk] - moved[everywhere] > 0.9 * chunk]
     if len(starts) < FEWEST_CHUNKS and chunk > CHUNK // 8:
         return None
-    return np.array(starts or everywhere, dtype=int)
+    return starts if len(starts) else everywhere
 
 
 @cache
@@ -172,14 +172,18 @@ def _bins(chunk: int) -> tuple[np.ndarray, np.ndarray]:
 
     Returns:
         (F, chunk) weights whose sums over a stretch are its spectrum: taper, wave, mean left out;
-        (F, N) what each bin takes in of N frequencies, FINER than the bins.
+        (F, N) what each bin takes in of N frequencies from 0 up, of either sign, FINER than the
+        bins.
     """
     taper = np.hanning(chunk + 1)[:-1]
     wave = np.exp(-2j * np.pi * np.outer(np.arange(1, chunk // 2), np.arange(chunk)) / chunk)
     weights = taper * wave / np.sqrt(np.sum(taper**2))
     weights -= weights.mean(axis=1, keepdims=True)
-    count = FINER * chunk
-    return weights, np.abs(np.fft.fft(weights, count, axis=1)) ** 2 / count
+    half = FINER * chunk // 2
+    either = np.abs(np.fft.fft(weights, 2 * half, axis=1)) ** 2 / (2 * half)
+    taken = either[:, : half + 1].copy()
+    taken[:, 1:half] += either[:, :half:-1]
+    return weights, taken
 
 
 def _median_power(errors: np.ndarray, pieces: np.ndarray, bins: np.ndarray) -> np.ndarray:
@@ -203,7 +207,7 @@ def _fit_channel(
     Debiased as by Sykulski et al. 2019, Biometrika 106(2): a short stretch blurs the spectrum, and
     leaving out its mean takes part of the slow drive noise away.
     """
-    frequency_Hz = np.fft.fftfreq(taken.shape[1], period_s)
+    frequency_Hz = np.fft.rfftfreq(2 * (taken.shape[1] - 1), period_s)
     quiet = ChannelNoise(*least, LEAST_MEMORY_S)
     power = np.maximum(power, taken @ quiet.spectrum(frequency_Hz, period_s))
     sensor = np.sqrt(power[-len(power) // 4 :].mean() / 4)

@@ -54,7 +54,7 @@ def test_what_is_left_of_a_part_is_predicted_without_it():
     )
 
 
-def test_sums_over_cells_give_those_of_rows_that_touch_each_part():
+def test_sums_over_cells_give_those_of_rows_inside_each_part_and_apart_from_it():
     random = np.random.default_rng(3)
     count, rows = 5, 400
     inside = random.integers(0, count, rows)
@@ -64,9 +64,9 @@ def test_sums_over_cells_give_those_of_rows_that_touch_each_part():
     order = parts.order
     values = random.normal(size=rows)[order]
     parts = parts.at(order)
-    own, touching = parts.summed(np.array([values[cell].sum() for cell in parts.cells]))
+    own, others = parts.summed(np.array([values[cell].sum() for cell in parts.cells]))
     inside, ends, begins = inside[order], ends[order], begins[order]
     for k in range(count):
         touches = (inside == k) | (ends == k) | (begins == k)
         assert own[k] == pytest.approx(values[inside == k].sum())
-        assert touching[k] == pytest.approx(values[touches].sum())
+        assert others[k] == pytest.approx(values[~touches].sum())
