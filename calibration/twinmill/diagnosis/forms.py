@@ -559,7 +559,11 @@ def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
     """What comes and goes, begins, or is there for a while."""
     first, span = every["t"].min(), np.ptp(every["t"])
     count = int(min(2 * span / SHORTEST_S, MOST_WAVES))
-    found = [_wave("t", k, span) for k in range(1, count + 1)]
+    found = [
+        _swinging(to, "t", np.pi * k / span, 0.5 / k)
+        for to in ("motion", "travel", "omega_radps")
+        for k in range(1, count + 1)
+    ]
     at = [float(f"{first + span * k / MOMENTS:.4g}") for k in range(1, MOMENTS)]
     found += [Form("motion", (f"(t > {a:g})",), TIME) for a in at]
     found += [Form("motion", (f"(t > {a:g})*(t < {b:g})",), TIME) for a in at for b in at if a < b]

@@ -145,7 +145,7 @@ class Formula:
     @property
     def like(self) -> str:
         """Known physics that it looks like; empty if none."""
-        return resembles(self.forms, [n.value for n in self.numbers])
+        return resembles(self.forms, [n.value for n in self.numbers], self.holds)
 
     def to_json(self) -> dict:
         """Fields of the interface."""

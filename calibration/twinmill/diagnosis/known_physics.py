@@ -2,27 +2,38 @@
 """What known physics a formula looks like, by its shape and its sign; empty where neither says."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import pi
+from types import MappingProxyType
+
+import numpy as np
 
 from twinmill.diagnosis.forms import ROOM, STARTS, Form
+from twinmill.diagnosis.recurring import LONGEST
 from twinmill.diagnosis.term import WAY
 
 AXES = {"vx": "driving", "vy": "driving sideways", "omega": "turning"}
 CHANNEL_OF = {"vx_mps": "vx", "vy_mps": "vy", "omega_radps": "omega"}
 
 
-def resembles(forms: Sequence[Form], numbers: Sequence[float]) -> str:
+def resembles(
+    forms: Sequence[Form],
+    numbers: Sequence[float],
+    seen: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> str:
     """In words, of the first term that says something; empty if none does.
 
     Args:
         forms: terms of a formula.
         numbers: theirs, in order.
+        seen: least and most of names of the motion in the logs, where known.
     """
     first = 0
     for form in forms:
         own = numbers[first : first + len(form.shapes)]
         first += len(form.shapes)
+        if slow := _of_few_periods(form, seen):
+            return slow
         for looks in LOOKS:
             if words := looks(form, own):
                 return words
@@ -114,11 +125,26 @@ def _of_past(form: Form, own: Sequence[float]) -> str:
     return f"way of {AXES[axis]} is stored over {reach} after a reversal: like play or soft tyres"
 
 
-def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
+def _of_few_periods(form: Form, seen: Mapping[str, tuple[float, float]]) -> str:
+    """What does not come again often enough in the logs to say that it comes again at all."""
+    name = _wave_of(form)
+    if name not in seen or form.constant * np.ptp(seen[name]) * LONGEST > 2 * pi:
+        return ""
+    if name == "t":
+        return "changes slowly over the run: like a battery, heat or a load that shifts"
+    return f"changes along {name}: like a floor that is not the same everywhere"
+
+
+def _wave_of(form: Form) -> str:
+    """The name of the motion along which it is a wave; empty if it is none."""
     wave = form.constant and form.shapes[0].startswith("cos(")
-    if form.group == "place" and wave:
+    return form.shapes[0].split("*")[-1].rstrip(")") if wave else ""
+
+
+def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
+    name = _wave_of(form)
+    if form.group == "place" and name:
         length_m = 2 * pi / form.constant
-        name = form.shapes[0].split("*")[-1].rstrip(")")
         return f"comes again every {length_m:.2f} m along {name}: like tiles, planks or seams"
     if form.adds_to == "theta_rad":
         return "the captured heading is off by the heading: like a compass or a tag seen aslant"
@@ -130,7 +156,7 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
         return "more in one direction of the room, less in the other: like wind, pile or a slope"
     if form.adds_to == "aside":
         return "led aside by the direction in which it drives: like grooves, joints or pile"
-    if form.group == "time" and (wave or "sin(" in form.shapes[0]):
+    if form.group == "time" and (name or "sin(" in form.shapes[0]):
         rate = form.constant or float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
         return f"comes and goes every {2 * pi / rate:.3g} s: like a load that is switched"
     if form.group == "time" and "<" in form.shapes[0]:
