@@ -5,7 +5,7 @@ An effect that is named surely and is not there sends its user the wrong way, so
 with the finding.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -530,10 +530,26 @@ def _leaves_what_depends_on_speed(
     finding: Finding, found: Sequence[Finding], rest: Rest
 ) -> Finding | None:
     """A weak wheel loses a share at all speeds: one that rubs leaves what depends on them."""
-    on = [g for g in rest.depends_on if g in STEADY and not rest.likely]
-    if finding.effect != "wheel_gain" or not on or rest.share <= SETTINGS.wheel_leaves:
+    on = _left_on(rest, STEADY)
+    if finding.effect != "wheel_gain" or not on:
         return None
-    return doubted(finding, f"what is left depends on {on[0]}, as where a wheel rubs or slips")
+    return doubted(finding, f"what is left depends on {on}, as where a wheel rubs or slips")
+
+
+def _leaves_what_couples_the_axes(
+    finding: Finding, found: Sequence[Finding], rest: Rest
+) -> Finding | None:
+    """A marker aside is led round alike in all turns: where a wheel slips in some it is not."""
+    on = _left_on(rest, (COUPLING,))
+    if finding.effect != "marker_offset" or not on:
+        return None
+    return doubted(finding, f"what is left depends on {on}, as where a wheel slips in turns")
+
+
+def _left_on(rest: Rest, groups: Collection[str]) -> str:
+    """The first of some groups on which more than little of what is left depends for sure."""
+    on = [g for g in rest.depends_on if g in groups and not rest.likely]
+    return on[0] if on and rest.share > SETTINGS.wheel_leaves else ""
 
 
 def _comes_and_goes(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
@@ -641,6 +657,7 @@ FORM_RULES = (
     _heading_is_late,
     _is_of_an_uneven_wheel,
     _leaves_what_depends_on_speed,
+    _leaves_what_couples_the_axes,
     _comes_and_goes,
     _is_no_loss,
     _is_of_a_place_that_changes,

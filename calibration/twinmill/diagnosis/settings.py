@@ -83,7 +83,9 @@ class Settings(Numbers):
     slight: float = number(0.3, "share of what is left that a second finding must take")
     much_left: float = number(0.3, "share left, beyond which no name is sure")
     lag_leaves: float = number(0.12, "share left, beyond which no lag is sure")
-    wheel_leaves: float = number(0.05, "the same of a weak wheel, if it depends on speeds")
+    wheel_leaves: float = number(
+        0.05, "the same of a weak wheel or a marker aside, if it depends on what these cannot do"
+    )
     no_right_model: float = number(1.15, "score beyond which no name is sure ...")
     left_by_right: float = number(0.04, "... if so large a share is left that depends on nothing")
     form_takes: float = number(0.15, "share of what is left, by which a finding has another form")

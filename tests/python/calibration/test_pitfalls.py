@@ -961,14 +961,22 @@ def test_a_rest_that_hardly_depends_on_what_an_effect_acts_by_leaves_it_its_form
 
 
 @pytest.mark.parametrize(
-    ("left", "on", "certainty"),
-    [(0.1, "speed", "doubtful"), (0.03, "speed", "sure"), (0.1, "heading", "sure")],
+    ("name", "left", "on", "certainty"),
+    [
+        ("wheel_gain", 0.1, "speed", "doubtful"),
+        ("wheel_gain", 0.03, "speed", "sure"),
+        ("wheel_gain", 0.1, "heading", "sure"),
+        ("marker_offset", 0.1, "coupling of the axes", "doubtful"),
+        ("marker_offset", 0.1, "speed", "sure"),
+    ],
 )
-def test_a_weak_wheel_that_leaves_what_depends_on_speed_may_rub(left, on, certainty):
-    """A bearing takes the same speed at all speeds; a weak wheel is weak by a share."""
-    (judged,) = of_another_form(
-        [Finding("wheel_gain", None, [], 0.9, "sure")], Rest(left, True, [on])
-    )
+def test_what_an_effect_cannot_do_is_not_left_beside_it_for_sure(name, left, on, certainty):
+    """A bearing takes the same speed at all speeds; a weak wheel is weak by a share.
+
+    A marker aside of the centre is led round by the same way in each turn, however the robot
+    drives; one wheel that slips in turns moves the point about which it turns.
+    """
+    (judged,) = of_another_form([Finding(name, None, [], 0.9, "sure")], Rest(left, True, [on]))
     assert judged.certainty == certainty
 
 
