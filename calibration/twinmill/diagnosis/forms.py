@@ -520,7 +520,7 @@ def own_forms(
     return [
         *_of_room(every, sideways),
         *_of_time(every),
-        *(_swinging(to, "t", beat_radps, SHARP) for to in ("motion", "travel") if beat_radps),
+        *(_swinging(to, "t", beat_radps, SHARP) for to in (*ALL_AXES, *CHANNELS) if beat_radps),
         *_of_load(),
         *_of_speed(),
         *_around_a_speed(every),
@@ -561,7 +561,7 @@ def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
     count = int(min(2 * span / SHORTEST_S, MOST_WAVES))
     found = [
         _swinging(to, "t", np.pi * k / span, 0.5 / k)
-        for to in ("motion", "travel", "omega_radps")
+        for to in (*ALL_AXES, "omega_radps")
         for k in range(1, count + 1)
     ]
     at = [float(f"{first + span * k / MOMENTS:.4g}") for k in range(1, MOMENTS)]

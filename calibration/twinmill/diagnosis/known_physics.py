@@ -156,8 +156,11 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
         return "more in one direction of the room, less in the other: like wind, pile or a slope"
     if form.adds_to == "aside":
         return "led aside by the direction in which it drives: like grooves, joints or pile"
-    if form.group == "time" and (name or "sin(" in form.shapes[0]):
-        rate = form.constant or float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
+    if name == "t":
+        every_s = 2 * pi / form.constant
+        return f"swings every {every_s:.3g} s: like a regulator that hunts, or a part that turns"
+    if form.group == "time" and "sin(" in form.shapes[0]:
+        rate = float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
         return f"comes and goes every {2 * pi / rate:.3g} s: like a load that is switched"
     if form.group == "time" and "<" in form.shapes[0]:
         return "there for a while: like something that was held, hung on or carried"

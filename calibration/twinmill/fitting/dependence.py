@@ -255,7 +255,14 @@ def beat(motion: Motion, rate_radps: float) -> Iterator[Group]:
     if rate_radps:
         angle = rate_radps * motion.t_s[:, None]
         wave = np.hstack([np.cos(angle), np.sin(angle)])
-        yield from ([features] for features in (_scaled(motion, wave), *_drifts(motion, wave)))
+        swinging = (_scaled(motion, wave), *_drifts(motion, wave), _along_the_body(motion, wave))
+        yield from ([features] for features in swinging)
+
+
+def _along_the_body(motion: Motion, gain: np.ndarray) -> Features:
+    """Pushes ahead and aside while the robot moves, times (N, k) gains."""
+    push = motion.moves[:, None] * gain
+    return push, push, np.zeros((len(gain), 0))
 
 
 def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:

@@ -59,6 +59,45 @@ def test_a_fan_that_swings_slowly_is_told(tanh_robot, measure, one_clock_base):
     assert found.verdict == "outside_catalogue" and found.rest.depends_on[0] == "time"
 
 
+def test_a_push_aside_that_swings_is_told_in_full(tanh_robot, measure, one_clock_base):
+    """The body is pushed to its left and right by 30 mm/s while it moves, every 2.7 s."""
+    rate_radps = 2 * np.pi / 2.7
+
+    class Pushed(tanh_robot):
+        def hindered(self, motion):
+            swing = 0.03 * np.sin(rate_radps * np.arange(len(motion)) * STEP_S)
+            moves = np.abs(motion).max(axis=1) > 0.01
+            return motion + np.outer(swing * moves, [0.0, 1.0, 0.0])
+
+    found = diagnose([measure(Pushed(), 54, 80.0)], one_clock_base)
+    assert found.verdict == "outside_catalogue" and found.rest.depends_on[0] == "time"
+    assert _wave(found, "vy_mps") == pytest.approx((0.03, rate_radps), rel=0.1)
+
+
+def test_way_that_swings_slowly_while_turns_do_not_is_told_in_full(
+    tanh_robot, measure, one_clock_base
+):
+    """It drives quicker and slower by 12 % every 25 s, as on a battery of its own for turns."""
+    rate_radps = 2 * np.pi / 25
+
+    class Swelling(tanh_robot):
+        def hindered(self, motion):
+            swing = 0.12 * np.sin(rate_radps * np.arange(len(motion)) * STEP_S)
+            return motion * (1 + np.outer(swing, [1.0, 1.0, 0.0]))
+
+    found = diagnose([measure(Swelling(), 55, 90.0)], one_clock_base)
+    assert found.rest.depends_on[0] == "time"
+    assert _wave(found, "travel") == pytest.approx((0.12, rate_radps), rel=0.15)
+
+
+def _wave(found, adds_to):
+    """Size and rate of the wave that was proven there."""
+    formula = found.rest.proven
+    assert formula.forms[0].adds_to == adds_to
+    size = np.hypot(*(n.value for n in formula.numbers[:2]))
+    return size, formula.forms[0].constant
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_a_calm_robot_has_no_beat(seed, tanh_robot, measure, one_clock_base):
     (opened,) = open_measurements([measure(tanh_robot(), seed, 60.0)], one_clock_base)

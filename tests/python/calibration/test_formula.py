@@ -251,3 +251,11 @@ def test_known_physics_is_named_by_shape_and_sign():
     assert "a spring (all wheels): 1 Hz, damping 0.1" in resembles([spring], [0.5])
     heat = Form("motion", ("s",), PAST, HEAT, 15.0)
     assert "falls" in resembles([heat], [-1.0]) and "heat of the motors" in resembles([heat], [-1])
+
+
+def test_only_what_was_seen_often_enough_comes_again():
+    """Seams every 0.4 m over 2 m are five; of a wave as long as the floor there is but one."""
+    pair = ("cos({c}*y)", "sin({c}*y)")
+    seams, slope = (Form("travel", pair, "place", constant=2 * np.pi / m) for m in (0.4, 2.0))
+    assert "every 0.40 m along y" in resembles([seams], [0.1, 0.0], {"y": (-1.0, 1.0)})
+    assert resembles([slope], [0.1, 0.0], {"y": (-1.0, 1.0)}).startswith("changes along y")
