@@ -164,6 +164,7 @@ def test_a_model_that_is_driven_otherwise_is_named(robot, drive):
 
 def test_units_are_told_from_speeds(robot):
     _one([_with_pose(robot, *(1000 * robot.pose[:, :2]).T)], "in mm", "x_mm")
+    _one([_with_pose(robot, *(1e9 * robot.pose[:, :2]).T)], "none of a robot in a room")
     _one([_with_pose(robot, theta=np.degrees(robot.pose[:, 2]))], "degrees", "theta_deg")
 
 
@@ -396,6 +397,38 @@ def test_robots_under_one_number_are_told(robot, count):
             z_m=np.zeros(len(pose)),
         )
         _one([mixed], "two robots or more under one number", "robot_id")
+
+
+def _parts_in_turn(first, second):
+    """(t_s, pose) of two parts, each (t_s, pose), sorted by stamp."""
+    t_s, pose = (np.concatenate(columns) for columns in zip(first, second, strict=True))
+    order = np.argsort(t_s, kind="stable")
+    return t_s[order], pose[order]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_stamps_that_step_back_are_told_from_two_robots(seed):
+    """A clock set back by 12 s after 40 s; then a guest for 20 s that leaves where it came."""
+    robot = _robot(seed=seed)
+    t_s, pose = robot.pose_t_s, robot.pose
+    late = t_s > 40
+    stepped = _parts_in_turn((t_s[~late], pose[~late]), (t_s[late] - 12.006, pose[late]))
+    (told,) = check_poses(replace(robot, pose_t_s=stepped[0], pose=stepped[1]), "log")
+    assert "the stamps of the poses step back by 12.0 s: " in str(told)
+    assert "after 40.0 s begin again at 28.0 s" in str(told)
+    out_and_back = np.minimum(np.arange(1000), np.arange(1000)[::-1])
+    guest = t_s[1000:2000] + 0.006, _robot(seed=seed + 10).pose[out_and_back] + [0.3, 0, 0]
+    mixed = _parts_in_turn((t_s, pose), guest)
+    everywhere = np.zeros(len(mixed[0]))
+    robots = replace(
+        robot,
+        pose_t_s=mixed[0],
+        pose=mixed[1],
+        z_m=everywhere,
+        valid=everywhere == 0,
+    )
+    (told,) = check_poses(robots, "log")
+    assert "two robots or more under one number" in str(told)
 
 
 def test_a_robot_that_stands_as_it_is_told_is_no_mistake(robot):

@@ -204,6 +204,11 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
             COMMANDS.replace("\n0,4", "\n50,4").replace("0.1,4", "51,4"),
             r"do not overlap.*--pose-shift-s 50\.000",
         ),
+        (
+            "\n".join(POSES.split("\n")[:2]) + "\n",
+            COMMANDS,
+            r"robot 4: has one pose, at .*tells no motion",
+        ),
         (POSES.replace("1.0,4", "1750000000,4"), COMMANDS, r"held for 1\d+ s"),
         (
             POSES,

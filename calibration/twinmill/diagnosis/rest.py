@@ -163,11 +163,15 @@ class Rest:
         )
 
     def at_few_commands(self) -> "Rest":
-        """Without steady speeds, where little is left: at few commands the base may make them."""
+        """Without steady speeds, where little is left: at few commands the base may make them.
+
+        Nor is a formula of these then proven.
+        """
         if not self.little:
             return self
         kept = [g for g in self.depends_on if g not in STEADY and not g.startswith("command of")]
-        return replace(self, depends_on=kept, likely=self.likely and bool(kept))
+        proven = self.proven if self.proven and {*self.proven.depends_on} <= {*kept} else None
+        return replace(self, depends_on=kept, likely=self.likely and bool(kept), proven=proven)
 
     @property
     def moments(self) -> tuple[Moment, ...]:
@@ -195,7 +199,7 @@ class Rest:
         if not self.looked_at:
             return NOT_LOOKED_AT
         known = self.depends_on and not self.likely
-        if self.share < HARDLY and not self.again:  # of which no score tells
+        if self.share < HARDLY and not (self.again or self.proven):  # of which no score tells
             return FEW if self.far else NOISE
         if known or (self.firm and not self.little):
             return FIRM

@@ -405,8 +405,8 @@ class VerdictInputs:
 
     @property
     def _outside_sentence(self) -> str:
-        events = self.rest.events.sentence
-        if events and not self._outside:
+        events, on = self.rest.events.sentence, self.rest.on
+        if events and not (self._outside or on):
             alone = ", or at changes of the command" if self.rest.events.at_changes else " alone"
             return f"What is missing acts at single moments{alone}. {events}"
         proven = self._proven_instead
@@ -419,10 +419,9 @@ class VerdictInputs:
             also += f" It was found in place of {_in_turn(effects)}."
         depends = self.rest.depends_on and not self.rest.likely
         taken = self._taken > self.rest.share
-        if self.noises and not (depends or self.rest.firm or taken):
+        if self.noises and not (events or depends or self.rest.firm or taken):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{self._most_likely}{also}"
-        on = self.rest.on
         by_itself = "it wanders by itself, or " if self.rest.wanders else ""
         depends = f"it depends {on}" if on else f"{by_itself}no formula that was tried describes it"
         what = f": {proven.equals}" if proven else ""

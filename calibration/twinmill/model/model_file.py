@@ -41,13 +41,19 @@ class ModelFile:
         try:
             path = Path(native.find_model_file(str(name)))
             text = path.read_text()
-            return cls(path, text, native.Model.from_toml(text, str(name)))
+            loaded = cls(path, text, native.Model.from_toml(text, str(name)))
         except UnicodeDecodeError as error:
             raise ModelError(
                 f"{name}: is no text, so it is no model file; check the name."
             ) from error
         except (ValueError, OSError) as error:
             raise ModelError(str(error)) from error
+        if "base" not in loaded._document:
+            raise ModelError(
+                f"{name}: has no section [base], so it does not say what the commands are nor how "
+                "the robot follows them; write one, or make a model file with twinmill guide."
+            )
+        return loaded
 
     def write(self, force: bool = True) -> None:
         """Writes its file, whole or not at all; `force` replaces one that is there.

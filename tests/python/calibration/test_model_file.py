@@ -50,6 +50,13 @@ def child(parent, fitted, tmp_path):
     return path
 
 
+@pytest.mark.parametrize("text", ["", "[robot]\nwheel_radius_m = 0.03\n"])
+def test_a_model_that_says_nothing_of_its_base_is_refused(tmp_path, text):
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(ModelError, match=r"m\.toml: has no section \[base\]"):
+        ModelFile.load(str(tmp_path / "m.toml"))
+
+
 def test_child_holds_every_value_of_the_fit(child, parent, fitted):
     written, old = ModelFile.load(str(child)).model, parent.model
     told = {e.name: e.value for e in fitted.estimates} | {"clock.offset_s": 0.06}

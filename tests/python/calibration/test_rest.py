@@ -13,12 +13,13 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.findings import with_stale_numbers
 from twinmill.diagnosis.library import SHAPES, _wheel_terms
-from twinmill.diagnosis.moments import Events
+from twinmill.diagnosis.moments import Events, Moment
 from twinmill.diagnosis.notes import _no_more_than_left, irregularity, is_random
 from twinmill.diagnosis.place import HORIZON, comes_again
 from twinmill.diagnosis.rest import (
     FIRM,
     FOLDS,
+    MOMENTS,
     Dependence,
     Products,
     Rest,
@@ -179,6 +180,32 @@ def test_at_few_commands_little_that_depends_on_speed_is_the_base():
     rest = Rest(1.0, False, ["speed", "command of the left wheels", "heading"], little=True)
     assert rest.at_few_commands().depends_on == ["heading"]
     assert replace(rest, little=False).at_few_commands().depends_on == rest.depends_on
+
+
+@pytest.mark.parametrize(("group", "kept"), [("speed", False), ("heading", True)])
+def test_at_few_commands_no_formula_is_offered_for_what_is_called_noise(group, kept):
+    proven = SimpleNamespace(depends_on=[group])
+    left = Rest(0.07, False, [group], little=True, proven=proven).at_few_commands()
+    assert bool(left.proven) == kept == (left.certainty == FIRM)
+
+
+def test_what_was_proven_is_firm_where_no_score_tells_of_it():
+    """Two or three short gusts in minutes leave the score at 1."""
+    left = Rest(0.0, False, ["time"], proven=SimpleNamespace(depends_on=["time"]))
+    assert left.certainty == FIRM != replace(left, proven=None).certainty
+
+
+@pytest.mark.parametrize("noise", [[], ["far less regular"]])
+@pytest.mark.parametrize("likely", [["place"], ["speed", "time"], []])
+def test_what_is_likely_is_named_before_single_moments(likely, noise):
+    moments = tuple(Moment("run", 1, 10.0 * k**2, 0.4, "less") for k in range(1, 5))
+    left = Rest(1.0, False, [*likely, MOMENTS], likely=True, wanders=True, events=Events(moments))
+    told = VerdictInputs(*[1.2] * 4, [], left, [], [], noise, 1.0)
+    assert told.verdict == "outside_catalogue"
+    before, after = told.sentence.split("At 4 moments")
+    assert "10.0, 40.0, 90.0 s and 1 more" in after
+    assert ("single moments alone" in before) != bool(likely)
+    assert all(name in before for name in likely)
 
 
 def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():

@@ -21,6 +21,7 @@ LAID_DOWN = {
 }
 UNDER_ONE = "give each robot its own robot_id, in its poses and in its commands"
 MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
+ARM_M = 0.1  # of headings, which part robots that meet
 # Nothing moves within this much, nor within five times the noise where that is as little as this.
 STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.2])
 
@@ -129,6 +130,16 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             )
         ]
     if apart_m := _goes_to_and_fro(pose[:, :2]):
+        if back := _step_back(pose):
+            first_s, last_s = t_s[list(back)]
+            return [
+                finding(
+                    f"the stamps of the poses step back by {last_s - first_s:.1f} s",
+                    f"those after {last_s:.1f} s begin again at {first_s:.1f} s, where the robot "
+                    f"is already as at {last_s:.1f} s",
+                    "add as much to all stamps after the step, or make two logs of the two parts",
+                )
+            ]
         return [
             finding(
                 "these poses are those of two robots or more under one number",
@@ -149,6 +160,14 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
                 f"z goes over {height_m:.2f} m and {axis} over {min(x_m, y_m) * 1000:.0f} mm",
                 "import anew with the other --up (y or z), or of a table with "
                 f"{of_robot(LAID_DOWN[axis], own)}",
+            )
+        ]
+    if fast_mps > 1000 * CHECKS.fastest_mps:  # in mm, too
+        return [
+            finding(
+                "the positions are none of a robot in a room, in any unit",
+                f"it drives at {fast_mps:.2g} m/s by them, over {max(x_m, y_m):.2g} m",
+                "correct what wrote them, or name the right columns and import anew",
             )
         ]
     if fast_mps > CHECKS.fastest_mps:
@@ -264,6 +283,31 @@ def _goes_to_and_fro(place: np.ndarray) -> float:
     leap_m, back_m = _to_and_fro(place)
     leaps = (leap_m > CHECKS.leap_m) & (back_m < leap_m / 5)
     return float(np.median(leap_m[leaps])) if leaps.mean() > CHECKS.leaps else 0.0
+
+
+def _step_back(pose: np.ndarray) -> tuple[int, int] | None:
+    """Where stamps that step back begin again, and the last before the step; None if none do.
+
+    Sorted by stamp, two parts of one drive come in turn for as long as the step: the second begins
+    where the first ends, and is there alone afterwards. Two robots are each on a way of its own.
+
+    Args:
+        pose: (N, 3) that goes to and fro.
+    """
+    ahead = np.column_stack([np.cos(pose[:, 2]), np.sin(pose[:, 2])])
+    place = np.column_stack([pose[:, :2], ARM_M * np.nan_to_num(ahead)])
+    leap_m, back_m = _to_and_fro(place)
+    leaps = np.flatnonzero((leap_m > CHECKS.leap_m) & (back_m < leap_m / 5))
+    begin, end = leaps[0] + 1, leaps[-1] + 3  # the second part's first pose; both have ended
+    if begin < CHECKS.fewest_poses or end > len(place) - CHECKS.fewest_poses:
+        return None
+    last = [begin - 1, begin]  # of either part
+    for k in range(begin + 1, end):
+        part = int(np.argmin(np.linalg.norm(place[last] - place[k], axis=1)))
+        last[part] = k
+    gap_m = np.linalg.norm(place[last[0]] - place[begin])
+    joined = last[1] > last[0] and gap_m < np.median(leap_m[leaps]) / 5
+    return (int(begin), last[0]) if joined else None
 
 
 def _to_and_fro(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -475,6 +475,11 @@ def _check_times(p: PoseSeries, c: CommandSeries, shift: bool, own: bool) -> Non
     start_s, end_s = c.utime_us[[0, -1]] / 1e6
     _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
     _check_rate(p)
+    if len(p.utime_us) == 1:
+        raise LogError(
+            f"robot {p.robot_id}: has one pose, at {first_s:.3f} s, which tells no motion; record "
+            "its poses all the time while it drives."
+        )
     if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
         remedy = (
             "shift the poses, for example so that both start together: --pose-shift-s "
