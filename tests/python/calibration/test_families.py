@@ -44,6 +44,25 @@ def in_a_strip(motion: np.ndarray) -> np.ndarray:
     return kept
 
 
+def by_strips(motion: np.ndarray, axis: int, rate: float) -> np.ndarray:
+    """Every second strip of floor of 0.35 m adds a rate to an axis of whatever drives over it."""
+    drives = np.abs(motion).max(axis=1) > 0.005
+    kept, x_m, heading = motion.copy(), 0.0, 0.0
+    for k in range(len(motion)):
+        kept[k, axis] += rate * (drives[k] and int(np.floor(x_m / 0.35)) % 2)
+        x_m += STEP_S * (np.cos(heading) * kept[k, 0] - np.sin(heading) * kept[k, 1])
+        heading += STEP_S * kept[k, 2]
+    return kept
+
+
+def turned_by_strips(motion: np.ndarray) -> np.ndarray:
+    return by_strips(motion, 2, 0.12)
+
+
+def shifted_by_strips(motion: np.ndarray) -> np.ndarray:
+    return by_strips(motion, 1, 0.025)
+
+
 def course(motion: np.ndarray) -> np.ndarray:
     """(K,) direction in the room in which it drives, rad."""
     return np.cumsum(motion[:, 2]) * STEP_S + np.arctan2(motion[:, 1], motion[:, 0])
@@ -103,6 +122,8 @@ def swung_round(motion: np.ndarray) -> np.ndarray:
         (swinging, "change of the command"),
         (dipping, "speed"),
         (in_a_strip, "place"),
+        (turned_by_strips, "place"),
+        (shifted_by_strips, "place"),
         (blown, "heading"),
         (led_aside, "heading"),
         (shaking, "speed"),

@@ -65,7 +65,10 @@ def _squares(sides: Sequence[Humps], own: Opened) -> np.ndarray:
 
 
 def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray]) -> list[Family]:
-    """All speeds change alike there, or turning alone; the floor pushes; iron turns a compass.
+    """What happens there.
+
+    All speeds change alike, or turning alone. The floor pushes along the room, or adds a rate of
+    its own to one axis of the body. Iron turns a compass.
 
     Args:
         where: a name for the places.
@@ -83,6 +86,9 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
     def turn(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         return {2: SWELL * bells(own) * velocity[:, [2]]}
 
+    def added(axis: int, own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
+        return {axis: TYPICAL[CHANNELS[axis]] * bells(own) * moves(velocity)[:, None]}
+
     def turned(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         angles = SWELL * bells(own)
         return {0: -angles * velocity[:, [1]], 1: angles * velocity[:, [0]]}
@@ -95,6 +101,13 @@ def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray])
             turn,
         ),
         Family([Term(PLACE, "vx_mps", t, 1.0, f"push at {where}") for t in toward], push),
+        *(
+            Family(
+                [Term(PLACE, to, f"{t}*moves", 1.0, f"{to} added at {where}") for t in texts],
+                partial(added, axis),
+            )
+            for axis, to in enumerate(CHANNELS)
+        ),
         Family(
             [Term(PLACE, "vy_mps", f"{t}*vx", SIZE, f"compass at {where}") for t in texts], turned
         ),
