@@ -165,6 +165,16 @@ class Form:
         return "t" in names_in([*self.texts, *self.rates])
 
     @property
+    def wave(self) -> tuple[str, float]:
+        """Name of the motion along which it swings, and at what rate; empty and 0 if at none."""
+        shape = self.shapes[0]
+        if self.constant and shape.startswith("cos("):
+            return shape.split("*")[-1].rstrip(")"), self.constant
+        if self.recurs:
+            return "t", float(re.search(r"sin\(([\d.]+)\*t", shape)[1])
+        return "", 0.0
+
+    @property
     def recurs(self) -> bool:
         """It is there for a part of each period, by the clock."""
         return self.phase is not None

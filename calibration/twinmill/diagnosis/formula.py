@@ -40,10 +40,12 @@ class Curve:
         spread: (B,) its standard error.
         drawn: (B,) the formula.
         carrier: name of the motion that all terms are multiplied by; empty if there is none.
+        period: of the variable, within which `at` is, since all comes again; 0 if it does not.
     """
 
     name: str
     carrier: str
+    period: float
     at: np.ndarray
     left: np.ndarray
     spread: np.ndarray

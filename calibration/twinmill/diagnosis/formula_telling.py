@@ -19,6 +19,7 @@ from twinmill.diagnosis.forms import (
     variable_of,
 )
 from twinmill.diagnosis.formula import Curve, Formula, Number
+from twinmill.diagnosis.recurring import LONGEST
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.units import units_of
 
@@ -27,6 +28,7 @@ DRAWS = 40  # resamplings of the stretches
 SLOPE = 0.01  # of a constant's logarithm
 LARGEST_LOG = 5.0
 BINS = 14  # of the curve that a report draws
+HALF_A_BIN = np.cos(np.pi / BINS)  # least cosine of an angle in a bin, from its middle
 
 
 # -- telling ---------------------------------------------------------------------------------------
@@ -87,15 +89,7 @@ def _shapes(forms: Sequence[Form]) -> int:
 def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> Curve:
     """What is left in bins of the first variable of the first term, and the formula there."""
     name, carrier = variable_of(forms)
-    at = rows.motion.names[name]
-    if name in ANGLES:
-        middles = np.linspace(-np.pi, np.pi, BINS, endpoint=False)
-        inside = [f"(cos({name} - {a:.4f}) > {np.cos(np.pi / BINS):.6f})" for a in middles]
-    else:
-        edges = np.unique(np.quantile(at, np.linspace(0, 1, BINS + 1)))
-        edges[-1] += 1e-9 + 1e-6 * abs(edges[-1])
-        inside = [f"({name} >= {a!r})*({name} < {b!r})" for a, b in pairwise(edges.tolist())]
-        middles = (edges[1:] + edges[:-1]) / 2
+    inside, middles, period = _bins(rows.motion.names[name], name, forms[0])
     by = f"*{carrier}" if carrier else ""
     bins = [Form(forms[0].adds_to, (f"{text}{by}",), "", sizes=(1.0,)) for text in inside]
     x = rows.seen(rows.raw(bins))
@@ -106,7 +100,25 @@ def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> 
     apart = np.eye(len(gram)) - 1 / len(gram)  # what all bins share is a gain of the base
     left = inverse @ (x.T @ rows.left) * USUAL[forms[0].adds_to]
     spread = np.sqrt(np.diag(apart @ inverse @ apart)) * USUAL[forms[0].adds_to]
-    return Curve(name, carrier, middles, left + np.mean(drawn - left), spread, drawn)
+    return Curve(name, carrier, period, middles, left + np.mean(drawn - left), spread, drawn)
+
+
+def _bins(at: np.ndarray, name: str, form: Form) -> tuple[list[str], np.ndarray, float]:
+    """Texts that are 1 in each bin of a variable, their middles, and its period; 0 if it has none.
+
+    What swings often enough in the logs is laid over one period.
+    """
+    waves, rate = form.wave
+    again = waves == name and rate * np.ptp(at) * LONGEST > 2 * np.pi
+    if again or name in ANGLES:
+        angles = np.linspace(-np.pi, np.pi, BINS, endpoint=False) + np.pi * again
+        times = rate if again else 1.0
+        inside = [f"(cos({times:.6g}*{name} - {a:.4f}) > {HALF_A_BIN:.6f})" for a in angles]
+        return inside, angles / times, 2 * np.pi / times if again else 0.0
+    edges = np.unique(np.quantile(at, np.linspace(0, 1, BINS + 1)))
+    edges[-1] += 1e-9 + 1e-6 * abs(edges[-1])
+    inside = [f"({name} >= {a!r})*({name} < {b!r})" for a, b in pairwise(edges.tolist())]
+    return inside, (edges[1:] + edges[:-1]) / 2, 0.0
 
 
 def _drawn(

@@ -127,25 +127,18 @@ def _of_past(form: Form, own: Sequence[float]) -> str:
 
 def _of_few_periods(form: Form, seen: Mapping[str, tuple[float, float]]) -> str:
     """What does not come again often enough in the logs to say that it comes again at all."""
-    name = _wave_of(form)
-    if name not in seen or form.constant * np.ptp(seen[name]) * LONGEST > 2 * pi:
+    name, rate = form.wave
+    if name not in seen or rate * np.ptp(seen[name]) * LONGEST > 2 * pi:
         return ""
     if name == "t":
         return "changes slowly over the run: like a battery, heat or a load that shifts"
     return f"changes along {name}: like a floor that is not the same everywhere"
 
 
-def _wave_of(form: Form) -> str:
-    """The name of the motion along which it is a wave; empty if it is none."""
-    wave = form.constant and form.shapes[0].startswith("cos(")
-    return form.shapes[0].split("*")[-1].rstrip(")") if wave else ""
-
-
 def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
-    name = _wave_of(form)
+    name, rate = form.wave
     if form.group == "place" and name:
-        length_m = 2 * pi / form.constant
-        return f"comes again every {length_m:.2f} m along {name}: like tiles, planks or seams"
+        return f"comes again every {2 * pi / rate:.2f} m along {name}: like tiles, planks or seams"
     if form.adds_to == "theta_rad":
         return "the captured heading is off by the heading: like a compass or a tag seen aslant"
     if form.adds_to == "omega_radps" and form.group == "heading":
@@ -156,12 +149,11 @@ def _of_place_or_time(form: Form, own: Sequence[float]) -> str:
         return "more in one direction of the room, less in the other: like wind, pile or a slope"
     if form.adds_to == "aside":
         return "led aside by the direction in which it drives: like grooves, joints or pile"
-    if name == "t":
-        every_s = 2 * pi / form.constant
-        return f"swings every {every_s:.3g} s: like a regulator that hunts, or a part that turns"
-    if form.group == "time" and "sin(" in form.shapes[0]:
-        rate = float(re.search(r"sin\(([\d.]+)\*t", form.shapes[0])[1])
+    if name == "t" and form.recurs:
         return f"comes and goes every {2 * pi / rate:.3g} s: like a load that is switched"
+    if name == "t":
+        every_s = 2 * pi / rate
+        return f"swings every {every_s:.3g} s: like a regulator that hunts, or a part that turns"
     if form.group == "time" and "<" in form.shapes[0]:
         return "there for a while: like something that was held, hung on or carried"
     if form.group == "time" and ">" in form.shapes[0]:

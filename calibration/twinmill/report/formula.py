@@ -118,8 +118,9 @@ def figures(rest: Rest) -> Sequence[Figure]:
         axes.axhline(0, color="#888888", lw=0.8)
         by = f" per {curve.carrier}" if curve.carrier else ""
         unit = "" if to in PARTS else f", {ADDS_TO[to]}" if not by else ""
+        within = f" within {curve.period:.3g} {_unit(curve.name)}" if curve.period else ""
         axes.set(
-            xlabel=f"{curve.name}, {_unit(curve.name)}".rstrip(", "),
+            xlabel=f"{curve.name}{within}, {_unit(curve.name)}".rstrip(", "),
             ylabel=f"{PARTS.get(to, to.rpartition('_')[0])}{by}{unit}",
         )
         legend_above(axes, 2)
