@@ -66,7 +66,14 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.stopped import Course
 from twinmill.diagnosis.taking import needless, tuned
 from twinmill.diagnosis.ties import instead_of_drift
-from twinmill.diagnosis.trials import REFIT, State, Trial, cross_validate, without_effect
+from twinmill.diagnosis.trials import (
+    REFIT,
+    State,
+    Trial,
+    begun_nearer,
+    cross_validate,
+    without_effect,
+)
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
 from twinmill.fitting.fit import base_names, effects_free
@@ -441,6 +448,7 @@ def _concluded(
         random,
         () if rest.events.later else unsteady([o.measurement for o in known]),
         own,
+        begun_nearer(first, done.start),
         random_in_words(scatters, [r.noise for r in modelled], model_file.model) if random else "",
     )
     if weighed.verdict == "outside_catalogue":

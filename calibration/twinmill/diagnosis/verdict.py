@@ -12,7 +12,6 @@ from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.ties import of_levels
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.compare import GOOD, LACKING, MISSING
-from twinmill.fitting.score_fit import FAR
 
 CHANGED = (
     "What changed between them is outside the catalogue: look at battery, load, wheels and floor."
@@ -34,6 +33,7 @@ class VerdictInputs:
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
         random: the motion is so much less regular than the model says that something is there.
+        far: the base's gains were far off, and the search began with them nearer.
         disturbed_by: by how much at random, in words; empty if that is not told.
         unsteady: what the input tells of commands that act later from some time on, in sentences.
         apart: numbers in which robots or runs differ; None where one set does as well.
@@ -53,6 +53,7 @@ class VerdictInputs:
     random: bool = False
     unsteady: Sequence[str] = ()
     apart: Apart | None = None
+    far: bool = False
     disturbed_by: str = ""
 
     @property
@@ -236,8 +237,7 @@ class VerdictInputs:
     def _begun_far(self) -> bool:
         """The base's gains were far off, no finding says so, and something else is left."""
         told = len(self.effects) < len(self.findings)
-        far = self.score > FAR and drifted(self.score, self.first, self.known)
-        return far and not told and bool(self.effects or self._unexplained)
+        return self.far and not told and bool(self.effects or self._unexplained)
 
     @property
     def _nothing(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.diagnose import diagnose
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import MISSING, SUSPECT, compare
 from twinmill.fitting.fit import fit
@@ -74,6 +75,12 @@ def test_dead_zone(added):
     width = found["dead_zone.width"]
     assert score < MISSING
     assert width.value == pytest.approx(0.05, abs=3 * width.std + FORM * 0.05)
+
+
+def test_a_base_of_the_same_robot_is_not_called_far_off(folder, base):
+    """Its gains would take a part of the dead zone, though nothing else changed."""
+    found = diagnose(load_measurements([folder / "case_a.lcmlog"]), base[1])
+    assert found.sentence.startswith("Missing: dead_zone")
 
 
 def test_motor_lag(added):
