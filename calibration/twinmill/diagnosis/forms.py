@@ -551,7 +551,7 @@ def _of_room(every: Mapping[str, np.ndarray], sideways: bool) -> list[Form]:
             continue
         count = int(min(2 * span / SHORTEST_M, MOST_WAVES))
         for k in range(2, count + 1):
-            found.append(_wave(name, k, span))
+            found.append(_wave("travel", name, k, span))
         found.append(Form("travel", (name,), "place"))
     if np.ptp(every["theta"]) > 0.5:
         found.append(Form(ROOM, ("sqrt(vx*vx + vy*vy)",) * 2, HEADING))
@@ -570,9 +570,7 @@ def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
     first, span = every["t"].min(), np.ptp(every["t"])
     count = int(min(2 * span / SHORTEST_S, MOST_WAVES))
     found = [
-        _swinging(to, "t", np.pi * k / span, 0.5 / k)
-        for to in (*ALL_AXES, "omega_radps")
-        for k in range(1, count + 1)
+        _wave(to, "t", k, span) for to in (*ALL_AXES, "omega_radps") for k in range(1, count + 1)
     ]
     at = [float(f"{first + span * k / MOMENTS:.4g}") for k in range(1, MOMENTS)]
     found += [Form("motion", (f"(t > {a:g})",), TIME) for a in at]
@@ -580,9 +578,9 @@ def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
     return found
 
 
-def _wave(name: str, k: int, span: float) -> Form:
+def _wave(adds_to: str, name: str, k: int, span: float) -> Form:
     """That has k half waves in what the logs span of a name of the motion."""
-    return _swinging("motion" if name == "t" else "travel", name, np.pi * k / span, 0.5 / k)
+    return _swinging(adds_to, name, np.pi * k / span, 0.5 / k)
 
 
 def _swinging(adds_to: str, name: str, rate: float, spread: float) -> Form:

@@ -19,7 +19,7 @@ from twinmill.diagnosis.forms import (
     variable_of,
 )
 from twinmill.diagnosis.formula import Curve, Formula, Number
-from twinmill.diagnosis.recurring import LONGEST
+from twinmill.diagnosis.recurring import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.units import units_of
 
@@ -109,7 +109,7 @@ def _bins(at: np.ndarray, name: str, form: Form) -> tuple[list[str], np.ndarray,
     What swings often enough in the logs is laid over one period.
     """
     waves, rate = form.wave
-    again = waves == name and rate * np.ptp(at) * LONGEST > 2 * np.pi
+    again = waves == name and comes_again(rate, np.ptp(at))
     if again or name in ANGLES:
         angles = np.linspace(-np.pi, np.pi, BINS, endpoint=False) + np.pi * again
         times = rate if again else 1.0

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from twinmill.diagnosis.forms import ROOM, STARTS, Form
-from twinmill.diagnosis.recurring import LONGEST
+from twinmill.diagnosis.recurring import comes_again
 from twinmill.diagnosis.term import WAY
 
 AXES = {"vx": "driving", "vy": "driving sideways", "omega": "turning"}
@@ -128,7 +128,7 @@ def _of_past(form: Form, own: Sequence[float]) -> str:
 def _of_few_periods(form: Form, seen: Mapping[str, tuple[float, float]]) -> str:
     """What does not come again often enough in the logs to say that it comes again at all."""
     name, rate = form.wave
-    if name not in seen or rate * np.ptp(seen[name]) * LONGEST > 2 * pi:
+    if name not in seen or comes_again(rate, np.ptp(seen[name])):
         return ""
     if name == "t":
         return "changes slowly over the run: like a battery, heat or a load that shifts"

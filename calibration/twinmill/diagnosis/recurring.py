@@ -26,6 +26,11 @@ FINER = (1.0, 0.2)
 FIRST = 0.6  # share of a log that must predict the rest
 
 
+def comes_again(rate: float, span: float) -> bool:
+    """Whether a wave is seen so often along a name of the motion that it is no chance."""
+    return rate * span * LONGEST > 2 * np.pi
+
+
 @dataclass(frozen=True)
 class Recurring:
     """What is tried over the logs of some evidence.

@@ -391,8 +391,7 @@ class Response:
     @cached_property
     def _steps(self) -> tuple[np.ndarray, np.ndarray]:
         """(N, 2) length of each step times the direction in which the robot heads; (N, 1) alone."""
-        ahead = np.column_stack([np.cos(self.heading_rad), np.sin(self.heading_rad)])
-        return ahead * self.step_s[:, None], self.step_s[:, None].copy()
+        return self.ahead * self.step_s[:, None], self.step_s[:, None].copy()
 
     def _part(self, t_s: np.ndarray) -> np.ndarray:
         return np.floor(t_s / self.block_s).astype(int) % self.folds
