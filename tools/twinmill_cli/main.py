@@ -93,6 +93,11 @@ COMMANDS = (
         "that the log cannot tell.",
     ),
     (
+        "infer",
+        "infer",
+        "Give the probability of each effect that a model may lack, and of something nameless.",
+    ),
+    (
         "explain",
         "diagnose",
         "Diagnose, add what is found, and write the model that has it; every "

@@ -147,6 +147,11 @@ class ModelFile:
         return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
 
     @property
+    def recorded_noise(self) -> dict[str, float]:
+        """Sensor and drive noise that a fit recorded: sensor_m, sensor_rad, drive_mps and others."""
+        return {key: float(v) for key, v in self._document.get("noise", {}).items()}
+
+    @property
     def noise_speed_mps(self) -> float:
         """RMS speed of the log that told the noise, while it drove; 0 where that is not known."""
         return float(self._document.get("fit", {}).get("noise_speed_mps", 0.0))

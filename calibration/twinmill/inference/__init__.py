@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bayesian model comparison: which effects or nameless dependences a model lacks, with probabilities.
+
+The data flow one way: `steps` (prediction errors of a log), `noise` (whitening), `candidates` and
+`discrepancy` (columns of what may be missing), `evidence` (linear Gaussian algebra), `hypothesis`
+(fits), `search` (a table of hypotheses), `posterior` (probabilities), `answer` (what is reported).
+`always` finds what a model misses in the log it was fitted to. Numbers that move an answer stand in
+`settings`. docs/inference.md has the equations.
+"""

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From beliefs to an answer: verdict, findings with groups and certainty, what the rest depends on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.inference.posterior import Belief, beliefs
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.table import Table
+from twinmill.model.parameters import catalogue_name
+
+LARGEST_GROUP = 4  # names: more help nobody
+
+
+@dataclass(frozen=True)
+class Named:
+    """One effect that is missing.
+
+    Attributes:
+        effect: its name.
+        probability: that it is missing.
+        group: names one of which is missing, itself first; empty if it stands alone.
+        group_probability: that one of the group is.
+        certainty: sure, group or doubtful.
+        numbers: parameter -> (value, standard deviation).
+    """
+
+    effect: str
+    probability: float
+    group: tuple[str, ...]
+    group_probability: float
+    certainty: str
+    numbers: dict[str, tuple[float, float]]
+
+    def to_json(self) -> dict:
+        """Fields of `findings` of the interface."""
+        return {
+            "effect": self.effect,
+            "probability": self.probability,
+            "group": list(self.group) if self.certainty == "group" else None,
+            "group_probability": self.group_probability,
+            "certainty": self.certainty,
+            "parameters": [
+                {"name": name, "value": value, "std": std}
+                for name, (value, std) in self.numbers.items()
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a log says of a model.
+
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
+            cannot_tell.
+        findings: effects, the one worth most first.
+        nothing, outside: probabilities that nothing is missing, and that something nameless is.
+        depends_on: what is left depends on, likeliest first, each with its probability.
+        share: of the excess squared error that the likeliest dependence takes.
+    """
+
+    verdict: str
+    findings: list[Named]
+    nothing: float
+    outside: float
+    depends_on: dict[str, float]
+    share: float
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {
+            "verdict": self.verdict,
+            "findings": [f.to_json() for f in self.findings],
+            "probability": {"nothing": self.nothing, "outside": self.outside},
+            "rest": {
+                "share": self.share,
+                "depends_on": list(self.depends_on),
+                "probability": self.depends_on,
+                "formula": None,
+            },
+        }
+
+
+def answer(table: Table) -> Answer:
+    """The answer with the least to explain away: the likeliest verdict, then the likeliest set."""
+    every = beliefs(table)
+    nothing = sum(b.probability for b in every if b.nothing)
+    outside = sum(b.probability for b in every if b.outside)
+    something = nothing <= 1 - PRIORS.sure
+    best = _likeliest(every, lambda b: tuple(sorted(b.fitted))) if something else ()
+    named = [_named(name, best, every, table) for name in _by_worth(best, table)]
+    findings = [f for f in named if f.probability >= PRIORS.member]
+    if not something:
+        stale = sum(b.probability for b in every if b.nothing and b.stale)
+        verdict = "refit_enough" if stale > nothing / 2 else "model_adequate"
+        verdict = verdict if nothing >= 0.5 else "cannot_tell"
+    elif outside >= 0.5 or not findings:
+        verdict = "outside_catalogue"
+    else:
+        verdict = "ambiguous" if findings[0].certainty == "group" else "effect_missing"
+    words, share = _rest(best, every, table) if something else ({}, 0.0)
+    return Answer(verdict, findings, nothing, outside, words, share)
+
+
+def _likeliest(every: list[Belief], key):
+    total: dict = {}
+    for b in every:
+        total[key(b)] = total.get(key(b), 0.0) + b.probability
+    return max(total, key=total.get)
+
+
+def _by_worth(best: tuple[str, ...], table: Table) -> list[str]:
+    """Effects of a set, the one without which the evidence is least first."""
+
+    def without(name: str) -> float:
+        return max(e.log_evidence for e in table.entries if name not in e.effects)
+
+    return sorted(best, key=without)
+
+
+def _named(name: str, best: tuple[str, ...], every: list[Belief], table: Table) -> Named:
+    p = sum(b.probability for b in every if name in b.effects)
+    rest = set(best) - {name}
+    instead: dict[str, float] = {}
+    for b in every:
+        if name not in b.effects and rest <= set(b.effects):
+            for other in set(b.effects) - rest:
+                instead[other] = instead.get(other, 0.0) + b.probability
+    likely = sorted(
+        (n for n, v in instead.items() if v >= PRIORS.member), key=lambda n: -instead[n]
+    )
+    group = (name, *likely)[:LARGEST_GROUP]
+    total = sum(b.probability for b in every if set(group) & set(b.effects))
+    certainty = "doubtful"
+    if p >= PRIORS.sure:
+        certainty, group = "sure", (name,)
+    elif total >= PRIORS.sure and len(group) > 1:
+        certainty = "group"
+    chosen = max((e for e in table.numbers if sorted(e) == sorted(best)), key=len)
+    numbers = {
+        label.split(".", 1)[1]: v
+        for label, v in table.numbers[chosen].items()
+        if catalogue_name(label) == name
+    }
+    return Named(name, p, group, total, certainty, numbers)
+
+
+def _rest(
+    best: tuple[str, ...], every: list[Belief], table: Table
+) -> tuple[dict[str, float], float]:
+    """Words with their probabilities given the set, likeliest first, and the share of the first."""
+    own = [b for b in every if tuple(sorted(b.fitted)) == best]
+    whole = sum(b.probability for b in own)
+    if sum(b.probability for b in own if b.words) <= 0.5 * whole:
+        return {}, 0.0
+    words: dict[str, float] = {}
+    for b in own:
+        for word in b.words:
+            words[word] = words.get(word, 0.0) + b.probability / whole
+    order = sorted((w for w in words if words[w] > PRIORS.member), key=lambda w: -words[w])
+    falls = [b.fall for b in own if b.words[:1] == (order[0],)]
+    return {w: words[w] for w in order}, float(np.clip(max(falls) / table.excess, 0, 1))

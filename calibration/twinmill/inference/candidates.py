@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Effects of the catalogue that a model may lack, and what each would change in a log."""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.track import Track
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.steps import Steps
+from twinmill.model.parameters import (
+    LAG,
+    MOTION_STAGES,
+    WHERE_OR_WHEN,
+    Parameter,
+    catalogue_of,
+    drives_sideways,
+    effect_parameters,
+    making_late,
+    needing,
+    newest_instance,
+)
+
+LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual limit: each a fifth more than the last
+SIDE = 9  # places along each side of the floor
+RADII = (0.12, 0.2, 0.35)  # of a place, times the floor's side
+LEAST_RADIUS_M = 0.15  # a robot's length
+MOMENTS, LEAST_S = 40, 4.0  # of a log, at which a while may begin or end; its least length
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect that may be added to a model.
+
+    Attributes:
+        name: of the effect.
+        parameters: of its newest instance.
+        columns: (k, W, 3) change of the errors by each size at its default strength, m and rad.
+        masks: (G, W) steps of each place or while; None where it acts everywhere.
+        at: (G, P) values that belong to these, or to limits; None where it has neither.
+        fixed: (G, W, 3) change of the errors by limits, which have no size.
+    """
+
+    name: str
+    parameters: list[Parameter]
+    columns: np.ndarray
+    masks: np.ndarray | None = None
+    at: np.ndarray | None = None
+    fixed: np.ndarray | None = None
+
+    @property
+    def sizes(self) -> list[int]:
+        """Parameters that have a column."""
+        return [k for k, p in enumerate(self.parameters) if _is_size(p)]
+
+    @property
+    def one_sided(self) -> np.ndarray:
+        """(k,) sizes that the card lets be positive only: their prior is half a normal one."""
+        own = [self.parameters[k] for k in self.sizes]
+        return np.array([p.min >= p.usual for p in own], bool)
+
+
+def candidates(model: native.Model, track: Track, same_clock: bool, declared: bool) -> list[str]:
+    """Effects that this robot can have and this log can show.
+
+    Args:
+        model: of the base.
+        track: of the log.
+        same_clock: the offset of the clocks is known, so that a delay shows.
+        declared: one clock stamps all, so that no offset can be missing.
+    """
+    excluded: set[str] = set()
+    if not same_clock:
+        excluded |= {*needing("clocks"), *making_late("delay")}
+    elif declared:
+        excluded |= set(making_late("clock"))
+    if model.get(LAG) == 0:
+        excluded |= set(making_late("lag"))
+    if np.isnan(track.battery_V).all():
+        excluded |= set(needing("battery"))
+    if not track.has_heading:
+        excluded |= set(needing("heading"))
+    names = []
+    for name, card in catalogue_of(model).items():
+        sideways = {*card["identify"]} and {*card["identify"]} <= {"strafe", "diagonal"}
+        if sideways and not drives_sideways(model):
+            continue
+        if card["stage"] in MOTION_STAGES and not card["texts"] and name not in excluded:
+            names.append(name)
+    return names
+
+
+def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
+    """What an effect would change beside a model.
+
+    Raises:
+        ValueError: the effect cannot be added to this model.
+    """
+    model = model.copy()
+    model.add_effect(name)
+    parameters = effect_parameters(model, newest_instance(model, name), fresh=True)
+    roles = [p.role for p in parameters]
+    if "limit" in roles:
+        return _with_limits(name, parameters, model, steps)
+    masks, at, on = None, None, np.array([p.usual for p in parameters])
+    where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN]
+    if where:
+        masks, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
+        on[where] = _everywhere([parameters[k] for k in where], steps)
+    sizes = [k for k, p in enumerate(parameters) if _is_size(p)]
+    points = [on]
+    for k in sizes:
+        points.append(on.copy())
+        points[-1][k] = parameters[k].value
+    errors = steps.errors(model, [p.name for p in parameters], np.array(points))
+    return Candidate(name, parameters, errors[0] - errors[1:], masks, at)
+
+
+def size_std(parameter: Parameter) -> float:
+    """Standard deviation of the prior of an effect's size, in its unit."""
+    return PRIORS.size * abs(parameter.strength) if _is_size(parameter) else parameter.std
+
+
+def _is_size(parameter: Parameter) -> bool:
+    return parameter.role not in (*WHERE_OR_WHEN, "radius", "limit")
+
+
+def _with_limits(
+    name: str, parameters: list[Parameter], model: native.Model, steps: Steps
+) -> Candidate:
+    """An effect whose limits act or not: no column is linear in them."""
+    usual, value = (np.array([getattr(p, k) for p in parameters]) for k in ("usual", "value"))
+    low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
+    limit = np.array([p.role == "limit" for p in parameters])
+    others = (1.0,) if limit.all() else (0.0, 1.0)
+    at = np.array(
+        [
+            np.where(limit, np.clip(factor * value, low, high), usual + other * (value - usual))
+            for factor, other in product(LIMITS, others)
+        ]
+    )
+    errors = steps.errors(model, [p.name for p in parameters], np.vstack([usual, at]))
+    fixed = errors[0] - errors[1:]
+    return Candidate(name, parameters, fixed[:0], None, at, fixed)
+
+
+def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
+    """Values at which an effect of a place or a while acts in the whole log."""
+    if where[0].role == "place":
+        return [*steps.place.mean(axis=0), where[2].max]
+    return [0.0, where[-1].max][: len(where)]
+
+
+def _places(steps: Steps) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (G, W) of circles on the floor, and (G, 3) their centres and radii in m."""
+    low, high = np.quantile(steps.place, (0.03, 0.97), axis=0)
+    side_m = float(np.max(high - low))
+    radii = sorted({max(LEAST_RADIUS_M, f * side_m) for f in RADII})
+    at = np.array([(x, y, r) for r in radii for x, y in product(*np.linspace(low, high, SIDE).T)])
+    x, y = steps.place.T
+    inside = np.hypot(x - at[:, :1], y - at[:, 1:2]) < at[:, 2:]
+    used = inside.any(axis=1)
+    return inside[used].astype(float), at[used]
+
+
+def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (G, W) of times from a moment on, or between two, and (G, count) these in s."""
+    t_s, begin_s = steps.t_s, steps.measurement.track.command_t_s[0]
+    grid_s = np.linspace(t_s[0], t_s[-1], MOMENTS + 2)[1:-1]
+    if count == 1:
+        return (t_s >= grid_s[:, None]).astype(float), (grid_s - begin_s)[:, None]
+    a, b = np.triu_indices(len(grid_s), 1)
+    long = grid_s[b] - grid_s[a] >= LEAST_S
+    a, b = grid_s[a[long]], grid_s[b[long]]
+    inside = (t_s >= a[:, None]) & (t_s < b[:, None])
+    return inside.astype(float), np.column_stack([a, b]) - begin_s

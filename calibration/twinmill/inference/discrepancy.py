@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nameless dependences: what a model may lack as a function of time, place, heading, speed, past.
+
+Each dependence has several kernels (smooth or quick; of gains, pushes or turns). A kernel is a
+Gaussian process in a small basis: columns over the steps, and the share of the prior variance that
+each has, so that a size of one is a gain error of one (Rasmussen and Williams 2006, ch. 2.7 and 4).
+A kernel's size is integrated over SIZES.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from twinmill.inference.steps import Motion
+
+SIZES = np.array([0.01, 0.03, 0.1, 0.3])  # from barely seen to a third of the way, relative
+CHANCE = np.array([0.6, 0.25, 0.1, 0.05])  # that a dependence has each: small ones are common
+STEP = float(np.sqrt(SIZES[1] / SIZES[0]))  # half the distance of two sizes, as a factor
+NODES = 7  # of a curve over speed: as a table of duties has
+LATEST = 10  # steps that a response to a command may last
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One form of a dependence.
+
+    Attributes:
+        depends_on: the word that an answer says.
+        name: unique among all.
+        columns: (K, W, 3) in m and rad, for a gain of one, scaled by the share of the variance.
+        lasting: the function holds for other logs, too (of speed, heading, past); else only its
+            size does (of time, place).
+    """
+
+    depends_on: str
+    name: str
+    columns: np.ndarray = field(repr=False)
+    lasting: bool
+
+
+def kernels(m: Motion) -> list[Kernel]:
+    """All forms of dependences that compete, of the motion of one log."""
+    found = []
+    families = {
+        "time": (_of_time, False),
+        "place": (_of_place, False),
+        "heading": (_of_heading, True),
+        "speed": (_of_speed, True),
+        "coupling of turns": (_of_coupling, True),
+        "past": (_of_past, True),
+    }
+    for word, (family, lasting) in families.items():
+        for name, columns, share in family(m):
+            scaled = columns * np.sqrt(np.broadcast_to(share, len(columns)))[:, None, None]
+            # all columns stay, those of no use in this log too: another log's have the same places
+            if np.abs(scaled).max(initial=0.0) > 1e-9:
+                found.append(Kernel(word, f"{word}: {name}", scaled, lasting))
+    return found
+
+
+Form = tuple[str, np.ndarray, np.ndarray | float]
+
+
+def _of_time(m: Motion) -> Iterator[Form]:
+    for name, shortest_s, smooth_s in (("slow", 12.0, 8.0), ("quick", 3.0, 1.5)):
+        w, share = _waves(m.t_s, shortest_s, smooth_s)
+        yield f"{name} gain", _gains(m, w, "all"), share
+        yield f"{name} gain of travel", _gains(m, w, "travel"), share
+        yield f"{name} gain of turns", _gains(m, w, "turn"), share
+    w, share = _waves(m.t_s, 8.0, 4.0)
+    yield "push", _pushes(m, w, "room"), np.tile(share, 2)
+    yield "turning", _pushes(m, w, "turn"), share
+
+
+def _of_place(m: Motion) -> Iterator[Form]:
+    w, share = _over_floor(m, 6)
+    yield "gain of travel", _gains(m, w, "travel"), share
+    yield "gain of all", _gains(m, w, "all"), share
+    yield "gain of turns", _gains(m, w, "turn"), share
+    yield "push", _pushes(m, w, "room"), np.tile(share, 2)
+    yield "turning", _pushes(m, w, "turn"), share
+    (wx, share_x), (wy, share_y) = (_waves(p, 0.4, 0.12) for p in m.place.T)
+    both = np.concatenate([share_x, share_y]) / 2
+    yield "strips both ways", _gains(m, np.concatenate([wx, wy]), "travel"), both
+    yield "strips along x", _gains(m, wx, "travel"), share_x
+    yield "strips along y", _gains(m, wy, "travel"), share_y
+
+
+def _of_heading(m: Motion) -> Iterator[Form]:
+    low, high = _harmonics(m.heading, (1, 2)), _harmonics(m.heading, (3, 4))
+    yield "gain of travel", _gains(m, low, "travel"), 1 / 4
+    yield "gain of turns", _gains(m, low, "turn"), 1 / 4
+    yield "compass, twice a turn", _compass(m, (2,)), 1 / 2
+    yield "compass", _compass(m, (1, 2, 3)), np.repeat((0.5, 0.25, 0.1), 2)
+    yield "push of the body", _pushes(m, low, "body"), 1 / 4
+    yield "turning", _pushes(m, low, "turn"), 1 / 4
+    yield "gain, up to four times a turn", _gains(m, np.concatenate([low, high]), "all"), 1 / 8
+    course = m.heading + np.arctan2(m.moved[:, 1], m.moved[:, 0])
+    yield "gain by course", _gains(m, _harmonics(course, (1, 2, 4)), "travel"), 1 / 6
+
+
+def _of_speed(m: Motion) -> Iterator[Form]:
+    axes = np.eye(3)
+    speed = np.hypot(m.moved[:, 0], m.moved[:, 1])
+    curves = [
+        _hats(np.abs(m.moved[:, k]), m.top[k], NODES)[1:, :, None] * (m.moved * axes[k])
+        for k in range(3)
+    ]
+    for name, curve in zip(("forward", "left", "turn"), curves, strict=True):
+        yield f"curve of {name}", curve, 1.0
+    plane = _hats(speed, m.top[3], NODES)[1:, :, None] * (m.moved * (1, 1, 0))
+    yield "curve of travel", plane, 1.0
+    yield "curve of each axis", np.concatenate(curves), 1.0
+    signed = [
+        _hats(np.abs(m.moved[:, k]), m.top[k], 4)[1:, :, None] * (np.abs(m.moved) * axes[k])
+        for k in range(3)
+    ]
+    yield "curve that differs backwards", np.concatenate(signed), 1 / 4
+
+
+def _of_coupling(m: Motion) -> Iterator[Form]:
+    forward, left, turn = (m.moved / m.usual).T
+    linear = ((turn, 0), (turn, 1), (forward, 1), (forward, 2), (left, 0), (left, 2))
+    products = (
+        (np.abs(turn), 0), (np.abs(forward), 2), (forward * turn, 1),
+        (left * turn, 0), (forward * np.abs(turn), 0), (left * np.abs(turn), 1),
+    )  # fmt: skip
+    yield "linear", _terms(linear, m.usual), 1 / 4
+    yield "products", _terms(products, m.usual), 1 / 4
+    spin = _hats(np.abs(m.moved[:, 2]), m.top[4], NODES)[1:, :, None]
+    yield "travel by rate of turn", spin * (m.moved * (1, 1, 0)), 1.0
+    speed = _hats(np.hypot(m.moved[:, 0], m.moved[:, 1]), m.top[3], NODES)[1:, :, None]
+    yield "turns by speed", speed * (m.moved * (0, 0, 1)), 1.0
+
+
+def _of_past(m: Motion) -> Iterator[Form]:
+    axes = np.eye(3)
+    share = np.exp(-np.arange(LATEST + 1) / 4.0) / 3.5  # decays over 0.4 s
+    late = [
+        np.array([(_later(m.instant[:, k], n) - m.moved[:, k])[:, None] * axes[k]
+                  for n in range(LATEST + 1)])
+        for k in range(3)
+    ]  # fmt: skip
+    yield "response of each axis", np.concatenate(late), np.tile(share, 3)
+    yield "response of the plane", np.concatenate(late[:2]), np.tile(share, 2)
+    yield "response of turns", late[2], share
+    size = np.abs(m.instant)
+    change = np.diff(size, axis=0, prepend=size[:1])
+    way = np.sign(m.instant + m.moved)
+    events = [
+        _later(what[:, k] * way[:, k], n)[:, None] * axes[k]
+        for what in (np.maximum(change, 0), np.maximum(-change, 0))
+        for k in range(3)
+        for n in (0, 1, 2, 4, 7)
+    ]
+    yield "after a rise or a fall", np.array(events), 0.3
+
+
+def _terms(terms, usual: np.ndarray) -> np.ndarray:
+    """(K, W, 3) of pairs of a unitless term (W,) and the axis that it moves."""
+    out = np.zeros((len(terms), len(terms[0][0]), 3))
+    for k, (term, axis) in enumerate(terms):
+        out[k, :, axis] = term * usual[axis]
+    return out
+
+
+def _later(values: np.ndarray, steps: int) -> np.ndarray:
+    """(W,) values so many steps later, zero before."""
+    moved = np.roll(values, steps)
+    moved[:steps] = 0
+    return moved
+
+
+def _gains(m: Motion, waves: np.ndarray, which: str) -> np.ndarray:
+    """(K, W, 3) displacements scaled by (K, W) waves: of travel, turns, or all alike."""
+    on = {"travel": (1, 1, 0), "turn": (0, 0, 1), "all": (1, 1, 1)}[which]
+    return waves[:, :, None] * (m.moved * on)
+
+
+def _pushes(m: Motion, waves: np.ndarray, frame: str) -> np.ndarray:
+    """(K', W, 3) displacements while the robot moves: along the room, the body, or a turn."""
+    c, s, zero = np.cos(m.heading), np.sin(m.heading), np.zeros(len(m.heading))
+    ways = {
+        "room": [(c, -s, zero), (s, c, zero)],
+        "body": [(zero + 1, zero, zero), (zero, zero + 1, zero)],
+        "turn": [(zero, zero, zero + 1)],
+    }[frame]
+    on = (waves * m.moves)[:, :, None]
+    return np.concatenate([on * np.column_stack(way) * m.usual for way in ways])
+
+
+def _compass(m: Motion, orders) -> np.ndarray:
+    """(2 K, W, 3) of a heading that is read wrong by harmonics of itself."""
+    out = []
+    for n in orders:
+        for wave, slope in ((np.cos, lambda a: -np.sin(a)), (np.sin, np.cos)):
+            off, turn = wave(n * m.heading), n * slope(n * m.heading)
+            ways = off * m.moved[:, 1], -off * m.moved[:, 0], turn * m.moved[:, 2]
+            out.append(np.column_stack(ways))
+    return np.array(out)
+
+
+def _waves(along: np.ndarray, shortest: float, smooth: float) -> tuple[np.ndarray, np.ndarray]:
+    """(K, W) cosines over a span, and the variance shares of a Matern 3/2 of that length scale."""
+    span = max(np.ptp(along), 1e-9)
+    k = np.arange(1, int(np.clip(2 * span / shortest, 3, 60)) + 1)
+    waves = np.sqrt(2) * np.cos(np.pi * k[:, None] * (along - along.min()) / span)
+    share = (1 + (np.pi * k / span * smooth) ** 2) ** -1.5
+    return waves, share / share.sum()
+
+
+def _harmonics(angle_rad: np.ndarray, orders) -> np.ndarray:
+    """(2 K, W) sines and cosines of an angle, of mean square one."""
+    each = [(np.cos(n * angle_rad), np.sin(n * angle_rad)) for n in orders]
+    return np.sqrt(2) * np.concatenate(each)
+
+
+def _hats(values: np.ndarray, top: float, count: int) -> np.ndarray:
+    """(count, W) linear interpolation between even nodes from 0 to top."""
+    at = np.clip(values / max(top, 1e-9), 0, 1) * (count - 1)
+    return np.maximum(1 - np.abs(at - np.arange(count)[:, None]), 0)
+
+
+def _over_floor(m: Motion, orders: int) -> tuple[np.ndarray, np.ndarray]:
+    """(K, W) products of cosines over the floor, and their variance shares."""
+    x, y = ((p - p.min()) / max(np.ptp(p), 1e-9) for p in m.place.T)
+    pairs = [(i, j) for i in range(orders) for j in range(orders) if 0 < i + j <= orders]
+    waves = [
+        (np.sqrt(2) if i else 1) * (np.sqrt(2) if j else 1)
+        * np.cos(np.pi * i * x) * np.cos(np.pi * j * y)
+        for i, j in pairs
+    ]  # fmt: skip
+    share = np.array([(1 + (i * i + j * j) / 4) ** -1.5 for i, j in pairs])
+    return np.array(waves), share / share.sum()

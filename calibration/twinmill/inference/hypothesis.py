@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A hypothesis: a base model with some effects, fitted, and linear about its best numbers."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import twinmill_native as native
+from scipy.special import log_ndtr
+
+from twinmill.inference.candidates import Candidate, size_std
+from twinmill.inference.evidence import Linear
+from twinmill.inference.noise import Noise
+from twinmill.inference.prior import Prior
+from twinmill.inference.steps import Steps
+from twinmill.model.parameters import (
+    WHERE_OR_WHEN,
+    effect_names,
+    instance_of,
+    key_of,
+    newest_instance,
+)
+
+ROUNDS = 6  # of Levenberg and Marquardt: most fits need three
+TRIES = 5  # dampings within a round
+SETTLED = 0.1  # units of the log posterior: less decides nothing
+LIMIT_SPREAD = 0.5  # prior of a limit about its start on the grid, relative: twice the grid's step
+MOVES = (1.0, 1.0, 0.4)  # times the reach, in turn, by which a place or a while is moved
+REACH = {"place": 0.075, "moment": 0.5}  # m, s: half of what a step of the grid leaves open
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of missing effects at its best numbers.
+
+    Numbers are `labels`: the base's, weights of its discrepancy, then those of effects.
+
+    Attributes:
+        effects: names, in the order in which they were added.
+        model: with them, at the best numbers.
+        labels: N of them; `named` (N,) says which are quantities of the model.
+        mean, cov: (N,), (N, N) of the prior.
+        low, high, step, value: (N,) bounds, steps of finite differences, best numbers.
+        one_sided: (N,) numbers whose prior is half a normal distribution.
+        grid: log evidence of what was integrated on a grid, by effect, less that of its best point.
+        slopes: (N, W, 3) change of the prediction with each number.
+        errors: (W, 3) at the best numbers.
+    """
+
+    effects: tuple[str, ...]
+    model: native.Model
+    labels: tuple[str, ...]
+    named: np.ndarray
+    mean: np.ndarray
+    cov: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    step: np.ndarray
+    value: np.ndarray
+    one_sided: np.ndarray
+    grid: dict[str, float] = field(default_factory=dict)
+    slopes: np.ndarray | None = field(default=None, repr=False)
+    errors: np.ndarray | None = field(default=None, repr=False)
+
+    @classmethod
+    def of_base(cls, model: native.Model, prior: Prior) -> "Hypothesis":
+        """The base alone, at the prior's mean."""
+        more = len(prior.mean) - len(prior.names)
+        wide = np.full(more, np.inf)
+        value = np.r_[np.clip(prior.mean[: len(prior.names)], prior.low, prior.high),
+                      prior.mean[len(prior.names):]]  # fmt: skip
+        return cls(
+            effects=(),
+            model=model,
+            labels=(*prior.names, *(f"discrepancy {k}" for k in range(more))),
+            named=np.r_[np.ones(len(prior.names), bool), np.zeros(more, bool)],
+            mean=prior.mean,
+            cov=prior.cov,
+            low=np.r_[prior.low, -wide],
+            high=np.r_[prior.high, wide],
+            step=np.r_[prior.step, np.ones(more)],
+            value=value,
+            one_sided=np.zeros(len(prior.mean), bool),
+            slopes=None,
+        )
+
+    @property
+    def of_effects(self) -> np.ndarray:
+        """(N,) numbers of effects that the hypothesis adds."""
+        added = {newest_instance(self.model, name) for name in self.effects}
+        return np.array([instance_of(n) in added for n in self.labels])
+
+    def linear(self, whiten, cov: np.ndarray | None = None) -> Linear:
+        """The linear model about the best numbers; `cov` in the place of the prior's."""
+        root = np.linalg.cholesky(self.cov if cov is None else cov)
+        x = whiten(self.slopes)
+        y = whiten(self.errors) + (self.value - self.mean) @ x
+        return Linear.of(y, root.T @ x)
+
+    def log_evidence(self, linear: Linear, cov: np.ndarray | None = None) -> float:
+        """Log evidence, with what was integrated on grids, and signs that cards demand.
+
+        A half normal prior doubles the density and cuts the posterior's share on the other side.
+        """
+        found = linear.log_evidence + sum(self.grid.values())
+        if not self.one_sided.any():
+            return found
+        mean, spread = self.posterior(linear, cov)
+        z = (mean - self.low)[self.one_sided] / np.sqrt(np.diag(spread)[self.one_sided])
+        return found + float(np.sum(np.log(2) + log_ndtr(z)))
+
+    def posterior(
+        self, linear: Linear, cov: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(N,) mean and (N, N) covariance; of a model with more columns than these, their part."""
+        root, count = np.linalg.cholesky(self.cov if cov is None else cov), len(self.mean)
+        spread = root @ linear.covariance[:count, :count] @ root.T
+        return self.mean + root @ linear.mean[:count], spread
+
+
+@dataclass(frozen=True)
+class Fitter:
+    """Fits hypotheses to the steps of a log under a noise.
+
+    Attributes:
+        steps, noise: of the log.
+        discrepancy: (K, W, 3) columns of the base's discrepancy.
+    """
+
+    steps: Steps
+    noise: Noise
+    discrepancy: np.ndarray
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """(..., 3 W) of (..., W, 3)."""
+        return self.noise.whiten(rows, self.steps.stretches)
+
+    def fit(self, h: Hypothesis, rounds: int = ROUNDS, known: int = 0) -> Hypothesis:
+        """Levenberg and Marquardt from its numbers; so many of the first slopes are kept."""
+        precision = np.linalg.inv(h.cov)
+        value, damping = np.clip(h.value, h.low, h.high), 1e-3
+        errors, cost = self._cost(h, value, precision)
+        slopes = h.slopes
+        for _ in range(rounds):
+            slopes = self._slopes(replace(h, value=value), slopes, known)
+            white = self.whiten(slopes)
+            gram = white @ white.T + precision
+            pull = white @ self.whiten(errors) - precision @ (value - h.mean)
+            fell = 0.0
+            for _ in range(TRIES):
+                step = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), pull)
+                trial = np.clip(value + step, h.low, h.high)
+                then, cost_then = self._cost(h, trial, precision)
+                if cost_then < cost:
+                    fell = cost - cost_then
+                    value, errors, cost, damping = trial, then, cost_then, damping / 10
+                    break
+                damping *= 10
+            if fell < SETTLED:
+                break
+        model = h.model.copy()
+        for name, v in zip(np.array(h.labels)[h.named], value[h.named], strict=True):
+            model.set(str(name), float(v))
+        found = replace(h, model=model, value=value, errors=errors)
+        return replace(found, slopes=self._slopes(found, slopes, known))
+
+    def with_effect(
+        self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float, told: bool = False
+    ) -> Hypothesis:
+        """The hypothesis with an effect more, fitted from a start.
+
+        Args:
+            h: without it.
+            c: the effect.
+            start: (P,) values of its parameters.
+            grid: log evidence of places, whiles or limits, less that of the best.
+            told: the base begins at the prior's mean: without the effect its numbers may have
+                gone far to stand in for it.
+        """
+        model = h.model.copy()
+        model.add_effect(c.name)
+        instance = newest_instance(model, c.name)
+        for p, v in zip(c.parameters, start, strict=True):
+            model.set(f"{instance}.{key_of(p.name)}", float(v))
+        local = np.array([p.role in WHERE_OR_WHEN for p in c.parameters])
+        limit = np.array([p.role == "limit" for p in c.parameters])[~local]
+        free = [p for p, here in zip(c.parameters, local, strict=True) if not here]
+        start = start[~local]
+        mean = np.where(limit, start, [p.usual for p in free])
+        std = np.where(limit, LIMIT_SPREAD * np.abs(start), [size_std(p) for p in free])
+        count = len(h.mean)
+        cov = np.zeros((count + len(free),) * 2)
+        cov[:count, :count] = h.cov
+        cov[range(count, len(cov)), range(count, len(cov))] = std**2
+        # clocks stay where they are: the prior hardly knows them
+        back = np.array([told and not name.startswith("clock.") for name in h.labels])
+        base = np.where(back & ~h.of_effects, h.mean, h.value)
+        grown = Hypothesis(
+            effects=(*h.effects, c.name),
+            model=model,
+            labels=(*h.labels, *(f"{instance}.{key_of(p.name)}" for p in free)),
+            named=np.r_[h.named, np.ones(len(free), bool)],
+            mean=np.r_[h.mean, mean],
+            cov=cov,
+            low=np.r_[h.low, [p.min for p in free]],
+            high=np.r_[h.high, [p.max for p in free]],
+            step=np.r_[h.step, [p.step or 1e-3 for p in free]],
+            value=np.r_[base, start],
+            one_sided=np.r_[
+                h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
+            ],
+            grid={**h.grid, c.name: grid},
+            slopes=h.slopes,
+        )
+        fitted = self.fit(grown, known=count)
+        return self._moved(fitted, c, instance) if local.any() else fitted
+
+    def without(self, h: Hypothesis, effect: str) -> Hypothesis:
+        """The hypothesis without one of its effects, fitted anew."""
+        model = h.model.copy()
+        instance = newest_instance(model, effect)
+        model.remove_effect(effect_names(model).index(instance))
+        keep = np.array([instance_of(n) != instance for n in h.labels])
+        part = {
+            k: getattr(h, k)[keep]
+            for k in ("named", "mean", "low", "high", "step", "value", "one_sided", "slopes")
+        }
+        less = replace(
+            h,
+            effects=tuple(n for n in h.effects if n != effect),
+            model=model,
+            labels=tuple(n for n, k in zip(h.labels, keep, strict=True) if k),
+            cov=h.cov[np.ix_(keep, keep)],
+            grid={k: v for k, v in h.grid.items() if k != effect},
+            **part,
+        )
+        return self.fit(less, rounds=3, known=int(keep.sum()))
+
+    def _cost(self, h: Hypothesis, value: np.ndarray, precision) -> tuple[np.ndarray, float]:
+        """Errors (W, 3) at some numbers, and the negative log posterior."""
+        names = np.array(h.labels)[h.named].tolist()
+        errors = self.steps.errors(h.model, names, value[h.named])[0]
+        errors -= np.tensordot(value[~h.named], self.discrepancy, 1) if (~h.named).any() else 0.0
+        white, away = self.whiten(errors), value - h.mean
+        return errors, float(0.5 * white @ white + 0.5 * away @ precision @ away)
+
+    def _slopes(self, h: Hypothesis, slopes: np.ndarray | None, known: int) -> np.ndarray:
+        """(N, W, 3) change of the prediction with each number; so many of the first as they were."""
+        count = len(h.value)
+        if known == count and slopes is not None:
+            return slopes
+        out = np.empty((count, len(self.steps), 3))
+        out[:known] = slopes[:known] if known else 0.0
+        if not h.named.all():
+            out[~h.named] = self.discrepancy
+        fresh = np.flatnonzero(h.named & (np.arange(count) >= known))
+        up = np.where(h.value + h.step <= h.high, h.step, -h.step)
+        points = np.tile(h.value, (2 * len(fresh), 1))
+        points[np.arange(len(fresh)), fresh] += up[fresh]
+        points[len(fresh) + np.arange(len(fresh)), fresh] -= up[fresh]
+        points = np.clip(points, h.low, h.high)
+        apart = (
+            points[np.arange(len(fresh)), fresh]
+            - points[len(fresh) :][np.arange(len(fresh)), fresh]
+        )
+        names = np.array(h.labels)[h.named].tolist()
+        errors = self.steps.errors(h.model, names, points[:, h.named])
+        difference = errors[len(fresh) :] - errors[: len(fresh)]
+        out[fresh] = difference / np.where(apart, apart, np.inf)[:, None, None]
+        return out
+
+    def _moved(self, h: Hypothesis, c: Candidate, instance: str) -> Hypothesis:
+        """Place or while moved to the best near by, all else held; then all else is fitted anew."""
+        own = [p for p in c.parameters if p.role in WHERE_OR_WHEN]
+        names = [f"{instance}.{key_of(p.name)}" for p in own]
+        reach = np.array([REACH[p.role] for p in own])
+        low, high = (np.array([getattr(p, k) for p in own]) for k in ("min", "max"))
+        at = np.array([h.model.get(n) for n in names])
+        for share in MOVES:
+            moves = np.concatenate([sign * np.diag(reach * share) for sign in (-2, -1, 1, 2)])
+            tries = np.clip(np.vstack([at, at + moves]), low, high)
+            white = self.whiten(self.steps.errors(h.model, names, tries) - self._always(h))
+            at = tries[int(np.argmin((white**2).sum(axis=1)))]
+        model = h.model.copy()
+        for name, v in zip(names, at, strict=True):
+            model.set(name, float(v))
+        base = len(h.labels) - len(c.parameters) + len(own)
+        return self.fit(replace(h, model=model), rounds=3, known=base)
+
+    def _always(self, h: Hypothesis) -> np.ndarray | float:
+        """(W, 3) the base's discrepancy at the best weights."""
+        weights = h.value[~h.named]
+        return np.tensordot(weights, self.discrepancy, 1) if len(weights) else 0.0

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Posterior probabilities of what is missing, from a table of evidence and prior odds.
+
+Three kinds of hypotheses compete: effects of the catalogue with or without a dependence that is a
+thing of its own; a dependence alone; and an unnamed thing that an effect mimics, of which the
+dependence is the part that the effect's form does not take. The data cannot tell the first from
+the last by likelihood where both hold the same columns; the prior of the sizes does.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from twinmill.inference.search import log_prior_of_effects
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.table import Entry, Table, subsets
+
+DRAWS = 400  # of blocks
+
+
+@dataclass(frozen=True)
+class Belief:
+    """One hypothesis and its probability.
+
+    Attributes:
+        effects: of the catalogue that are missing.
+        mimicked: effects in whose place one unnamed thing is; empty if none is.
+        stale: the base is known no better than a data sheet.
+        words: dependences.
+        probability: of it.
+        fall: of the squares by the dependence.
+    """
+
+    effects: tuple[str, ...]
+    mimicked: tuple[str, ...]
+    stale: bool
+    words: tuple[str, ...]
+    probability: float
+    fall: float
+
+    @property
+    def nothing(self) -> bool:
+        """Nothing is missing but better numbers of the base."""
+        return not (self.effects or self.mimicked or self.words)
+
+    @property
+    def outside(self) -> bool:
+        """Something is missing, and nothing of the catalogue."""
+        return not self.effects and not self.nothing
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Effects that its model has, those that are mimicked too."""
+        return (*self.effects, *self.mimicked)
+
+
+def beliefs(table: Table) -> list[Belief]:
+    """All hypotheses with their probabilities, which add up to one.
+
+    Blocks of time are drawn again and again (Bayesian bootstrap; pseudo-BMA+ of Yao et al. 2018,
+    Bayesian Analysis 13), so that what few blocks speak for, or some against, is not sure.
+    """
+    rows = [row for entry in table.entries for row in _rows(entry, table)]
+    logs = np.array([log for _, log, _ in rows])
+    blocks = np.array([e.blocks for _, _, e in rows])
+    rest = logs - blocks.sum(axis=1)
+    count = blocks.shape[1]
+    drawn = np.random.default_rng(0).dirichlet(np.ones(count), DRAWS) * count
+    each = blocks @ drawn.T + rest[:, None]
+    p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
+    return [
+        Belief(
+            tuple(n for n in e.effects if n not in mimicked),
+            mimicked,
+            e.stale,
+            e.words,
+            float(v),
+            e.fall,
+        )
+        for (mimicked, _, e), v in zip(rows, p, strict=True)
+    ]
+
+
+def _rows(entry: Entry, table: Table) -> list[tuple[tuple[str, ...], float, Entry]]:
+    """Effects that are mimicked, log posterior up to a constant, and the entry."""
+    count = len(entry.effects)
+    stale = np.log(PRIORS.stale if entry.stale else 1 - PRIORS.stale)
+    each = np.log(PRIORS.outside / len(table.words))
+    other = len(entry.words) * each if entry.words else np.log(1 - PRIORS.outside)
+    real = stale + other + log_prior_of_effects(count, table.candidates) + entry.log_evidence
+    rows = [((), float(real), entry)]
+    for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
+        if np.isfinite(log_evidence):
+            # the first word is no further thing, but the part that the effects' forms do not take
+            like = -len(names) * np.log(table.candidates)
+            rest = log_prior_of_effects(count - len(names), table.candidates)
+            rows.append((names, float(stale + other + like + rest + log_evidence), entry))
+    return rows

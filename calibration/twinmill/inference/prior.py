@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of a base model before a log is seen: a joint normal distribution of its numbers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import twinmill_native as native
+from scipy.linalg import block_diag
+
+from twinmill.inference.discrepancy import Kernel
+from twinmill.inference.duties import refined
+from twinmill.inference.moments import Rate
+from twinmill.inference.settings import PRIORS
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import (
+    CLOCK,
+    CLOCK_RATE,
+    LAG,
+    base_parameters,
+    duty_table,
+    gains_of,
+)
+
+CLOCK_STD_S = 1.0  # of an offset that nothing is known of, about the best that was looked for
+RATE_STD_PPM = 30.0  # of two quartz clocks; see shared conventions in docs/conventions.md
+SAME_STD_S, SAME_STD_PPM = 1e-4, 0.01  # of one clock that stamps all
+LEAST_STD = 1e-6  # relative, so that no direction is certain
+ROUGH = 0.3  # largest relative error of a speed of the duty table, which neighbours tell as well
+
+
+@dataclass(frozen=True)
+class Always:
+    """What a model misses in the log that it was fitted to, so that it is no news in another.
+
+    Attributes:
+        labels: names of the base's numbers, and of weights of its discrepancy, N of them.
+        mean, cov: (N,), (N, N) of these.
+        kernels: name and size of each kernel of the discrepancy.
+        rate: of moments.
+        usual, top: scale of the kernels, see `Motion`.
+        noise: (3, 3) sensor, drive, memory of each channel, see `Noise`.
+    """
+
+    labels: tuple[str, ...]
+    mean: np.ndarray
+    cov: np.ndarray
+    kernels: tuple[tuple[str, float], ...]
+    rate: Rate
+    usual: np.ndarray
+    top: np.ndarray
+    noise: np.ndarray
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A normal distribution of the base's numbers and of the weights of its discrepancy.
+
+    Attributes:
+        names: quantities of the base, P of them.
+        mean, cov: (P + K,), (P + K, P + K).
+        step, low, high: (P,) of finite differences, and bounds.
+        columns: (K, W, 3) of the discrepancy, m and rad.
+    """
+
+    names: list[str]
+    mean: np.ndarray
+    cov: np.ndarray
+    step: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    columns: np.ndarray = field(repr=False)
+
+    @property
+    def stale(self) -> np.ndarray:
+        """(P + K, P + K) covariance of a base of which nothing is known but a data sheet."""
+        cov = self.cov.copy()
+        for k, name in enumerate(self.names):
+            if name not in (CLOCK, CLOCK_RATE):
+                cov[k, k] += ((2 if name == LAG else 1) * PRIORS.sheet * self.mean[k]) ** 2
+        return cov
+
+
+def base_prior(model: native.Model, model_file: ModelFile, same_clock: bool, known: bool) -> Prior:
+    """From a model file: values, the covariance that a fit wrote, and how gains drift since.
+
+    Args:
+        model: of the robot, with the nodes of `duties.refined` if it is told duties.
+        model_file: its file.
+        same_clock: one clock stamps all, or other logs gave the offset.
+        known: other logs gave the offset.
+    """
+    names = [*gains_of(model)]
+    names += [LAG] * (model.get(LAG) > 0)
+    names += [CLOCK, CLOCK_RATE]
+    table = duty_table(model_file.model)
+    cov = _told(model_file, [*table, *names], same_clock, known)
+    if table:
+        names = [*duty_table(model), *names]
+        fine = refined(model_file)
+        rest = len(names) - len(fine.weights)
+        weights = block_diag(fine.weights, np.eye(rest))
+        cov = weights @ cov @ weights.T + np.diag(np.r_[fine.std_mps, np.zeros(rest)] ** 2)
+    parts = base_parameters(model, names)
+    value = np.array([p.value for p in parts])
+    return Prior(
+        names,
+        value,
+        cov + drift(names, value),
+        np.array([p.step for p in parts]),
+        np.array([p.min for p in parts]),
+        np.array([p.max for p in parts]),
+        np.zeros((0, 0, 3)),
+    )
+
+
+def _told(model_file: ModelFile, names: Sequence[str], same_clock: bool, known: bool) -> np.ndarray:
+    """(P, P) covariance of named quantities, as a model file tells it."""
+    model = model_file.model
+    cov = np.zeros((len(names),) * 2)
+    fitted = model_file.covariance.of(names)
+    own = [names.index(n) for n in fitted.names]
+    cov[np.ix_(own, own)] = fitted.values
+    unsure = model_file.unsure_speeds()
+    for k, name in enumerate(names):
+        if name in unsure:
+            cov[k, k] = min(unsure[name], ROUGH * model.get(name)) ** 2
+        elif name == CLOCK:
+            cov[k, k] = (
+                model_file.clock_std_s([]) ** 2 + SAME_STD_S**2 if same_clock else CLOCK_STD_S**2
+            )
+        elif name == CLOCK_RATE:
+            one = model.clock_same and not known
+            cov[k, k] = SAME_STD_PPM**2 if one else RATE_STD_PPM**2
+    return cov
+
+
+def drift(names: Sequence[str], value: np.ndarray) -> np.ndarray:
+    """(P, P) covariance of the change of a base's numbers between two logs."""
+    share = [
+        PRIORS.lag_drift if n == LAG else PRIORS.gain_drift if n.endswith("_gain") else LEAST_STD
+        for n in names
+    ]
+    return np.diag((np.array(share) * value[: len(names)]) ** 2 + LEAST_STD**2)
+
+
+def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
+    """The prior of a later log: numbers and discrepancy as the base's own log gave them.
+
+    Of a discrepancy that is not lasting only the size is known.
+
+    Args:
+        prior: from the model file.
+        always: of the base's own log.
+        found: kernels of the later log.
+    """
+    size = dict(always.kernels)
+    there = [k for k in found if k.name in size]
+    labels = [*prior.names, *(label for k in there for label in weight_labels(k))]
+    columns = [size[k.name] * k.columns for k in there]
+    count = len(prior.names)
+    mean = np.r_[prior.mean, np.zeros(len(labels) - count)]
+    cov = np.diag(np.r_[np.zeros(count), np.ones(len(labels) - count)])
+    cov[:count, :count] = prior.cov
+    known = {n: k for k, n in enumerate(always.labels)}
+    own = [k for k, n in enumerate(labels) if n in known]
+    index = [known[labels[k]] for k in own]
+    mean[own] = always.mean[index]
+    cov[np.ix_(own, own)] = always.cov[np.ix_(index, index)]
+    told = [k for k in own if k < count]
+    cov[np.ix_(told, told)] += drift([prior.names[k] for k in told], mean[told])
+    weights = [k for k in own if k >= count]
+    cov[weights, weights] += PRIORS.sheet**2
+    return replace(
+        prior, mean=mean, cov=cov, columns=np.concatenate(columns) if columns else prior.columns
+    )
+
+
+def weight_labels(kernel: Kernel) -> list[str]:
+    """One for each weight of a kernel."""
+    return [f"{kernel.name} {k}" for k in range(len(kernel.columns))]

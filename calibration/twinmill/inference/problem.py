@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One robot in one log, ready for inference: errors, prior, noise, and all that may be missing."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.measurement import Measurement
+from twinmill.inference import candidates, discrepancy, moments
+from twinmill.inference.candidates import Candidate
+from twinmill.inference.discrepancy import Kernel
+from twinmill.inference.duties import refined
+from twinmill.inference.evidence import Linear
+from twinmill.inference.hypothesis import Fitter, Hypothesis
+from twinmill.inference.moments import Rate
+from twinmill.inference.noise import Noise, first_noise, fit_noise, weights_of
+from twinmill.inference.prior import Always, Prior, base_prior, with_always
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.steps import Motion, Steps, motion_of
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import CLOCK, LAG
+
+CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between two commands
+CLOCK_REACH_S = 0.3  # about the best of the grid
+FLEXIBLE = 0.05  # gain error of each kernel while noise is looked for first
+SEEN = 0.5  # information in units of the prior, below which a direction says nothing of the noise
+NO_LAG_S = 1e-3
+
+
+@dataclass(frozen=True)
+class View:
+    """What may be missing, as it looks under a noise.
+
+    Attributes:
+        fitter: of the log, under that noise.
+        kernels: F nameless dependences.
+        stacked: (sum of K, R) their white columns.
+        parts: of each kernel in these.
+        grams: of each kernel, (K, K) products.
+        moments: (B, k, R) white columns, and (B k, B k) their products.
+        log_size: of the noise.
+        block: (R,) number of the block of time of each white row.
+    """
+
+    fitter: Fitter
+    kernels: list[Kernel]
+    stacked: np.ndarray
+    parts: list[slice]
+    grams: list[np.ndarray]
+    moments: tuple[np.ndarray, np.ndarray]
+    log_size: float
+    block: np.ndarray
+
+    def white(self, f: int) -> np.ndarray:
+        """(K, R) white columns of a kernel."""
+        return self.stacked[self.parts[f]]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One robot in one log.
+
+    Attributes:
+        steps: of the log.
+        motion: as the base predicts it.
+        prior: of the base.
+        base: fitted, nothing missing.
+        kernels: nameless dependences that compete.
+        names: of the effects that compete.
+        rate: of moments, as the base's own log had them; None where that is not known.
+        noise: what all flexible terms together leave.
+    """
+
+    steps: Steps
+    motion: Motion
+    prior: Prior
+    base: Hypothesis
+    kernels: list[Kernel]
+    names: list[str]
+    rate: Rate | None
+    noise: Noise
+
+    def view(self, noise: Noise) -> View:
+        """What may be missing, under a noise."""
+        fitter = Fitter(self.steps, noise, self.prior.columns)
+        stacked = fitter.whiten(np.concatenate([k.columns for k in self.kernels]))
+        edges = np.cumsum([0, *(len(k.columns) for k in self.kernels)])
+        parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        at_moments = fitter.whiten(moments.columns(self.motion))
+        flat = at_moments.reshape(-1, at_moments.shape[-1])
+        return View(
+            fitter,
+            self.kernels,
+            stacked,
+            parts,
+            [stacked[part] @ stacked[part].T for part in parts],
+            (at_moments, flat @ flat.T),
+            noise.log_size(len(self.steps), self.steps.observed),
+            np.tile(self.steps.block, 3),
+        )
+
+    def columns(self, h: Hypothesis) -> dict[str, Candidate]:
+        """What each effect that a hypothesis lacks would change beside it, the base as it is known."""
+        model = h.model.copy()
+        for label, named, mean in zip(h.labels, h.named, h.mean, strict=True):
+            if named and label in self.prior.names and not label.startswith("clock."):
+                model.set(label, float(mean))
+        found = {}
+        for name in self.names:
+            if name not in h.effects:
+                try:
+                    found[name] = candidates.candidate(name, model, self.steps)
+                except ValueError:  # this model cannot have it
+                    continue
+        return found
+
+
+def problem_of(
+    measurement: Measurement,
+    model_file: ModelFile,
+    always: Always | None = None,
+    sheet: bool = False,
+) -> Problem:
+    """Prepares a log.
+
+    Args:
+        measurement: of one robot.
+        model_file: its base model.
+        always: what the model misses in the log that it was fitted to.
+        sheet: nothing of the base is known but a data sheet.
+    """
+    measurement = measurement.punctual()
+    whole = model_file.model
+    if whole.drive == "duty":
+        whole = refined(model_file).model
+    model = whole.for_robot(measurement.track.robot_id)
+    known = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
+    known = known and not measurement.two_clocks
+    if measurement.same_clock and not known:
+        model.set(CLOCK, 0.0)
+    declared = measurement.same_clock or model.clock_same
+    same_clock = (known or declared) and measurement.lateness is None
+    steps = Steps(measurement)
+    prior = base_prior(model, model_file, same_clock, known)
+    if sheet:
+        prior = replace(prior, cov=prior.stale)
+    if not same_clock:
+        prior = _with_clock(prior, model, steps)
+    motion = _motion(steps, model, always)
+    found = discrepancy.kernels(motion)
+    if always is not None:
+        prior = with_always(prior, always, found)
+    noise = _begin_noise(steps, model_file, always)
+    base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
+    names = candidates.candidates(model, measurement.track, same_clock, declared)
+    rate = always.rate if always else None
+    rough = Problem(steps, motion, prior, base, found, names, rate, noise)
+    noise = _flexible_noise(rough)
+    base = Fitter(steps, noise, prior.columns).fit(base)
+    return replace(rough, noise=noise, base=base)
+
+
+def _with_clock(prior: Prior, model: native.Model, steps: Steps) -> Prior:
+    """The prior about the offset of the clocks at which the errors are least."""
+    grid = CLOCK_GRID_S + model.get(CLOCK)
+    errors = steps.errors(model, [CLOCK], grid[:, None])
+    size = np.sqrt((errors**2).mean(axis=(0, 1)))
+    size = np.where(size > 0, size, 1.0)
+    best = float(grid[np.argmin(((errors / size) ** 2).sum(axis=(1, 2)))])
+    k = prior.names.index(CLOCK)
+    mean, low, high = prior.mean.copy(), prior.low.copy(), prior.high.copy()
+    mean[k], low[k], high[k] = best, best - CLOCK_REACH_S, best + CLOCK_REACH_S
+    model.set(CLOCK, best)
+    return replace(prior, mean=mean, low=low, high=high)
+
+
+def _motion(steps: Steps, model: native.Model, always: Always | None) -> Motion:
+    moved = steps.predicted(model)
+    instant = moved
+    if model.get(LAG) > 0:
+        quick = model.copy()
+        quick.set(LAG, NO_LAG_S)
+        instant = steps.predicted(quick)
+    return motion_of(steps, moved, instant, (always.usual, always.top) if always else None)
+
+
+def _begin_noise(steps: Steps, model_file: ModelFile, always: Always | None) -> Noise:
+    step_s = float(np.median(steps.step_s))
+    if always is not None:
+        return Noise(*always.noise, step_s)
+    return first_noise(step_s, model_file.recorded_noise)
+
+
+def _flexible_noise(p: Problem) -> Noise:
+    """The noise that all effects and all dependences together leave; far errors weigh less."""
+    fitter = Fitter(p.steps, p.noise, p.prior.columns)
+    free = [np.tensordot(np.linalg.cholesky(p.base.cov).T, p.base.slopes, 1)]
+    for c in p.columns(p.base).values():
+        if c.masks is None and len(c.columns):
+            free.append(PRIORS.size * c.columns)
+    free += [FLEXIBLE * k.columns for k in p.kernels]
+    columns = np.concatenate(free)
+    white = fitter.whiten(columns)
+    values, ways = np.linalg.eigh(white @ white.T)
+    columns = np.tensordot(ways[:, values > SEEN].T, columns, 1)
+    noise = fit_noise(p.base.errors, columns, p.steps.stretches, p.noise)
+    white = noise.whiten(columns, p.steps.stretches)
+    y = noise.whiten(p.base.errors, p.steps.stretches)
+    left = Linear.of(y, white).residuals.reshape(3, -1)
+    return replace(noise, weight=weights_of(left))

@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Search over sets of effects.
+
+Nothing is accepted or refused on the way: a set that was fitted competes in the end. Moves: one
+effect more, one exchanged, one left out.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from twinmill.inference.candidates import Candidate
+from twinmill.inference.discrepancy import CHANCE, SIZES
+from twinmill.inference.evidence import Linear, gains_by_size
+from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.moments import MOMENTS
+from twinmill.inference.problem import Problem, View
+from twinmill.inference.settings import PRIORS
+
+MOST = 4  # effects of a set
+FITTED = 6  # effects that are fitted beside the best set, by what each would gain alone ...
+BESIDE = 2  # ... and beside the likeliest dependence
+INSTEAD = 2  # effects tried in the place of each one of the best sets
+SETS = 2  # best sets whose effects are exchanged, within ...
+NEAR = 4.0  # ... this log odds of the best
+WORTH = -3.0  # gain in log evidence below which an effect is not fitted
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Of one hypothesis under one noise.
+
+    Attributes:
+        hypothesis: with its best numbers.
+        linear: the linear model.
+        alone: log evidence with no dependence.
+        gains, falls: (F, S) gain in log evidence, and fall of the squares, by each kernel and size.
+        taken: (Q, R) orthonormal rows that span what the effects change: a dependence is the part
+            that they do not take.
+    """
+
+    hypothesis: Hypothesis
+    linear: Linear
+    alone: float
+    gains: np.ndarray
+    falls: np.ndarray
+    taken: np.ndarray
+
+    def white(self, view: View, f: int) -> np.ndarray:
+        """(K, R) white columns of a kernel, without what the effects take."""
+        columns = view.white(f)
+        return columns - (columns @ self.taken.T) @ self.taken
+
+
+class Search:
+    """Sets of effects that were fitted, with their evidence under the first noise."""
+
+    def __init__(self, problem: Problem, progress: Callable[[str], None] = lambda _: None) -> None:
+        self.problem = problem
+        self.view = problem.view(problem.noise)
+        self.progress = progress
+        self.fitted: dict[tuple[str, ...], Evidence] = {}
+        self.words = (*dict.fromkeys(k.depends_on for k in problem.kernels), MOMENTS)
+        self._keep(problem.base)
+
+    def run(self) -> "Search":
+        """Forward while more effects are likelier, then exchanges among the best sets."""
+        frontier = self.problem.base
+        for depth in range(MOST):
+            self.progress(f"effect {depth + 1}")
+            grown = self._grow(frontier, FITTED - depth, BESIDE)
+            if not grown:
+                break
+            best = max(grown, key=lambda h: self._log_posterior(h.effects))
+            if self._log_posterior(best.effects) < max(map(self._log_posterior, self.fitted)):
+                break
+            frontier = best
+        self.progress("exchanging effects")
+        self._exchange()
+        return self
+
+    def likely(self) -> list[tuple[str, ...]]:
+        """Sets of effects that were fitted, likeliest first."""
+        return sorted(self.fitted, key=self._log_posterior, reverse=True)
+
+    def _exchange(self) -> None:
+        asked: set[tuple[tuple[str, ...], str]] = set()
+        for _ in range(SETS):
+            order = self.likely()
+            least = self._log_posterior(order[0]) - NEAR
+            for names in [k for k in order if self._log_posterior(k) > least][:SETS]:
+                for name in names if len(names) > 1 else ():
+                    if (names, name) not in asked:
+                        asked.add((names, name))
+                        self._grow(self._without(names, name), INSTEAD, 1, never=name)
+            if self.likely()[0] == order[0]:
+                return
+
+    def _without(self, names: tuple[str, ...], name: str) -> Hypothesis:
+        rest = tuple(n for n in names if n != name)
+        for own in self.fitted:
+            if sorted(own) == sorted(rest):
+                return self.fitted[own].hypothesis
+        less = self.view.fitter.without(self.fitted[names].hypothesis, name)
+        self._keep(less)
+        return less
+
+    def _grow(self, h: Hypothesis, alone: int, beside: int, never: str = "") -> list[Hypothesis]:
+        """Fits the likeliest sets of one effect more."""
+        own = self.fitted[h.effects]
+        columns = self.problem.columns(h)
+        gains = screened(own.linear, columns, self.view)
+        order = sorted((n for n in gains if n != never), key=lambda n: -gains[n][0])[:alone]
+        if own.gains.max() > 0:
+            f, s = np.unravel_index(own.gains.argmax(), own.gains.shape)
+            with_likely = own.linear.with_columns(SIZES[s] * own.white(self.view, f))
+            other = screened(with_likely, columns, self.view)
+            more = sorted((n for n in other if n != never), key=lambda n: -other[n][0])[:beside]
+            gains |= {n: other[n] for n in more if n not in order}
+            order += [n for n in more if n not in order]
+        known = {tuple(sorted(k)) for k in self.fitted}
+        grown = []
+        for name in order:
+            gain, start, grid = gains[name]
+            if gain < WORTH or tuple(sorted((*h.effects, name))) in known:
+                continue
+            found = self._fitted(h, columns[name], start, grid)
+            self._keep(found)
+            grown.append(found)
+        return grown
+
+    def _fitted(self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float) -> Hypothesis:
+        """From the linear start, and where the effect may be bent from its default strength too."""
+        fitter = self.view.fitter
+        found = fitter.with_effect(h, c, start, grid)
+        if c.masks is not None or c.fixed is not None:
+            return found
+        value, usual, low, high = (
+            np.array([getattr(p, k) for p in c.parameters])
+            for k in ("value", "usual", "min", "max")
+        )
+        best = found.log_evidence(found.linear(fitter.whiten))
+        for other in [start] if len(value) > 1 else [value, 2 * usual - value]:
+            other = np.clip(other, low, high)
+            if np.any(np.abs(other - usual) > 1e-12):
+                again = fitter.with_effect(h, c, other, grid, told=True)
+                then = again.log_evidence(again.linear(fitter.whiten))
+                if then > best:
+                    found, best = again, then
+        return found
+
+    def _keep(self, h: Hypothesis) -> None:
+        self.fitted[h.effects] = evidence(h, self.view)
+
+    def _log_posterior(self, names: tuple[str, ...]) -> float:
+        """Of a set at its best: alone or with the likeliest dependence, up to a constant."""
+        own = self.fitted[names]
+        forms = len(self.problem.kernels)
+        other = float((own.gains + np.log(CHANCE)).max()) - np.log(forms)
+        best = max(np.log(1 - PRIORS.outside), np.log(PRIORS.outside) + other)
+        return own.alone + log_prior_of_effects(len(names), len(self.problem.names)) + best
+
+
+def log_prior_of_effects(count: int, candidates: int) -> float:
+    """Log prior of a set of so many effects."""
+    each = count * np.log(PRIORS.effects / candidates)
+    return float(each + max(count - 1, 0) * np.log(PRIORS.further))
+
+
+def evidence(
+    h: Hypothesis,
+    view: View,
+    cov: np.ndarray | None = None,
+    beside: np.ndarray | None = None,
+) -> Evidence:
+    """Evidence of a hypothesis alone and with each dependence.
+
+    Args:
+        h: the hypothesis.
+        view: under a noise.
+        cov: prior covariance in the place of its own.
+        beside: (K, R) white columns of a dependence that is there as well.
+    """
+    linear = h.linear(view.fitter.whiten, cov)
+    if beside is not None and len(beside):
+        linear = linear.with_columns(beside)
+    taken = _taken(h, view)
+    inside = view.stacked @ taken.T
+    cross = view.stacked @ linear.basis.T - inside @ (taken @ linear.basis.T)
+    push = view.stacked @ linear.y - inside @ (taken @ linear.y) - cross @ linear.half
+    each = []
+    for part, gram in zip(view.parts, view.grams, strict=True):
+        own = np.concatenate([cross[part], inside[part]], axis=1)
+        each.append(gains_by_size(gram - own @ own.T, push[part], SIZES))
+    return Evidence(
+        h,
+        linear,
+        h.log_evidence(linear, cov),
+        np.array([g for g, _ in each]),
+        np.array([f for _, f in each]),
+        taken,
+    )
+
+
+def _taken(h: Hypothesis, view: View) -> np.ndarray:
+    """(Q, R) orthonormal rows that span the white columns of the effects' numbers."""
+    own = (
+        view.fitter.whiten(h.slopes[h.of_effects]) if h.effects else np.zeros((0, len(view.block)))
+    )
+    return np.linalg.qr(own.T)[0].T
+
+
+def screened(
+    linear: Linear, columns: dict[str, Candidate], view: View
+) -> dict[str, tuple[float, np.ndarray, float]]:
+    """Of each effect, were it linear: gain in log evidence, best numbers, and offset of its grid."""
+    left = linear.y - linear.half @ linear.basis
+    return {
+        name: _screened(c, linear.basis, left, view.fitter.whiten) for name, c in columns.items()
+    }
+
+
+def _screened(c: Candidate, basis: np.ndarray, left: np.ndarray, whiten):
+    if c.fixed is not None:
+        white = whiten(c.fixed)
+        cross = white @ basis.T
+        gains = white @ left - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
+        best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
+        return total, c.at[best], total - float(gains[best])
+    masks = np.ones((1, c.columns.shape[1])) if c.masks is None else c.masks
+    white = PRIORS.size * np.stack([whiten(masks[:, :, None] * own) for own in c.columns], axis=1)
+    cross = white @ basis.T
+    gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2) + np.eye(len(c.columns))
+    push = white @ left
+    solved = np.linalg.solve(gram, push[..., None])[..., 0]
+    gains = 0.5 * (push * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
+    if c.one_sided.any():
+        spread = np.sqrt(np.diagonal(np.linalg.inv(gram), axis1=1, axis2=2))
+        sided = np.log(2) + log_ndtr(solved / spread)
+        gains = gains + np.where(c.one_sided, sided, 0.0).sum(axis=1)
+    best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
+    start = np.array([p.usual for p in c.parameters], float)
+    strength = np.array([p.value - p.usual for p in c.parameters])
+    start[c.sizes] += PRIORS.size * solved[best] * strength[c.sizes]
+    start = np.clip(start, [p.min for p in c.parameters], [p.max for p in c.parameters])
+    if c.masks is not None:
+        local = [k for k in range(len(start)) if k not in c.sizes]
+        start[local] = c.at[best]
+    return total, start, total - float(gains[best])

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The numbers that can move an answer: prior probabilities, prior widths, and what words mean."""
+
+from dataclasses import dataclass
+
+from twinmill.settings import Numbers, number
+
+
+@dataclass(frozen=True)
+class Priors(Numbers):
+    """Prior knowledge; none was set on a case. Sizes are standard deviations."""
+
+    effects: float = number(1.0, "expected number of missing effects, over the whole catalogue")
+    further: float = number(0.1, "factor on the prior odds of each effect after the first")
+    outside: float = number(0.3, "probability that something outside the catalogue is there")
+    stale: float = number(0.1, "probability that the base is known no better than a data sheet")
+    size: float = number(2.0, "size of an effect, times its card's default strength")
+    gain_drift: float = number(0.02, "drift of gains between logs of one robot, relative")
+    lag_drift: float = number(0.05, "drift of the motor lag between logs, relative")
+    sheet: float = number(
+        0.15,
+        "error of a data sheet's speeds, relative, its lag twice that; of what another log told of a discrepancy, times its size",
+    )
+    moments: float = number(0.05, "expected share of half seconds in which something happens")
+    sudden: float = number(0.5, "gain error at such a moment; push over the usual speed")
+    sure: float = number(0.95, "posterior probability from which an answer is called sure")
+    member: float = number(0.05, "posterior probability from which a name belongs to a group")
+
+
+PRIORS = Priors()

@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prediction errors over short steps of a log, and what happened during each step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.measurement import Measurement
+from twinmill.model.parameters import CLOCK
+
+STEP_S = 0.1  # shorter than the memories looked for, long against the time between poses
+FEWEST = 10  # steps of a stretch: a shorter one has hardly a step that its start does not touch
+BLOCK_S, FEWEST_BLOCKS = 8.0, 6  # blocks of time counted as independent, as in `predict.datasets`
+
+
+class Steps:
+    """Displacements over W steps that do not overlap, seen from the pose at each start.
+
+    The covariance of their errors can be written down (`noise`): white noise of the poses enters as
+    a difference, a disturbance of the velocity with its memory.
+
+    Attributes:
+        stretches: slices of steps that follow each other without a gap.
+        t_s, step_s: (W,) middle and length of each step, on the capture's clock.
+        place, heading: (W, 2) m and (W,) rad in the middle of each step.
+        block: (W,) number of the block of time.
+        observed: (3,) channels (forward, left, turn) that were measured.
+    """
+
+    def __init__(self, measurement: Measurement) -> None:
+        self.measurement = measurement
+        track = measurement.track
+        self._starts, self._ends, self.stretches = _cut(track)
+        start, end = track.pose[self._starts], track.pose[self._ends]
+        self.t_s = (track.pose_t_s[self._starts] + track.pose_t_s[self._ends]) / 2
+        self.step_s = track.pose_t_s[self._ends] - track.pose_t_s[self._starts]
+        self.place = (start[:, :2] + end[:, :2]) / 2
+        self.observed = np.array([True, True, track.has_heading])
+        smooth_rad = track.heading_smooth[self._starts]
+        self.heading = (start[:, 2] + end[:, 2]) / 2 if track.has_heading else smooth_rad
+        self._start = np.column_stack([start[:, :2], smooth_rad])
+        self._measured = np.column_stack([_ahead(end - start, smooth_rad), np.zeros(len(start))])
+        if track.has_heading:  # from reading to reading, so that its noise is a difference as well
+            self._measured[:, 2] = end[:, 2] - start[:, 2]
+        span_s = self.t_s - self.t_s[0]
+        length_s = min(BLOCK_S, span_s[-1] / FEWEST_BLOCKS)
+        self.block = np.maximum(np.floor(span_s / length_s - 1e-9), 0).astype(int)
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def errors(self, model: native.Model, names=(), values=None) -> np.ndarray:
+        """(B, W, 3) m and rad measured less predicted, for B rows of values of named quantities.
+
+        Without names (1, W, 3) of the model as it stands.
+        """
+        names = list(names) or [CLOCK]
+        values = np.array([[model.get(CLOCK)]]) if values is None else np.atleast_2d(values)
+        measured = self._measured[:, None].copy()
+        found = native.window_errors(
+            model,
+            self.measurement.started,
+            self._starts,
+            self._ends[:, None].copy(),
+            names,
+            np.asarray(values, float),
+            self._start,
+            measured,
+            np.ones_like(measured),
+        )
+        return found.reshape(len(values), len(self), 3) * self.observed
+
+    def predicted(self, model: native.Model) -> np.ndarray:
+        """(W, 3) displacements in m and rad that a model predicts."""
+        return self._measured - self.errors(model)[0]
+
+
+def _cut(track) -> tuple[np.ndarray, np.ndarray, list[slice]]:
+    """Poses at which steps start and end, and the stretches of steps."""
+    period_s = track.timing.pose_period_s
+    every_s = max(1, round(STEP_S / period_s)) * period_s
+    starts, ends, lengths = [], [], []
+    for number in np.unique(track.segment[track.segment >= 0]):
+        index = np.flatnonzero(track.segment == number)
+        t_s = track.pose_t_s[index]
+        grid_s = np.arange(t_s[0], t_s[-1], every_s)
+        at = np.unique(index[np.searchsorted(t_s, grid_s - period_s / 2)])
+        if len(at) > FEWEST:
+            starts.append(at[:-1])
+            ends.append(at[1:])
+            lengths.append(len(at) - 1)
+    edges = np.cumsum([0, *lengths])
+    stretches = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return (
+        np.concatenate(starts).astype(np.int64),
+        np.concatenate(ends).astype(np.int64),
+        stretches,
+    )
+
+
+def _ahead(step: np.ndarray, heading_rad: np.ndarray) -> np.ndarray:
+    """(W, 2) of (W, 3) displacements in W, seen along a heading."""
+    c, s = np.cos(heading_rad), np.sin(heading_rad)
+    return np.column_stack([c * step[:, 0] + s * step[:, 1], c * step[:, 1] - s * step[:, 0]])
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a dependence may look at: W steps as the base predicts them.
+
+    Attributes:
+        moved: (W, 3) displacements forward, left, turn in m and rad.
+        instant: (W, 3) displacements of the base without its motor lag.
+        t_s, step_s, place, heading: of the steps, see `Steps`.
+        usual: (3,) root mean square displacement of a step, of this log or of the base's own.
+        top: (5,) largest displacement along each axis, in the plane, and of turning in a step.
+    """
+
+    moved: np.ndarray
+    instant: np.ndarray
+    t_s: np.ndarray
+    step_s: np.ndarray
+    place: np.ndarray
+    heading: np.ndarray
+    usual: np.ndarray
+    top: np.ndarray
+
+    @property
+    def moves(self) -> np.ndarray:
+        """(W,) 1 where the robot moves, 0 where it stands, linear between."""
+        relative = np.abs(self.moved) / np.maximum(self.top[:3], 1e-9)
+        return np.clip(relative.max(axis=1) / 0.1, 0.0, 1.0)
+
+
+def motion_of(steps: Steps, moved: np.ndarray, instant: np.ndarray, scale=None) -> Motion:
+    """The motion of a log; `scale` (usual, top) is that of the base's own log, where it is known."""
+    return Motion(
+        moved, instant, steps.t_s, steps.step_s, steps.place, steps.heading,
+        *(scale or _scale(moved)),
+    )  # fmt: skip
+
+
+def _scale(moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    size = np.sqrt((moved**2).mean(axis=0))
+    plane = np.hypot(size[0], size[1])
+    way = np.hypot(moved[:, 0], moved[:, 1])
+    top = [*np.abs(moved).max(axis=0), way.max(), np.abs(moved[:, 2]).max()]
+    return np.array([plane, plane, max(size[2], 1e-6)]), np.array(top)

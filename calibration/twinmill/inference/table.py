@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The table of evidence: sets of effects, each alone and with nameless dependences."""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.special import logsumexp
+
+from twinmill.inference import moments
+from twinmill.inference.discrepancy import CHANCE, SIZES, STEP
+from twinmill.inference.evidence import Linear
+from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.moments import MOMENTS, Rate
+from twinmill.inference.noise import fit_noise
+from twinmill.inference.problem import Problem, View
+from twinmill.inference.search import Evidence, Search, evidence
+from twinmill.model.parameters import effect_names, newest_instance
+
+COMPARED = 10  # sets of the table ...
+WHOLE = 4  # ... of which so many also with a stale base and with two dependences
+WORTH = 1.5  # least gain of a further moment: half of what one costs
+DRAWS = 60  # of blocks, for the spread of estimates
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One hypothesis of the table: effects, whether the base is stale, and a dependence or two.
+
+    Attributes:
+        effects: names.
+        stale: the base's numbers are known no better than a data sheet's.
+        words: dependences.
+        log_evidence: integrated over numbers, forms and sizes.
+        log_mimicked: for each of `subsets`, the same where an unnamed thing is in its place, of
+            which the dependence is the part that the effect's form does not take.
+        blocks: (B,) log density of each block of time at the posterior mean.
+        fall: of the squares by the dependence.
+    """
+
+    effects: tuple[str, ...]
+    stale: bool
+    words: tuple[str, ...]
+    log_evidence: float
+    log_mimicked: tuple[float, ...]
+    blocks: np.ndarray
+    fall: float
+
+
+@dataclass(frozen=True)
+class Table:
+    """All that an answer is made of.
+
+    Attributes:
+        entries: hypotheses.
+        numbers: of each set of effects, name -> (value, standard deviation).
+        excess: squares that the base leaves over those of noise.
+        candidates: number of effects that compete.
+        words: dependences that compete.
+    """
+
+    entries: list[Entry]
+    numbers: dict[tuple[str, ...], dict[str, tuple[float, float]]]
+    excess: float
+    candidates: int
+    words: tuple[str, ...]
+
+
+def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """All sets of some of the effects, which one unnamed thing may be in the place of."""
+    counts = range(1, len(effects) + 1)
+    return [subset for n in counts for subset in combinations(effects, n)]
+
+
+def table_of(search: Search) -> Table:
+    """Evidence of the likely sets, each under the noise that suits it best of three.
+
+    Three noises: what all flexible terms leave, what the base leaves, what the best set leaves. With
+    one noise for all, slow drive noise is told as a dependence on time.
+    """
+    p, order = search.problem, search.likely()
+    inside = [k for k in search.fitted if set(k) < set(order[0])]
+    kept = list(dict.fromkeys([(), *order[:COMPARED], *inside]))
+    whole = {(), *order[:WHOLE]}
+    views = [search.view]
+    for h in dict.fromkeys([(), order[0]]):
+        search.progress("noise")
+        own = search.fitted[h].hypothesis
+        columns = np.tensordot(np.linalg.cholesky(own.cov).T, own.slopes, 1)
+        at_mean = own.errors + np.tensordot(own.value - own.mean, own.slopes, 1)
+        noise = fit_noise(at_mean, columns, p.steps.stretches, p.noise)
+        views.append(p.view(replace(noise, weight=p.noise.weight)))
+    entries: dict[tuple, Entry] = {}
+    falls: dict[tuple, float] = {}  # under the first noise, as the excess is
+    best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
+    for names in kept:
+        search.progress("comparing hypotheses")
+        h = search.fitted[names].hypothesis
+        changes = _changes(p, h)
+        within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
+        for view in views:
+            each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
+            squares = np.array([each[index].sum() for index in within])
+            own = _Comparison(p, search.words, h, squares, view)
+            of_noise = own.entries(names in whole)
+            for entry in of_noise:
+                key = entry.effects, entry.stale, tuple(sorted(entry.words))
+                falls.setdefault(key, entry.fall)
+                if key not in entries or entry.log_evidence > entries[key].log_evidence:
+                    entries[key] = entry
+            likely = max(entry.log_evidence for entry in of_noise)
+            if names and likely > best.get(names, (-np.inf,))[0]:
+                best[names] = likely, own
+    rows = len(p.steps) * int(p.steps.observed.sum())
+    return Table(
+        [replace(entry, fall=falls[key]) for key, entry in entries.items()],
+        {names: own.numbers() for names, (_, own) in best.items()},
+        max(search.fitted[()].linear.left - rows, 1e-9),
+        len(p.names),
+        search.words,
+    )
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """What is there beside a set of effects before more dependences are looked at.
+
+    Attributes:
+        words: dependences that it is; none for moments as often as usual.
+        white: (K, R) columns.
+        log_chance: prior of just these.
+        fall: of the squares by it; 0 if it is none.
+        log_relative: (M,) log prior of its size where it is what the form of each of `subsets`
+            leaves, over that of a thing of its own.
+        cov: prior covariance of a stale base; None for what is known.
+        local: (B,) what moments cost the evidence, in the blocks in which they are: where a block
+            counts less, so does the price of what happened in it.
+    """
+
+    words: tuple[str, ...]
+    white: np.ndarray
+    log_chance: float
+    fall: float
+    log_relative: np.ndarray
+    cov: np.ndarray | None
+    local: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """One set of effects under one noise."""
+
+    problem: Problem
+    words: tuple[str, ...]
+    h: Hypothesis
+    squares: np.ndarray  # (M,) that each of `subsets` takes
+    view: View
+
+    def entries(self, whole: bool) -> list[Entry]:
+        """Alone and with each dependence; if `whole`, also of a stale base, and with two."""
+        usual, news = self._moments(None)
+        own = self._evidence(usual)
+        out = [self._alone(usual), *self._with_words(usual, own), self._alone(news)]
+        if whole:
+            cov = self.h.cov.copy()
+            count = len(self.problem.prior.mean)
+            cov[:count, :count] = self.problem.prior.stale
+            stale, _ = self._moments(cov)
+            of_stale = self._evidence(stale)
+            out += [self._alone(stale), *self._with_words(stale, of_stale)]
+            for first in (news, self._likeliest(usual, own)):
+                if first.fall > 0:
+                    out += self._with_words(first, self._evidence(first))
+        return out
+
+    def numbers(self) -> dict[str, tuple[float, float]]:
+        """Estimates of the effects and their standard deviations, with the likeliest dependence.
+
+        As wide as the posterior, and as blocks of time drawn again and again let them scatter, which
+        is wider where the model's form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
+        """
+        usual, news = self._moments(None)
+        likely = self._likeliest(usual, self._evidence(usual))
+        every = [(b, self._linear(b)) for b in (usual, news, likely)]
+        linear = max(every, key=lambda b: b[1].log_evidence + b[0].log_chance)[1]
+        mean, spread = self.h.posterior(linear)
+        root, count = np.linalg.cholesky(self.h.cov), len(self.h.mean)
+        parts = [linear.x[:, self.view.block == b] for b in range(self.view.block.max() + 1)]
+        grams = np.array([part @ part.T for part in parts])
+        pushes = np.array([part @ linear.y[self.view.block == b] for b, part in enumerate(parts)])
+        draws = np.random.default_rng(0).dirichlet(np.ones(len(parts)), DRAWS) * len(parts)
+        drawn = [
+            root
+            @ np.linalg.solve(np.tensordot(w, grams, 1) + np.eye(len(linear.x)), w @ pushes)[:count]
+            for w in draws
+        ]
+        std = np.sqrt(np.maximum(np.diag(spread), np.var(drawn, axis=0)))
+        mean = np.clip(mean, self.h.low, self.h.high)
+        own = range(len(self.problem.prior.mean), count)
+        return {self.h.labels[k]: (float(mean[k]), float(std[k])) for k in own}
+
+    def _moments(self, cov: np.ndarray | None) -> tuple[_Beside, _Beside]:
+        """Moments as often as the base's own log had them, and as news."""
+        bare = self.h.linear(self.view.fitter.whiten, cov)
+        found = moments.find(bare, *self.view.moments, WORTH)
+        beside = []
+        for rate, words in ((self.problem.rate, ()), (Rate(), (MOMENTS,))):
+            on = found.on[: found.likeliest(rate)] if rate else ()
+            chance = float(rate.log_chance(np.array(len(on)), found.count)) if rate else 0.0
+            white = self.view.moments[0][list(on)].reshape(-1, len(self.view.block))
+            fall = 2 * float(found.gains[len(on)])
+            relative = self._log_relative(np.array(fall))
+            price = self._price(bare, white, chance, on)
+            beside.append(_Beside(words, white, chance, fall, relative, cov, price))
+        return beside[0], beside[1]
+
+    def _price(self, bare: Linear, white: np.ndarray, chance: float, on) -> np.ndarray:
+        """(B,) change of the evidence by moments less that of the density, in their blocks."""
+        count = self.view.block.max() + 1
+        if not len(on):
+            return np.zeros(count)
+        linear, block = bare.with_columns(white), self.view.block
+        density = linear.log_densities(block).sum() - bare.log_densities(block).sum()
+        price = linear.log_evidence + chance - bare.log_evidence - density
+        rows = [np.argmax(np.abs(self.view.moments[0][b]).max(axis=0)) for b in on]
+        return np.bincount(block[rows], minlength=count) * price / len(on)
+
+    def _likeliest(self, usual: _Beside, own: Evidence) -> _Beside:
+        """The likeliest form and size of a dependence, as something that is there as well."""
+        gains = own.gains + np.log(CHANCE)
+        f, s = np.unravel_index(gains.argmax(), gains.shape)
+        word = self.view.kernels[f].depends_on
+        forms = sum(k.depends_on == word for k in self.view.kernels)
+        return _Beside(
+            (word,),
+            np.concatenate([usual.white, SIZES[s] * own.white(self.view, f)]),
+            usual.log_chance + float(np.log(CHANCE[s] / forms)),
+            float(own.falls[f, s]) if gains[f, s] > 0 else 0.0,
+            self._log_relative(own.falls[f, s]) - np.log(CHANCE[s]),
+            None,
+            usual.local,
+        )
+
+    def _evidence(self, beside: _Beside) -> Evidence:
+        return evidence(self.h, self.view, beside.cov, beside.white)
+
+    def _linear(self, beside: _Beside) -> Linear:
+        linear = self.h.linear(self.view.fitter.whiten, beside.cov)
+        return linear.with_columns(beside.white) if len(beside.white) else linear
+
+    def _alone(self, beside: _Beside) -> Entry:
+        """The entry with no more than what is beside."""
+        linear = self._linear(beside)
+        found = self.h.log_evidence(linear, beside.cov) + beside.log_chance
+        mimicked = beside.log_relative if beside.words else -np.inf
+        return self._entry(beside, beside.words, found, linear, beside.fall, mimicked)
+
+    def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
+        """Entries with each dependence that is not beside already."""
+        out = []
+        for word in self.words[:-1]:
+            if word in beside.words:
+                continue
+            at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
+            gains = own.gains[at] - np.log(len(at))
+            likely = gains + np.log(CHANCE)
+            total = float(logsumexp(likely))
+            if beside.words:
+                mimicked = beside.log_relative
+            else:
+                relative = self._log_relative(own.falls[at])
+                mimicked = np.array([logsumexp(gains + r) - total for r in relative])
+            f, s = np.unravel_index(likely.argmax(), likely.shape)
+            linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
+            fall = beside.fall if beside.words else float(own.falls[at][f, s])
+            words, chance = (*beside.words, word), own.alone + beside.log_chance
+            out.append(self._entry(beside, words, chance + total, linear, fall, mimicked))
+        return out
+
+    def _entry(
+        self,
+        beside: _Beside,
+        words: tuple[str, ...],
+        log_evidence: float,
+        linear: Linear,
+        fall: float,
+        mimicked: np.ndarray | float,
+    ) -> Entry:
+        share = self.view.log_size * np.bincount(self.view.block) / len(self.view.block)
+        blocks = linear.log_densities(self.view.block) - share + beside.local
+        each = np.broadcast_to(mimicked, len(self.squares))
+        found = log_evidence - self.view.log_size
+        stale = beside.cov is not None
+        return Entry(
+            self.h.effects, stale, words, found, tuple(float(found + m) for m in each), blocks, fall
+        )
+
+    def _log_relative(self, falls: np.ndarray) -> np.ndarray:
+        """(M, ...) log prior of a dependence that takes these squares as what effects leave.
+
+        The share of the squares of an unnamed thing that the forms of effects do not take is
+        uniform between nothing and all. Each size stands for a bin of the grid of sizes.
+        """
+        squares = self.squares.reshape(-1, *[1] * np.ndim(falls))
+        share = falls / np.maximum(falls + squares, 1e-300)
+        with np.errstate(divide="ignore"):
+            return np.log(np.minimum(1, share * STEP**2) - share / STEP**2)
+
+
+def _changes(p: Problem, h: Hypothesis) -> np.ndarray:
+    """(E, W, 3) change of the prediction by each effect, m and rad."""
+    found = []
+    for name in h.effects:
+        model = h.model.copy()
+        model.remove_effect(effect_names(model).index(newest_instance(model, name)))
+        found.append(p.steps.errors(model)[0] - p.steps.errors(h.model)[0])
+    return np.array(found).reshape(-1, len(p.steps), 3)

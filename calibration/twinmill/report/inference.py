@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Probabilities of what a model lacks, as sentences and tables."""
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from twinmill.inference.answer import Answer, Named
+from twinmill.inference.infer import Inference
+from twinmill.model.parameters import catalogue
+from twinmill.report import show
+from twinmill.report.tables import Cell, Table, number
+
+
+def sentence(answer: Answer) -> str:
+    """The verdict in one sentence, with its probability."""
+    if answer.verdict == "cannot_tell":
+        return (
+            f"This log cannot tell: nothing is missing with a probability of "
+            f"{percent(answer.nothing)}, which is too little to say either."
+        )
+    if answer.verdict in ("model_adequate", "refit_enough"):
+        better = ", but the base's numbers are stale: fit it anew" if _stale(answer) else ""
+        return f"Nothing is missing ({percent(answer.nothing)}){better}."
+    names = " and ".join(_name(f) for f in answer.findings)
+    if answer.verdict == "outside_catalogue":
+        like = f", most like {names}" if names else ""
+        return f"Missing: something outside the catalogue ({percent(answer.outside)}){like}{_on(answer)}."
+    return f"Missing: {names}{_on(answer)}."
+
+
+def terminal(result: Inference) -> RenderableType:
+    """What `twinmill infer` prints."""
+    answer = result.answer
+    parts: list[RenderableType] = [Text(sentence(answer)), Text()]
+    if answer.findings:
+        parts.append(show.table(_effects(answer.findings)))
+    if answer.depends_on:
+        parts.append(show.table(_dependences(answer)))
+    if result.always is None:
+        parts.append(
+            Text(
+                "What the model misses in the log that it was fitted to is not known, so it may be "
+                "told as news: give that log with --own."
+            )
+        )
+    elif result.always.kernels:
+        known = ", ".join(name for name, _ in result.always.kernels)
+        parts.append(Text(f"No news, since the model misses it in its own log too: {known}."))
+    return Group(*parts)
+
+
+def percent(probability: float) -> str:
+    """A probability in percent; none is certain."""
+    if probability > 0.99:
+        return f"{min(100 * probability, 99.9):.1f} %"
+    return f"{100 * probability:.0f} %" if probability >= 0.01 else "< 1 %"
+
+
+def _stale(answer: Answer) -> bool:
+    return answer.verdict == "refit_enough"
+
+
+def _name(found: Named) -> str:
+    if found.certainty == "group":
+        return f"one of {', '.join(found.group)} ({percent(found.group_probability)})"
+    word = "" if found.certainty == "sure" else ", not sure"
+    return f"{found.effect} ({percent(found.probability)}{word})"
+
+
+def _on(answer: Answer) -> str:
+    if not answer.depends_on:
+        return ""
+    word, p = next(iter(answer.depends_on.items()))
+    return f"; what is left depends on {word} ({percent(p)})"
+
+
+def _effects(findings: list[Named]) -> Table:
+    rows = []
+    for f in findings:
+        for k, (name, (value, std)) in enumerate(f.numbers.items() or [("", (None, None))]):
+            rows.append(
+                [
+                    Cell("" if k else f.effect),
+                    Cell("" if k else percent(f.probability), bar=None if k else f.probability),
+                    Cell(name),
+                    Cell(number(value)),
+                    Cell(f"+- {number(std, 2)}"),
+                    Cell("" if k else str(catalogue()[f.effect]["summary"])),
+                ]
+            )
+    columns = ["effect", "probability", "number", "value", "std", "what it is"]
+    return Table("Missing effects", columns, rows, words=(0, 2, 5))
+
+
+def _dependences(answer: Answer) -> Table:
+    rows = [[Cell(word), Cell(percent(p), bar=p)] for word, p in answer.depends_on.items()]
+    note = f"The likeliest takes {percent(answer.share)} of the squared error above the noise."
+    return Table("What is left depends on", ["", "probability"], rows, note=note)

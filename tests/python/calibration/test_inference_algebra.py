@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Noise, evidence and prior odds of the inference against dense algebra and other libraries."""
+
+from itertools import product
+from math import comb, log
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from twinmill.inference import moments
+from twinmill.inference.discrepancy import SIZES, kernels
+from twinmill.inference.evidence import Linear, gains_by_size
+from twinmill.inference.moments import Rate
+from twinmill.inference.noise import Noise
+from twinmill.inference.posterior import beliefs
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.steps import Motion
+from twinmill.inference.table import Entry, Table
+
+STEP_S = 0.1
+
+
+def dense_covariance(sensor, drive, memory_s, count):
+    """(count, count) of e = AR(1) disturbance + differences of white noise, by the definition."""
+    a = np.exp(-STEP_S / memory_s)
+    lags = drive**2 * a ** np.arange(count)
+    difference = np.zeros(count)
+    difference[:2] = 2 * sensor**2, -(sensor**2)
+    return toeplitz(lags + difference)
+
+
+@pytest.mark.parametrize(
+    "sensor, drive, memory_s", [(3e-4, 5e-4, 0.15), (2e-3, 1e-3, 0.5), (1e-4, 3e-3, 1.0)]
+)
+def test_whitened_errors_have_the_likelihood_of_the_dense_covariance(sensor, drive, memory_s):
+    """The filter forgets its start: after 100 steps log densities grow alike."""
+    count, begin = 400, 100
+    covariance = dense_covariance(sensor, drive, memory_s, count)
+    errors = np.random.default_rng(1).multivariate_normal(np.zeros(count), covariance)
+    rows = np.zeros((count, 3))
+    rows[:, 0] = errors
+    noise = Noise(np.full(3, sensor), np.full(3, drive), np.full(3, memory_s), STEP_S)
+    white = noise.whiten(rows, [slice(0, count)])[:count]
+    observed = np.array([True, False, False])
+    late = count - begin
+    ours = -0.5 * np.sum(white[begin:] ** 2) - noise.log_size(late, observed)
+    ours -= 0.5 * late * np.log(2 * np.pi)
+
+    def density(n):
+        return multivariate_normal(np.zeros(n), covariance[:n, :n]).logpdf(errors[:n])
+
+    assert ours == pytest.approx(density(count) - density(begin), abs=0.02)
+
+
+def test_evidence_is_that_of_the_marginal_normal_distribution():
+    random = np.random.default_rng(2)
+    y, x, f = random.normal(size=40), random.normal(size=(5, 40)), random.normal(size=(3, 40))
+
+    def dense(columns):
+        return multivariate_normal(np.zeros(40), np.eye(40) + columns.T @ columns).logpdf(y)
+
+    constant = -0.5 * 40 * np.log(2 * np.pi)
+    linear = Linear.of(y, x)
+    assert linear.log_evidence + constant == pytest.approx(dense(x))
+    gains, _ = gains_by_size(*linear.projected(f, f @ f.T), SIZES)
+    for gain, size in zip(gains, SIZES, strict=True):
+        both = dense(np.concatenate([x, size * f]))
+        assert gain == pytest.approx(both - dense(x))
+    more = linear.with_columns(f)
+    both = np.concatenate([x, f])
+    normal = both @ both.T + np.eye(8)
+    assert more.mean == pytest.approx(np.linalg.solve(normal, both @ y))
+    assert more.covariance == pytest.approx(np.linalg.inv(normal))
+
+
+def test_chances_of_all_sets_of_moments_add_up_to_one():
+    for rate in (Rate(), Rate(0.1), Rate(0.3, 2.0, 50.0)):
+        on = np.arange(13)
+        sets = [log(comb(12, k)) for k in on]
+        assert logsumexp(rate.log_chance(on, 12) + sets) == pytest.approx(0, abs=1e-9)
+
+
+def test_two_moments_of_a_shift_are_found_and_no_third():
+    """White errors of unit size, shifted by 8 in two of thirty stretches of five rows."""
+    random = np.random.default_rng(3)
+    y = random.normal(size=150)
+    white = np.zeros((30, 1, 150))
+    for b in range(30):
+        white[b, 0, 5 * b : 5 * b + 5] = 8.0
+    y[20:25] += 8.0
+    y[100:105] -= 8.0
+    flat = white.reshape(30, -1)
+    found = moments.find(Linear.of(y, np.zeros((1, 150))), white, flat @ flat.T, 1.5)
+    assert set(found.on[: found.likeliest(Rate())]) == {4, 20}
+    assert found.after(0.05).there > 0.95
+    quiet = moments.find(Linear.of(random.normal(size=150), np.zeros((1, 150))), white,
+                         flat @ flat.T, 1.5)  # fmt: skip
+    assert quiet.after(0.05).there < 0.05
+
+
+def motion(count=300):
+    random = np.random.default_rng(4)
+    moved = random.normal(size=(count, 3)) * (0.02, 0.02, 0.1)
+    return Motion(
+        moved, moved, np.arange(count) * STEP_S, np.full(count, STEP_S),
+        random.uniform(-1, 1, size=(count, 2)), random.uniform(-np.pi, np.pi, count),
+        np.sqrt((moved**2).mean(axis=0)), np.array([0.06, 0.06, 0.3, 0.08, 0.3]),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("word", ["time", "place", "heading"])
+def test_a_gain_kernel_of_size_one_is_a_gain_error_of_one(word):
+    """The prior variance of the gain, averaged over the log, is one: that is what a size means."""
+    m = motion()
+    gains = [k for k in kernels(m) if k.depends_on == word and "gain" in k.name]
+    assert len(gains) >= 3
+    for k in gains:
+        moves = np.abs(k.columns).max(axis=0) > 0
+        variance = np.sum(k.columns**2, axis=0)[moves] / m.moved[moves] ** 2
+        assert variance.mean() == pytest.approx(1, rel=0.15), k.name
+
+
+def table(entries, candidates=10, words=("time", "place")):
+    return Table(entries, {}, 1.0, candidates, words)
+
+
+def entry(effects, words, log_evidence, mimicked=None):
+    mimicked = tuple(mimicked or [-np.inf] * len(effects))
+    blocks = np.full(6, log_evidence / 6)
+    return Entry(effects, False, words, log_evidence, mimicked, blocks, 1.0)
+
+
+def test_flat_evidence_leaves_the_prior_odds():
+    """Nothing : one named effect : a dependence = (1 - q) : (1 - q) / 10 : q / 2, q = outside."""
+    q = PRIORS.outside
+    found = beliefs(table([entry((), (), 0), entry(("a",), (), 0), entry((), ("time",), 0)]))
+    odds = np.array([b.probability for b in found])
+    assert odds.sum() == pytest.approx(1)
+    assert odds / odds[0] == pytest.approx([1, PRIORS.effects / 10, q / 2 / (1 - q)])
+
+
+def test_what_one_block_alone_speaks_for_is_less_sure():
+    """The same evidence, spread over all blocks or in one: drawn again the one is often absent."""
+    even = np.full(8, 1.5)
+    single = np.r_[12.0, np.zeros(7)]
+
+    def sure(blocks):
+        found = Entry(("a",), False, (), 12.0, (-np.inf,), blocks, 0.0)
+        none = Entry((), False, (), 0.0, (), np.zeros(8), 0.0)
+        return beliefs(table([none, found]))[1].probability
+
+    assert sure(even) > 0.999
+    assert sure(single) < 0.9
+
+
+def test_probability_moves_from_an_effect_to_its_mimic_with_what_its_form_leaves():
+    """Same evidence, prior of the remainder's size times 20 for the mimic: it becomes likelier."""
+    there = [entry((), (), -50), entry(("a",), ("time",), 0, [log(20)])]
+    alike = [entry((), (), -50), entry(("a",), ("time",), 0, [log(1 / 20)])]
+    p = [sum(b.probability for b in beliefs(table(t)) if "a" in b.effects) for t in (there, alike)]
+    assert p[0] < 0.2 < 0.8 < p[1]
+
+
+def test_all_pairs_of_words_share_one_prior_of_something_outside():
+    """Two dependences cost the prior of each; the order does not matter."""
+    entries = [entry((), (), 0)] + [entry((), pair, 0) for pair in product(("time",), ("place",))]
+    found = beliefs(table(entries))
+    q = PRIORS.outside / 2
+    assert found[1].probability / found[0].probability == pytest.approx(q**2 / (1 - PRIORS.outside))
