@@ -33,6 +33,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import explain as explain
     from twinmill.api import fit as fit
     from twinmill.api import import_log as import_log
+    from twinmill.api import infer as infer
     from twinmill.api import load as load
     from twinmill.api import next_run as next_run
     from twinmill.api import simulate as simulate
@@ -40,6 +41,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.results import Comparison as Comparison
     from twinmill.results import Effect as Effect
+    from twinmill.results import Inference as Inference
     from twinmill.results import NextRun as NextRun
     from twinmill.results import SwarmComparison as SwarmComparison
 
@@ -51,11 +53,13 @@ _HOME = {
         (
             *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),
             *("compare", "diagnose", "effect", "effects", "explain", "fit", "import_log"),
-            *("load", "next_run", "simulate"),
+            *("infer", "load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),
-    **dict.fromkeys(("Comparison", "Effect", "NextRun", "SwarmComparison"), "twinmill.results"),
+    **dict.fromkeys(
+        ("Comparison", "Effect", "Inference", "NextRun", "SwarmComparison"), "twinmill.results"
+    ),
 }
 __all__ = sorted(_HOME)
 

@@ -53,6 +53,7 @@ from twinmill.files import plain
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
+from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
 from twinmill.model.set_values import with_values
@@ -61,7 +62,14 @@ from twinmill.report import detections, sections, show
 from twinmill.report import diagnosis as diagnosis_report
 from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
-from twinmill.results import Comparison, Effect, NextRun, SwarmComparison, errors_drawn
+from twinmill.results import (
+    Comparison,
+    Effect,
+    Inference,
+    NextRun,
+    SwarmComparison,
+    errors_drawn,
+)
 from twinmill.shown import (
     A_PATH,
     Reported,
@@ -1291,6 +1299,42 @@ def diagnose(
     measurements = log.measurements(model)
     result = _diagnose.diagnose(measurements, model.file, progress or (lambda _: None), excluded)
     return _told(Diagnosis(result, log, model.file), measurements)
+
+
+@_one_thread
+def infer(
+    log: Log | str | Path,
+    model: Model | str | Path | None = None,
+    *,
+    own: Log | str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Inference:
+    """Gives the probability of each effect that a model may lack, and of something nameless.
+
+    Args:
+        log: a log of one robot, or the path of one.
+        model: best one that was fitted to another log; None is TurboPi's.
+        own: the log that the model was fitted to: what it misses there, too, is no news.
+        progress: is told in words what is being done.
+
+    Returns:
+        Verdict, effects and dependences with their probabilities.
+
+    Raises:
+        LogError: the log cannot be used, or has several robots; one sentence.
+        ModelError: the model cannot be read.
+
+    Examples:
+        >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
+        >>> inferred.findings[0].effect
+        'coasting'
+    """
+    log, model = _log(log), _model(model)
+    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
+    measurements = log.measurements(model)
+    before = _log(own).measurements(model) if own is not None else ()
+    result = _infer.infer(measurements, model.file, before, progress or (lambda _: None))
+    return _told(Inference(result), measurements)
 
 
 @_one_thread

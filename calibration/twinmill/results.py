@@ -14,9 +14,11 @@ from twinmill.experiment.design import Plan
 from twinmill.experiment.played import csv_text
 from twinmill.files import plain
 from twinmill.fitting import compare as _compare
+from twinmill.inference import infer as _infer
 from twinmill.report import (
     comparisons,
     error_figures,
+    inference,
     next_run_figures,
     sections,
     show,
@@ -88,6 +90,53 @@ class Comparison(Reported):
     def __repr__(self) -> str:
         logs = ", ".join(dict.fromkeys(r.measurement.log_name for r in self._result.robots))
         return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
+
+
+class Inference(Shown):
+    """Probabilities of what a model lacks.
+
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
+            cannot_tell.
+        sentence: the same for people.
+        findings: effects that are missing, each with `effect`, `probability` and `certainty`.
+        nothing, outside: probabilities that nothing is missing, and that something nameless is.
+
+    Examples:
+        >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
+        >>> inferred.nothing < 0.05
+        True
+    """
+
+    def __init__(self, result: _infer.Inference):
+        self._result, answer = result, result.answer
+        self.verdict, self.findings = answer.verdict, list(answer.findings)
+        self.nothing, self.outside = answer.nothing, answer.outside
+        self.sentence = inference.sentence(answer)
+
+    def table(self) -> pd.DataFrame:
+        """Effects and their numbers.
+
+        Returns:
+            effect, probability, certainty, name, value, std (both in the unit of the number).
+
+        Examples:
+            >>> inferred.table()["effect"].unique().tolist()
+            ['coasting']
+        """
+        columns = ["effect", "probability", "certainty", "name", "value", "std"]
+        rows = [
+            (f.effect, f.probability, f.certainty, name, value, std)
+            for f in self.findings
+            for name, (value, std) in f.numbers.items()
+        ]
+        return pd.DataFrame(rows, columns=columns)
+
+    def _text(self) -> RenderableType:
+        return inference.terminal(self._result)
+
+    def __repr__(self) -> str:
+        return f"Inference({self.verdict}: {self.sentence})"
 
 
 class NextRun(Reported):

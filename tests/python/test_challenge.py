@@ -397,5 +397,6 @@ def test_no_base_model_is_kept_of_half_an_explanation(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "write_log", lambda plan, played, path: path.write_text("a log"))
     monkeypatch.setattr(command, "run", stopped)
     with pytest.raises(KeyboardInterrupt):
-        command.base_of(tmp_path, 1, ROBOTS[1], SEED, duration_s=SECONDS)
+        judge = command.Judge.DIAGNOSE
+        command.base_of(tmp_path, 1, ROBOTS[1], SEED, duration_s=SECONDS, judge=judge)
     assert [path.name for path in tmp_path.iterdir()] == ["sheet_1.toml"]

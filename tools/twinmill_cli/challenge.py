@@ -9,6 +9,7 @@ import json
 import os
 import time
 from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -39,6 +40,14 @@ if working():  # not for --help
     from twinmill.terminal import progress_bar
     from twinmill.version import __version__
     from twinmill_cli.main import run
+
+
+class Judge(StrEnum):
+    """The command that an exam examines."""
+
+    DIAGNOSE = "diagnose"
+    INFER = "infer"
+
 
 DONE = "done"  # folder of the cases that are done, while others are not
 WRITTEN = (  # in the folder of a challenge, whole or stopped half way
@@ -76,6 +85,9 @@ def _challenge(
             "quantity how often its 95 % interval covers the truth.",
         ),
     ] = None,
+    judge: Annotated[
+        Judge, typer.Option(help="What is examined; infer also sees the log of each base.")
+    ] = Judge.DIAGNOSE,
     as_json: AsJson = False,
 ) -> dict:
     """Draw robots and what is hidden in them, seal the answers, diagnose their logs, unseal, score.
@@ -93,11 +105,12 @@ def _challenge(
     (out / DONE).mkdir(parents=True, exist_ok=True)
     workers = workers or os.cpu_count() or 1
     command = f"twinmill challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
+    command += "" if judge == Judge.DIAGNOSE else f" --judge {judge}"
     how = {"seed": seed, "duration_s": duration_s, "workers": workers, "as_json": as_json}
     with alone_in(out):
         if intervals:
             return _intervals(out, intervals, command=f"{command} --intervals {intervals}", **how)
-        return _exam(out, count, command=command, **how)
+        return _exam(out, count, command=command, judge=judge, **how)
 
 
 def _exam(
@@ -105,6 +118,7 @@ def _exam(
     count: int,
     *,
     command: str,
+    judge: Judge,
     seed: int,
     duration_s: float,
     workers: int,
@@ -117,9 +131,10 @@ def _exam(
     digest = hashlib.sha256(answers.encode()).hexdigest()
     Console(stderr=True).print(f"sealed answers: sha256 {digest}", soft_wrap=True)
     driven = sorted({case.robot for case in cases})
-    bases = {k: base_of(out, k, robots[k], seed, duration_s=duration_s) for k in driven}
+    how = {"duration_s": duration_s, "judge": judge}
+    bases = {k: base_of(out, k, robots[k], seed, **how) for k in driven}
     results, times_s = {}, {}
-    for number, result, time_s in _all(out, bases, cases, workers):
+    for number, result, time_s in _all(bases, cases, workers, judge):
         results[number], times_s[number] = result, time_s
     ordered = [results[case.number] for case in cases]
     found = {"command": command, "seed": seed, "duration_s": duration_s}
@@ -129,20 +144,25 @@ def _exam(
     write_whole(out / "times.json", json.dumps([times_s[case.number] for case in cases]))
     report = page.write(out, found, list(times_s.values()))
     shutil.rmtree(out / DONE)
+    for log in out.glob("calibration_*.lcmlog"):
+        log.unlink()
     shown = page.shown(found, list(times_s.values()))
     deliver(found, Group(shown, Text(f"Report: {report}")), as_json)
     return found
 
 
-def base_of(folder: Path, number: int, robot: Robot, seed: int, *, duration_s: float) -> Path:
+def base_of(
+    folder: Path, number: int, robot: Robot, seed: int, *, duration_s: float, judge: Judge
+) -> Path:
     """The model that a user of the robot has: its sheet, then by turns a fit or an explanation.
 
     Args:
-        folder: where the model goes.
-        number: of the robot; those of odd numbers are explained.
+        folder: where the model goes, and for `infer` the log that it is fitted to.
+        number: of the robot; those of odd numbers are explained, but for `infer`.
         robot: who drives.
         seed: of the calibration log.
         duration_s: of that log.
+        judge: what is examined.
     """
     log, sheet = folder / f"calibration_{number}.lcmlog", folder / f"sheet_{number}.toml"
     base = folder / f"base_{number}.toml"
@@ -151,31 +171,36 @@ def base_of(folder: Path, number: int, robot: Robot, seed: int, *, duration_s: f
     plan = calibration(robot, seed, duration_s)
     write_log(plan, play(plan, forces=True), log)
     write_whole(sheet, robot.sheet(np.random.default_rng([seed, 3, number])))
-    how = "explain" if number % 2 else "fit"
+    how = "explain" if number % 2 and judge == Judge.DIAGNOSE else "fit"
     with contextlib.redirect_stdout(io.StringIO()):
         code = run([how, str(log), "--model", str(sheet), "-o", str(base), "--json"])
-    log.unlink()
+    if judge == Judge.DIAGNOSE:
+        log.unlink()
     if code == STOPPED:
         base.unlink(missing_ok=True)  # of half an explanation
         raise KeyboardInterrupt
     return base
 
 
-def diagnosed(folder: Path, base: Path, case: Case) -> tuple[dict, float]:
+def diagnosed(base: Path, case: Case, judge: Judge) -> tuple[dict, float]:
     """Makes the log of a case, diagnoses it, and only then looks at the answer.
 
     Args:
-        folder: for the log, which is removed.
-        base: model of the robot.
+        base: model of the robot; the log is made beside it, and removed.
         case: sealed.
+        judge: what diagnoses.
 
     Returns:
         The score of the case, and how many seconds the diagnosis took.
     """
-    log = folder / f"case{case.number:03d}.lcmlog"
+    log = base.parent / f"case{case.number:03d}.lcmlog"
     make_log(case, log)
     started = time.monotonic()
-    found = tm.diagnose(log, tm.Model.load(base)).to_json()
+    if judge == Judge.INFER:
+        own = base.parent / f"calibration_{case.robot}.lcmlog"
+        found = tm.infer(log, tm.Model.load(base), own=own).to_json()
+    else:
+        found = tm.diagnose(log, tm.Model.load(base)).to_json()
     time_s = time.monotonic() - started
     log.unlink()
     return scored(case, found), time_s
@@ -225,10 +250,10 @@ def _fitted(folder: Path, number: int, seed: int, duration_s: float) -> tuple[in
 
 
 def _all(
-    folder: Path, bases: dict[int, Path], cases: Sequence[Case], workers: int
+    bases: dict[int, Path], cases: Sequence[Case], workers: int, judge: Judge
 ) -> Iterator[tuple[int, dict, float]]:
     """Every case as it is done: number, result, time."""
-    calls = [(_one, folder, bases[case.robot], case) for case in cases]
+    calls = [(_one, bases[case.robot], case, judge) for case in cases]
     yield from _done(calls, "diagnosing", workers)
 
 
@@ -252,13 +277,13 @@ def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
         pool.shutdown(cancel_futures=True)
 
 
-def _one(folder: Path, base: Path, case: Case) -> tuple[int, dict, float]:
+def _one(base: Path, case: Case, judge: Judge) -> tuple[int, dict, float]:
     """A case, or what a challenge that was stopped found for the same case and base model."""
-    asked = [__version__, case.to_json(), case.plan.seed, base.read_text()]
+    asked = [__version__, case.to_json(), case.plan.seed, base.read_text(), judge]
     name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
-    kept = folder / DONE / f"{name}.json"
+    kept = base.parent / DONE / f"{name}.json"
     if kept.exists():
         return case.number, *json.loads(kept.read_text())
-    result, time_s = diagnosed(folder, base, case)
+    result, time_s = diagnosed(base, case, judge)
     write_whole(kept, json.dumps([result, time_s]))
     return case.number, result, time_s

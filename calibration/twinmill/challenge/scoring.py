@@ -8,6 +8,7 @@ finding is right if its name is; beyond doubt is a row of its own.
 
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.stats import binomtest
@@ -20,6 +21,7 @@ LARGEST_GROUP = 4
 WITHIN = 1.96  # standard errors: 95 %
 TOLD_REST = 0.1  # share of the squared error from which a rest counts as told
 BINS = (1.0, 1.5, 2.5, 4.0)  # lower ends of sizes, in floors
+RELIABILITY = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)  # edges of bins of a name's probability
 NAMED = ("effect_missing", "ambiguous")  # verdicts that name something
 OF_FORCES = frozenset({"yaw_lag", "lateral_slip"})  # what every robot made of forces has
 
@@ -136,6 +138,11 @@ def scored(case: Case, found: dict) -> dict:
         "rest": told,
         "outcome": outcome,
         "estimates": [e for h in case.hidden for e in _estimates(h, firm)],
+        "names": [
+            {"probability": f["probability"], "right": f["effect"] in allowed}
+            for f in found.get("findings", ())
+            if "probability" in f and f["effect"] not in there
+        ],
     }
 
 
@@ -166,6 +173,7 @@ def summary(results: list[dict]) -> dict:
         "depends_right": rate([r["outcome"]["told"] and r["outcome"]["depends"] for r in outside]),
         "named_wrongly": share("wrong_and_sure", results),
         "within": rate([e["within"] for e in estimates]),
+        "reliability": _reliability([n for r in results for n in r["names"]]),
         "bias": [float(q) for q in np.percentile(ratios, [25, 50, 75])] if ratios else None,
         "power": [{"from_floors": low, **_in_bin(single, low)} for low in BINS],
         "confusion": [
@@ -173,6 +181,18 @@ def summary(results: list[dict]) -> dict:
         ],
         "lost": [r for r in results if lost(r)],
     }
+
+
+def _reliability(names: list[dict]) -> list[dict]:
+    """How often names are right, by bins of the probability that they were given."""
+    found = []
+    for low, high in pairwise(RELIABILITY):
+        own = [n for n in names if low <= n["probability"] < high or n["probability"] == high == 1]
+        if own:
+            mean = float(np.mean([n["probability"] for n in own]))
+            right = rate([n["right"] for n in own])
+            found.append({"from": low, "to": high, "mean": mean, "right": right})
+    return found
 
 
 def _is_known(result: dict) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bayesian model comparison: which effects or nameless dependences a model lacks, with probabilities.
+"""Bayesian model comparison: probabilities of the effects and dependences that a model lacks.
 
 The data flow one way: `steps` (prediction errors of a log), `noise` (whitening), `candidates` and
 `discrepancy` (columns of what may be missing), `evidence` (linear Gaussian algebra), `hypothesis`

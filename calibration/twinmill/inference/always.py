@@ -4,8 +4,8 @@
 A fitted base is of another form than the robot. What it leaves in its own log (a bend of the speed,
 a coupling of turns, a slow wander, single moments) is no news in the next one. It is found by the
 same evidence that judges later logs, kernel after kernel while the posterior odds rise, and enters
-their prior: a function of speed, heading or the past with its weights, one of time or place with its
-size alone (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
+their prior: a function of speed, heading or the past with its weights, one of time or place with
+its size alone (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
 """
 
 from dataclasses import dataclass, replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From beliefs to an answer: verdict, findings with groups and certainty, what the rest depends on."""
+"""From beliefs to an answer: verdict, findings with their certainty, what the rest depends on."""
 
 from dataclasses import dataclass
 

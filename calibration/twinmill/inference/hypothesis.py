@@ -164,7 +164,7 @@ class Fitter:
         return replace(found, slopes=self._slopes(found, slopes, known))
 
     def with_effect(
-        self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float, told: bool = False
+        self, h: Hypothesis, c: Candidate, start: np.ndarray, *, grid: float, told: bool = False
     ) -> Hypothesis:
         """The hypothesis with an effect more, fitted from a start.
 
@@ -244,7 +244,7 @@ class Fitter:
         return errors, float(0.5 * white @ white + 0.5 * away @ precision @ away)
 
     def _slopes(self, h: Hypothesis, slopes: np.ndarray | None, known: int) -> np.ndarray:
-        """(N, W, 3) change of the prediction with each number; so many of the first as they were."""
+        """(N, W, 3) change of the prediction with each number; the first `known` are kept."""
         count = len(h.value)
         if known == count and slopes is not None:
             return slopes

@@ -5,7 +5,8 @@ Each channel is an ARMA(1, 2) series, with L the shift by one step and a = exp(-
 
     (1 - a L) e = w + (1 - a L)(1 - L) s,   var w = drive^2 (1 - a^2),   var s = sensor^2
 
-so that one recursive filter whitens errors and columns alike (Box, Jenkins and Reinsel 2008, ch. 4).
+so that one recursive filter whitens errors and columns alike (Box, Jenkins and Reinsel
+2008, ch. 4).
 """
 
 from collections.abc import Sequence
@@ -55,7 +56,7 @@ class Noise:
         return out.reshape(*rows.shape[:-2], 3 * rows.shape[-2])
 
     def log_size(self, count: int, observed: np.ndarray) -> float:
-        """Logarithm of the noise's standard deviations over `count` steps: the likelihood's divisor."""
+        """Sum of log standard deviations over `count` steps: what the likelihood is divided by."""
         scales = [self._filters[c][2] for c in np.flatnonzero(observed)]
         found = count * float(np.sum(np.log(scales)))
         return found if self.weight is None else found - float(np.log(self.weight[observed]).sum())
@@ -132,7 +133,7 @@ def _fit_channel(both: np.ndarray, stretches, start: np.ndarray, step_s: float) 
 
 
 def weights_of(left: np.ndarray) -> np.ndarray:
-    """(3, W) weights of errors (3, W) that no smooth term explains, as Student's t would have them."""
+    """(3, W) weights of residuals (3, W), those of Student's t for what is far off."""
     size = np.sqrt(np.median(left**2, axis=1) / 0.455)  # 0.455: median of a squared normal variate
     size = np.where(size > 0, size, 1.0)[:, None]
     return np.minimum(1.0, HEAVY / np.maximum(np.abs(left) / size, 1e-9)) / np.maximum(size, 1.0)

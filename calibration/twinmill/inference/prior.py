@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of a base model before a log is seen: a joint normal distribution of its numbers."""
+"""What is known of a base model before a log is seen: a joint normal distribution."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -2,6 +2,7 @@
 """One robot in one log, ready for inference: errors, prior, noise, and all that may be missing."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -86,7 +87,7 @@ class Problem:
         fitter = Fitter(self.steps, noise, self.prior.columns)
         stacked = fitter.whiten(np.concatenate([k.columns for k in self.kernels]))
         edges = np.cumsum([0, *(len(k.columns) for k in self.kernels)])
-        parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        parts = [slice(a, b) for a, b in pairwise(edges)]
         at_moments = fitter.whiten(moments.columns(self.motion))
         flat = at_moments.reshape(-1, at_moments.shape[-1])
         return View(
@@ -101,7 +102,7 @@ class Problem:
         )
 
     def columns(self, h: Hypothesis) -> dict[str, Candidate]:
-        """What each effect that a hypothesis lacks would change beside it, the base as it is known."""
+        """What each effect that a hypothesis lacks would change; the base at its prior mean."""
         model = h.model.copy()
         for label, named, mean in zip(h.labels, h.named, h.mean, strict=True):
             if named and label in self.prior.names and not label.startswith("clock."):

@@ -134,7 +134,7 @@ class Search:
     def _fitted(self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float) -> Hypothesis:
         """From the linear start, and where the effect may be bent from its default strength too."""
         fitter = self.view.fitter
-        found = fitter.with_effect(h, c, start, grid)
+        found = fitter.with_effect(h, c, start, grid=grid)
         if c.masks is not None or c.fixed is not None:
             return found
         value, usual, low, high = (
@@ -145,7 +145,7 @@ class Search:
         for other in [start] if len(value) > 1 else [value, 2 * usual - value]:
             other = np.clip(other, low, high)
             if np.any(np.abs(other - usual) > 1e-12):
-                again = fitter.with_effect(h, c, other, grid, told=True)
+                again = fitter.with_effect(h, c, other, grid=grid, told=True)
                 then = again.log_evidence(again.linear(fitter.whiten))
                 if then > best:
                     found, best = again, then
@@ -215,7 +215,7 @@ def _taken(h: Hypothesis, view: View) -> np.ndarray:
 def screened(
     linear: Linear, columns: dict[str, Candidate], view: View
 ) -> dict[str, tuple[float, np.ndarray, float]]:
-    """Of each effect, were it linear: gain in log evidence, best numbers, and offset of its grid."""
+    """Gain in log evidence of each effect, were it linear, best numbers, and offset of its grid."""
     left = linear.y - linear.half @ linear.basis
     return {
         name: _screened(c, linear.basis, left, view.fitter.whiten) for name, c in columns.items()

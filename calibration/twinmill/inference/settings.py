@@ -18,8 +18,7 @@ class Priors(Numbers):
     gain_drift: float = number(0.02, "drift of gains between logs of one robot, relative")
     lag_drift: float = number(0.05, "drift of the motor lag between logs, relative")
     sheet: float = number(
-        0.15,
-        "error of a data sheet's speeds, relative, its lag twice that; of what another log told of a discrepancy, times its size",
+        0.15, "error of a data sheet's speeds, and of a discrepancy in another log, relative"
     )
     moments: float = number(0.05, "expected share of half seconds in which something happens")
     sudden: float = number(0.5, "gain error at such a moment; push over the usual speed")

@@ -2,6 +2,7 @@
 """Prediction errors over short steps of a log, and what happened during each step."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import twinmill_native as native
@@ -91,7 +92,7 @@ def _cut(track) -> tuple[np.ndarray, np.ndarray, list[slice]]:
             ends.append(at[1:])
             lengths.append(len(at) - 1)
     edges = np.cumsum([0, *lengths])
-    stretches = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    stretches = [slice(a, b) for a, b in pairwise(edges)]
     return (
         np.concatenate(starts).astype(np.int64),
         np.concatenate(ends).astype(np.int64),
@@ -134,7 +135,7 @@ class Motion:
 
 
 def motion_of(steps: Steps, moved: np.ndarray, instant: np.ndarray, scale=None) -> Motion:
-    """The motion of a log; `scale` (usual, top) is that of the base's own log, where it is known."""
+    """The motion of a log; `scale` (usual, top) is that of the base's own log, if it is known."""
     return Motion(
         moved, instant, steps.t_s, steps.step_s, steps.place, steps.heading,
         *(scale or _scale(moved)),

@@ -75,8 +75,8 @@ def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
 def table_of(search: Search) -> Table:
     """Evidence of the likely sets, each under the noise that suits it best of three.
 
-    Three noises: what all flexible terms leave, what the base leaves, what the best set leaves. With
-    one noise for all, slow drive noise is told as a dependence on time.
+    Three noises: what all flexible terms leave, what the base leaves, what the best set leaves.
+    With one noise for all, slow drive noise is told as a dependence on time.
     """
     p, order = search.problem, search.likely()
     inside = [k for k in search.fitted if set(k) < set(order[0])]
@@ -176,8 +176,8 @@ class _Comparison:
     def numbers(self) -> dict[str, tuple[float, float]]:
         """Estimates of the effects and their standard deviations, with the likeliest dependence.
 
-        As wide as the posterior, and as blocks of time drawn again and again let them scatter, which
-        is wider where the model's form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
+        As wide as the posterior, and as blocks of time drawn again and again let them scatter,
+        which is wider where the form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
         """
         usual, news = self._moments(None)
         likely = self._likeliest(usual, self._evidence(usual))
@@ -253,7 +253,14 @@ class _Comparison:
         linear = self._linear(beside)
         found = self.h.log_evidence(linear, beside.cov) + beside.log_chance
         mimicked = beside.log_relative if beside.words else -np.inf
-        return self._entry(beside, beside.words, found, linear, beside.fall, mimicked)
+        return self._entry(
+            beside,
+            linear,
+            words=beside.words,
+            log_evidence=found,
+            fall=beside.fall,
+            mimicked=mimicked,
+        )
 
     def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
         """Entries with each dependence that is not beside already."""
@@ -272,17 +279,25 @@ class _Comparison:
                 mimicked = np.array([logsumexp(gains + r) - total for r in relative])
             f, s = np.unravel_index(likely.argmax(), likely.shape)
             linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
-            fall = beside.fall if beside.words else float(own.falls[at][f, s])
-            words, chance = (*beside.words, word), own.alone + beside.log_chance
-            out.append(self._entry(beside, words, chance + total, linear, fall, mimicked))
+            out.append(
+                self._entry(
+                    beside,
+                    linear,
+                    words=(*beside.words, word),
+                    log_evidence=own.alone + beside.log_chance + total,
+                    fall=beside.fall if beside.words else float(own.falls[at][f, s]),
+                    mimicked=mimicked,
+                )
+            )
         return out
 
     def _entry(
         self,
         beside: _Beside,
+        linear: Linear,
+        *,
         words: tuple[str, ...],
         log_evidence: float,
-        linear: Linear,
         fall: float,
         mimicked: np.ndarray | float,
     ) -> Entry:

@@ -148,7 +148,7 @@ class ModelFile:
 
     @property
     def recorded_noise(self) -> dict[str, float]:
-        """Sensor and drive noise that a fit recorded: sensor_m, sensor_rad, drive_mps and others."""
+        """Noise that a fit recorded, by key: sensor_m, sensor_rad, drive_mps and others."""
         return {key: float(v) for key, v in self._document.get("noise", {}).items()}
 
     @property

@@ -17,7 +17,8 @@ from twinmill.version import __version__
 
 def shown(found: dict, times_s: list[float]) -> RenderableType:
     """Tables of rates and of missed cases."""
-    return Group(*(show.table(t) for t in (_rates(found, times_s), *_lost(found))))
+    tables = (_rates(found, times_s), *_reliability(found), *_lost(found))
+    return Group(*(show.table(t) for t in tables))
 
 
 def intervals(found: dict) -> RenderableType:
@@ -55,7 +56,12 @@ def write(folder: Path, found: dict, times_s: list[float]) -> Path:
         "each hidden effect adds more than the floor to the error at 2 s. A group of more than "
         f"{LARGEST_GROUP} names is wrong.",
         figures=[_power(found)],
-        tables=[_rates(found, times_s), *_lost(found), _confusion(found)],
+        tables=[
+            _rates(found, times_s),
+            *_reliability(found),
+            *_lost(found),
+            _confusion(found),
+        ],
     )
     source = Provenance(found["command"], f"twinmill {__version__}", "")
     return write_report(folder, "Blind test of diagnosis", source, [section], note="")
@@ -82,6 +88,21 @@ def _rates(found: dict, times_s: list[float]) -> Table:
         low, middle, high = found["bias"]
         note += f" Estimates over truth: {middle:.2f}, half of them {low:.2f} to {high:.2f}."
     return Table("Right or wrong", ["", "cases", "share", "95 % interval", "goal"], rows, note)
+
+
+def _reliability(found: dict) -> list[Table]:
+    """Probabilities of names against how often they are right; none where none were given."""
+    rows = [
+        [
+            Cell(f"{b['from']:g} to {b['to']:g}"),
+            Cell(f"{100 * b['mean']:.1f} %"),
+            Cell(f"{b['right']['hits']} of {b['right']['of']}"),
+            Cell(f"{100 * b['right']['low']:.0f} to {100 * b['right']['high']:.0f} %"),
+        ]
+        for b in found["reliability"]
+    ]
+    head = ["probability of a name", "mean", "right", "95 % interval"]
+    return [Table("Reliability", head, rows)] if rows else []
 
 
 def _lost(found: dict) -> list[Table]:

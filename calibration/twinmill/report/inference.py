@@ -24,7 +24,8 @@ def sentence(answer: Answer) -> str:
     names = " and ".join(_name(f) for f in answer.findings)
     if answer.verdict == "outside_catalogue":
         like = f", most like {names}" if names else ""
-        return f"Missing: something outside the catalogue ({percent(answer.outside)}){like}{_on(answer)}."
+        outside = f"something outside the catalogue ({percent(answer.outside)})"
+        return f"Missing: {outside}{like}{_on(answer)}."
     return f"Missing: {names}{_on(answer)}."
 
 

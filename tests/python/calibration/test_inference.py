@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names, probabilities and numbers of the inference, on robots of known constants.
+
+The robots share no code with the twin (see conftest.py). Tolerances of numbers: three standard
+deviations of the estimate.
+"""
+
+import json
+
+import numpy as np
+import pytest
+
+from twinmill.data.log import LogError
+from twinmill.data.measurement import load_measurements
+from twinmill.fitting.fit import fit
+from twinmill.inference.infer import infer
+from twinmill.model.model_file import ModelFile
+
+SURE = 0.95  # what the interface calls sure
+
+
+def number(found, effect, name):
+    (named,) = [f for f in found.answer.findings if f.effect == effect]
+    return named.numbers[name]
+
+
+@pytest.fixture(scope="module")
+def own(measure, tanh_robot):
+    """The log that `one_clock_base` was fitted to."""
+    return measure(tanh_robot(), 1, 60.0)
+
+
+@pytest.mark.parametrize("seed", [5, 6, 12])
+def test_no_alarm_where_the_robot_is_as_it_was(measure, one_clock_base, own, seed):
+    """That nothing is missing is likely, or cannot be told of 40 s; nothing is named."""
+    found = infer([measure(seed=seed)], one_clock_base, [own])
+    assert found.answer.verdict in ("model_adequate", "cannot_tell")
+    assert found.answer.nothing > 1 - SURE
+    assert not found.answer.findings
+
+
+def test_a_robot_that_rolls_on_is_named_coasting(measure, tanh_robot, one_clock_base, own):
+    found = infer([measure(tanh_robot(coast_mps2=0.6), 7)], one_clock_base, [own])
+    first = found.answer.findings[0]
+    assert first.effect == "coasting"
+    assert first.probability > SURE
+
+
+def test_a_marker_beside_the_axle_is_named_with_its_place(measure, one_clock_base, own):
+    """Poses are moved by algebra: 8 mm ahead and 5 mm to the left of where they were."""
+
+    def aside(pose, valid):
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        x, y = 8e-3, 5e-3
+        return pose + np.column_stack([c * x - s * y, s * x + c * y, 0 * c]), valid
+
+    found = infer([measure(seed=9, spoil=aside)], one_clock_base, [own])
+    first = found.answer.findings[0]
+    assert first.effect == "marker_offset"
+    assert first.probability > SURE
+    for name, truth in (("x_m", 8e-3), ("y_m", 5e-3)):
+        value, std = number(found, "marker_offset", name)
+        assert abs(value - truth) < 3 * std
+        assert std < 1e-3
+
+
+def test_what_the_base_misses_in_its_own_log_is_no_news(
+    measure, tanh_robot, model_file, tmp_path_factory
+):
+    """A robot that turns less the faster it drives, in the base's log as in the next one."""
+
+    class Stiff(tanh_robot):
+        def hindered(self, motion):
+            return motion * np.column_stack(
+                [1 + 0 * motion[:, 0]] * 2 + [1 - 1.2 * np.abs(motion[:, 0])]
+            )
+
+    before, later = measure(Stiff(), 1, 60.0), measure(Stiff(), 11)
+    path = tmp_path_factory.mktemp("stiff") / "base.toml"
+    fit([before], model_file(extra="[clock]\nsame = true\n"), path, "")
+    base = ModelFile.load(str(path))
+    news, known = infer([later], base), infer([later], base, [before])
+    assert [name for name, _ in known.always.kernels] == ["coupling of turns: turns by speed"]
+    assert news.answer.nothing < 1e-6
+    assert known.answer.nothing > 1e3 * news.answer.nothing
+    assert not [f for f in known.answer.findings if f.certainty == "sure"]
+
+
+def test_the_same_log_gives_the_same_bytes(measure, one_clock_base, own):
+    run = measure(seed=5)
+    texts = [json.dumps(infer([run], one_clock_base, [own]).to_json()) for _ in range(2)]
+    assert texts[0] == texts[1]
+
+
+def test_two_logs_are_refused_in_a_sentence(measure, one_clock_base):
+    runs = [measure(seed=5), measure(seed=6)]
+    with pytest.raises(LogError, match="infer: the log holds 2 robots, and one robot's"):
+        infer(runs, one_clock_base)
+
+
+HIDDEN = {  # the README's answers, and those that were sealed when these logs came
+    "a": "dead_zone",
+    "b": "motor_lag",
+    "c": "floor_tilt",
+    "d": "marker_offset",
+    "e": "",
+    "f": "battery_sag",
+    "s": "wheel_gain",
+    "t": "lateral_slip",
+    "u": "wheel_eccentricity",
+    "w": "",
+    "x": "heading_bias",
+}
+
+
+@pytest.fixture(scope="module")
+def foreign(data_dir, model_file, tmp_path_factory):
+    """Logs of a plant that is not ours, and the base that was fitted to one of them."""
+    folder = data_dir / "hidden_effects"
+    if not folder.is_dir():
+        pytest.skip(f"no recordings at {folder}")
+    rough = model_file(
+        ("[0, 25, 50, 75, 100]", "[0, 12.5, 25, 37.5, 50, 75, 100]"),
+        ("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.05, 0.1, 0.15, 0.2, 0.28, 0.36]"),
+    )
+    path = tmp_path_factory.mktemp("foreign") / "fitted.toml"
+    before = load_measurements([folder / "calibration.lcmlog"])
+    fit(before, rough, path, "")
+    return folder, before, ModelFile.load(str(path))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", HIDDEN)
+def test_hidden_effects_of_a_foreign_plant(foreign, case):
+    folder, before, base = foreign
+    found = infer(load_measurements([folder / f"case_{case}.lcmlog"]), base, before)
+    names = [f.effect for f in found.answer.findings]
+    assert names[:1] == [HIDDEN[case]] if HIDDEN[case] else not names
+    sure = {f.effect for f in found.answer.findings if f.certainty == "sure"}
+    assert sure <= {HIDDEN[case]}
