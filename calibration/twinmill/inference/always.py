@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a model always misses: its discrepancy in the log that it was fitted to.
 
-A fitted base is of another form than the robot. What it leaves in its own log (a bend of the speed,
-a coupling of turns, a slow wander, single moments) is no news in the next one. It is found by the
-same evidence that judges later logs, kernel after kernel while the posterior odds rise, and enters
+A fitted base is of another form than the robot. What it leaves in its own log (effects that a fit
+of the base's numbers leaves out, a coupling of turns, a slow wander, single moments) is no news in
+the next one. It is found by the same evidence that judges later logs: the likeliest set of effects,
+then kernel after kernel while the posterior odds rise. It enters
 their prior: a function of speed, heading or the past with its weights, one of time or place with
 its size alone (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
 """
@@ -11,19 +12,21 @@ its size alone (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from twinmill.data.measurement import Measurement
 from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
-from twinmill.inference.hypothesis import Fitter, Hypothesis
+from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
-from twinmill.inference.noise import Noise, fit_noise
+from twinmill.inference.noise import Noise
 from twinmill.inference.prior import Always, weight_labels
 from twinmill.inference.problem import Problem, View, problem_of
-from twinmill.inference.search import evidence
+from twinmill.inference.search import Search, evidence
 from twinmill.inference.settings import PRIORS
-from twinmill.inference.table import WORTH
+from twinmill.inference.table import WORTH, noise_of
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import catalogue, is_local, with_role
 
 MOST = 8  # kernels: more are parts of each other
 
@@ -53,22 +56,29 @@ def always_of(measurement: Measurement, model_file: ModelFile) -> Always:
         model_file: as fitted.
     """
     p = problem_of(measurement, model_file, sheet=True)
-    h = p.base
-    columns = np.tensordot(np.linalg.cholesky(h.cov).T, h.slopes, 1)
-    at_mean = h.errors + np.tensordot(h.value - h.mean, h.slopes, 1)
-    of_base = fit_noise(at_mean, columns, p.steps.stretches, p.noise)
-    noises = [p.noise, replace(of_base, weight=p.noise.weight)]
-    best = max((_grown(p, p.view(noise)) for noise in noises), key=lambda g: g.log_evidence)
-    return _conditioned(p, best)
+    search = Search(p).run()
+    h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
+    noise = noise_of(h, p)
+    noises = [p.noise, replace(noise, weight=p.noise.weight)]
+    best = max((_grown(p, h, p.view(n)) for n in noises), key=lambda g: g.log_evidence)
+    return _conditioned(p, h, best)
 
 
-def _grown(p: Problem, view: View) -> _Grown:
+def _lasts(effects: tuple[str, ...]) -> bool:
+    """Whether all of a set are of the robot: none of a place, a while or the clocks."""
+    return not any(
+        is_local(name) or with_role(name, "moment") or catalogue()[name]["needs"] == "clocks"
+        for name in effects
+    )
+
+
+def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     words = len({k.depends_on for k in p.kernels}) + 1
-    linear = p.base.linear(view.fitter.whiten)
+    linear = h.linear(view.fitter.whiten)
     found: list[tuple[Kernel, float]] = []
     prior = 0.0
     while len(found) < MOST:
-        own = evidence(p.base, view, None, _white(view, found))
+        own = evidence(h, view, None, _white(view, found))
         forms = np.array(
             [sum(k.depends_on == kernel.depends_on for k in p.kernels) for kernel in p.kernels]
         )
@@ -94,33 +104,26 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray | None:
     return np.concatenate(own) if own else None
 
 
-def _conditioned(p: Problem, grown: _Grown) -> Always:
-    """The base's numbers and lasting weights, given its own log."""
+def _conditioned(p: Problem, h: Hypothesis, grown: _Grown) -> Always:
+    """The base's and the effects' numbers and the lasting weights, given the base's own log."""
     size = {k.name: s for k, s in grown.kernels}
     there = [k for k in p.kernels if k.name in size]
-    columns = [size[k.name] * k.columns for k in there]
-    weights = [label for k in there for label in weight_labels(k)]
-    lasting = [label for k in there if k.lasting for label in weight_labels(k)]
-    count = len(p.prior.mean)
-    cov = np.eye(count + len(weights))
-    cov[:count, :count] = p.prior.cov
-    prior = replace(
-        p.prior,
-        mean=np.r_[p.prior.mean, np.zeros(len(weights))],
-        cov=cov,
-        columns=np.concatenate(columns) if columns else p.prior.columns,
-    )
-    fitter = Fitter(p.steps, grown.noise, prior.columns)
-    h = Hypothesis.of_base(p.base.model, prior)
-    h = fitter.fit(replace(h, value=np.r_[p.base.value, np.zeros(len(weights))]))
-    _, spread = h.posterior(h.linear(fitter.whiten))
-    labels = [*p.prior.names, *weights]
-    kept = [k for k, n in enumerate(labels) if n in p.prior.names or n in lasting]
+    labels = [*h.labels, *(label for k in there for label in weight_labels(k))]
+    lasting = {label for k in there if k.lasting for label in weight_labels(k)}
+    view = p.view(grown.noise)
+    linear = h.linear(view.fitter.whiten)
+    if there:
+        linear = linear.with_columns(_white(view, grown.kernels))
+    root = block_diag(np.linalg.cholesky(h.cov), np.eye(len(labels) - len(h.labels)))
+    mean = np.r_[h.mean, np.zeros(len(labels) - len(h.labels))] + root @ linear.mean
+    cov = root @ linear.covariance @ root.T
+    kept = [k for k, n in enumerate(labels) if k < len(h.labels) or n in lasting]
     noise = grown.noise
     return Always(
+        effects=h.effects,
         labels=tuple(labels[k] for k in kept),
-        mean=h.value[kept],
-        cov=spread[np.ix_(kept, kept)],
+        mean=mean[kept],
+        cov=cov[np.ix_(kept, kept)],
         kernels=tuple(size.items()),
         rate=grown.rate,
         usual=p.motion.usual,

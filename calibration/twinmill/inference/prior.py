@@ -8,6 +8,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.linalg import block_diag
 
+from twinmill.inference.candidates import size_std
 from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.duties import refined
 from twinmill.inference.moments import Rate
@@ -19,7 +20,10 @@ from twinmill.model.parameters import (
     LAG,
     base_parameters,
     duty_table,
+    effect_parameters,
     gains_of,
+    instance_of,
+    newest_instance,
 )
 
 CLOCK_STD_S = 1.0  # of an offset that nothing is known of, about the best that was looked for
@@ -34,7 +38,9 @@ class Always:
     """What a model misses in the log that it was fitted to, so that it is no news in another.
 
     Attributes:
-        labels: names of the base's numbers, and of weights of its discrepancy, N of them.
+        effects: of the catalogue, that the base lacks there.
+        labels: names of the base's and the effects' numbers, and of weights of its discrepancy, N
+            of them.
         mean, cov: (N,), (N, N) of these.
         kernels: name and size of each kernel of the discrepancy.
         rate: of moments.
@@ -42,6 +48,7 @@ class Always:
         noise: (3, 3) sensor, drive, memory of each channel, see `Noise`.
     """
 
+    effects: tuple[str, ...]
     labels: tuple[str, ...]
     mean: np.ndarray
     cov: np.ndarray
@@ -81,7 +88,14 @@ class Prior:
         return cov
 
 
-def base_prior(model: native.Model, model_file: ModelFile, same_clock: bool, known: bool) -> Prior:
+def base_prior(
+    model: native.Model,
+    model_file: ModelFile,
+    *,
+    same_clock: bool,
+    known: bool,
+    effects: Sequence[str],
+) -> Prior:
     """From a model file: values, the covariance that a fit wrote, and how gains drift since.
 
     Args:
@@ -89,6 +103,7 @@ def base_prior(model: native.Model, model_file: ModelFile, same_clock: bool, kno
         model_file: its file.
         same_clock: one clock stamps all, or other logs gave the offset.
         known: other logs gave the offset.
+        effects: that the model has beside those of its file; their numbers are the card's priors.
     """
     names = [*gains_of(model)]
     names += [LAG] * (model.get(LAG) > 0)
@@ -101,7 +116,10 @@ def base_prior(model: native.Model, model_file: ModelFile, same_clock: bool, kno
         rest = len(names) - len(fine.weights)
         weights = block_diag(fine.weights, np.eye(rest))
         cov = weights @ cov @ weights.T + np.diag(np.r_[fine.std_mps, np.zeros(rest)] ** 2)
-    parts = base_parameters(model, names)
+    own = [p for name in effects for p in effect_parameters(model, newest_instance(model, name))]
+    parts = [*base_parameters(model, names), *own]
+    cov = block_diag(cov, np.diag([size_std(p) ** 2 for p in own]))
+    names += [p.name for p in own]
     value = np.array([p.value for p in parts])
     return Prior(
         names,
@@ -169,11 +187,16 @@ def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
     cov[np.ix_(own, own)] = always.cov[np.ix_(index, index)]
     told = [k for k in own if k < count]
     cov[np.ix_(told, told)] += drift([prior.names[k] for k in told], mean[told])
-    weights = [k for k in own if k >= count]
-    cov[weights, weights] += PRIORS.sheet**2
+    for k in own:  # what the base lacks is known less well than its own numbers
+        size = 1.0 if k >= count else 0.0 if _is_base(labels[k]) else mean[k]
+        cov[k, k] += (PRIORS.sheet * size) ** 2
     return replace(
         prior, mean=mean, cov=cov, columns=np.concatenate(columns) if columns else prior.columns
     )
+
+
+def _is_base(name: str) -> bool:
+    return instance_of(name) in ("base", "clock")
 
 
 def weight_labels(kernel: Kernel) -> list[str]:

@@ -136,6 +136,8 @@ def problem_of(
     if whole.drive == "duty":
         whole = refined(model_file).model
     model = whole.for_robot(measurement.track.robot_id)
+    for name in always.effects if always else ():
+        model.add_effect(name)
     known = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
     known = known and not measurement.two_clocks
     if measurement.same_clock and not known:
@@ -143,11 +145,19 @@ def problem_of(
     declared = measurement.same_clock or model.clock_same
     same_clock = (known or declared) and measurement.lateness is None
     steps = Steps(measurement)
-    prior = base_prior(model, model_file, same_clock, known)
+    prior = base_prior(
+        model,
+        model_file,
+        same_clock=same_clock,
+        known=known,
+        effects=always.effects if always else (),
+    )
     if sheet:
         prior = replace(prior, cov=prior.stale)
     if not same_clock:
         prior = _with_clock(prior, model, steps)
+    if always is not None:
+        _set_to(model, prior, always)
     motion = _motion(steps, model, always)
     found = discrepancy.kernels(motion)
     if always is not None:
@@ -160,6 +170,14 @@ def problem_of(
     noise = _flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
     return replace(rough, noise=noise, base=base)
+
+
+def _set_to(model: native.Model, prior: Prior, always: Always) -> None:
+    """Sets a model to the numbers that the base's own log gave, but for its clock."""
+    known = dict(zip(always.labels, always.mean, strict=True))
+    for name, low, high in zip(prior.names, prior.low, prior.high, strict=True):
+        if name in known and not name.startswith("clock."):
+            model.set(name, float(np.clip(known[name], low, high)))
 
 
 def _with_clock(prior: Prior, model: native.Model, steps: Steps) -> Prior:

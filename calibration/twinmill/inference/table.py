@@ -12,7 +12,7 @@ from twinmill.inference.discrepancy import CHANCE, SIZES, STEP
 from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
-from twinmill.inference.noise import fit_noise
+from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
 from twinmill.model.parameters import effect_names, newest_instance
@@ -85,11 +85,7 @@ def table_of(search: Search) -> Table:
     views = [search.view]
     for h in dict.fromkeys([(), order[0]]):
         search.progress("noise")
-        own = search.fitted[h].hypothesis
-        columns = np.tensordot(np.linalg.cholesky(own.cov).T, own.slopes, 1)
-        at_mean = own.errors + np.tensordot(own.value - own.mean, own.slopes, 1)
-        noise = fit_noise(at_mean, columns, p.steps.stretches, p.noise)
-        views.append(p.view(replace(noise, weight=p.noise.weight)))
+        views.append(p.view(noise_of(search.fitted[h].hypothesis, p)))
     entries: dict[tuple, Entry] = {}
     falls: dict[tuple, float] = {}  # under the first noise, as the excess is
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
@@ -119,6 +115,13 @@ def table_of(search: Search) -> Table:
         len(p.names),
         search.words,
     )
+
+
+def noise_of(h: Hypothesis, p: Problem) -> Noise:
+    """The noise that a hypothesis leaves; steps weigh as with all flexible terms."""
+    columns = np.tensordot(np.linalg.cholesky(h.cov).T, h.slopes, 1)
+    at_mean = h.errors + np.tensordot(h.value - h.mean, h.slopes, 1)
+    return fit_noise(at_mean, columns, p.steps.stretches, p.noise)
 
 
 @dataclass(frozen=True)
