@@ -326,6 +326,29 @@ def test_sdf_passes_its_own_library(wheels, folder, model_text):
     assert check(b"broken.sdf") != 0
 
 
+@pytest.mark.parametrize(("wheels", "rolling"), [("mecanum", 4), ("omni3", 3), ("differential", 4)])
+def test_sdformat_holds_the_frame_of_friction_by_the_letters_that_each_gazebo_asks_for(
+    wheels, rolling, folder, model_text, capfd
+):
+    """Gazebo's physics compares `ignition:` in Fortress, `gz:` since Garden, as letters.
+
+    What the library prints is what it holds. For XML the two are one name if they stand for one
+    address, and no other parser would then open the file.
+    """
+    library = ctypes.util.find_library("sdformat12")
+    if not library:
+        pytest.skip("libsdformat12 is not installed (Debian: libsdformat12-12)")
+    open_text(folder, model_text("m").replace('"mecanum"', f'"{wheels}"'))
+    run(["export-model", "m.toml", "--to", "sdf"])
+    capfd.readouterr()
+    ctypes.CDLL(library).cmdPrint(b"m.sdf", 0, 0, 0, 17, 0)
+    ctypes.CDLL(None).fflush(None)
+    printed = capfd.readouterr().out
+    ET.fromstring(printed)
+    frames = re.findall(r"<fdir1 (\S+)='base_link' (\S+)='base_link'>", printed)
+    assert frames == [("ignition:expressed_in", "gz:expressed_in")] * rolling
+
+
 def test_a_controller_told_the_exported_numbers_drives_as_fast_as_it_is_asked(folder, model_text):
     """The inverse kinematics of ros2_control's mecanum controller, by hand: both gains undone."""
     file = open_text(folder, model_text("m", forward_gain=0.9, sideways_gain=0.9, yaw_gain=0.8))
