@@ -27,8 +27,10 @@ from twinmill.model.model_file import ModelFile
 from twinmill.predict.windows import Windows
 from twinmill_cli.main import run
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "two-hours.md"
-(DRIVEN_BY_DUTY,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+(DRIVEN_BY_DUTY,) = re.findall(
+    r"```python\n(.*?)```", (DOCS / "two-hours.md").read_text(), re.DOTALL
+)
 CARRIED_BY_THREE = """
 [[effect]]
 name = "mass_offset"
@@ -241,6 +243,29 @@ def test_what_the_file_says_of_its_delay_holds_in_mujoco(folder, model_text):
     for begun, moves in ((zero, 1), (after_reset, delayed_steps)):
         states, _ = rollout.rollout(model, data, begun[None], ahead)
         assert np.argmax(np.abs(states[0, :, 1 + model.nq]) > 1e-6) == moves
+
+
+def test_what_the_page_on_other_simulators_shows_runs(folder, model_text):
+    text = model_text("m", motor_lag_s=0) + '[[effect]]\nname = "input_delay"\ndelay_s = 0.03\n'
+    open_text(folder, text)
+    for kind, name in (("mjcf", "better.xml"), ("urdf", "better.urdf")):
+        run(["export-model", "m.toml", "--to", kind, "--out", name])
+    page = (DOCS / "simulators.md").read_text()
+    exec("".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names := {})
+    model, data, swarm = (names[name] for name in ("model", "data", "swarm"))
+    names["begin"]([0.3] * 4)
+    assert first_moves(model, data) == 0
+    mujoco.mj_setState(model, data, names["state"], names["full"])
+    data.ctrl[:] = 0.3
+    assert first_moves(model, data) == 30
+
+    many = mujoco.MjData(swarm)
+    many.ctrl[4:8] = 0.3  # the second of three
+    mujoco.mj_step(swarm, many, 530)
+    assert many.qpos[3] == pytest.approx(0.15, abs=0.001)  # half a second ahead
+    np.testing.assert_allclose(np.delete(many.qpos, 3), 0, atol=1e-6)
+
+    assert names["free"].body_mass.sum() == pytest.approx(1.2)
 
 
 BY_HAND = """

@@ -167,6 +167,7 @@ def _about(robot: RobotModel, left: list[Left]) -> str:
         f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash}).",
         f"ctrl: {ctrl}.",
         "Joints x, y, yaw are the pose; the floor is drawn and does not touch.",
+        "A scene that this is attached to needs this integrator: its own options hold there.",
         *(DELAYED if _delay_s(robot) > 0 else ()),
         "Not carried:",
         *(f"- {item.sentence()}" for item in left),

@@ -4,19 +4,17 @@
 import ctypes
 import ctypes.util
 import math
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from interop.cells import Cell, Told, writes
+from interop.cells import ROOT, Cell, Told, writes
 from interop.robot import MASS_KG, TEXT, WHEEL_RADIUS_M, WHEELS, write
 
 FILE = "robot.sdf"
 ENGINE = "ign-physics-5/engine-plugins/libignition-physics5-dartsim-plugin.so.5"
-FLOOR = """<world name="room"><model name="floor"><static>true</static><link name="floor">
-<collision name="floor"><geometry><plane><normal>0 0 1</normal></plane></geometry></collision>
-</link></model>"""
 WAYS = {"ahead": (0.2, 0, 0), "sideways": (0, 0.2, 0), "turning": (0, 0, 1.5)}
 WAYS |= {"all three at once": (0.12, 0.08, 0.8)}
 HALF_TRACK_M, HALF_WHEELBASE_M = 0.067, 0.059
@@ -83,16 +81,16 @@ def gazebo(folder: Path) -> Told:
 
 
 def _drives(folder: Path, wheels: str, velocity: tuple[float, float, float]) -> bool:
-    """Told its wheels' speeds by textbook kinematics, does it move by `velocity` after 2 s?"""
+    """In the page's world, its wheels told by textbook kinematics, is `velocity` its own?"""
     told = [
         f"{name}_wheel_joint={rim_mps / WHEEL_RADIUS_M}"
         for name, rim_mps in _rims_mps(wheels, *velocity).items()
     ]
-    text = (folder / f"{wheels}.sdf").read_text()
-    room = text.replace("<model", f"{FLOOR}<model", 1).replace("</sdf>", "</world></sdf>")
-    (folder / "room.sdf").write_text(room)
+    page = (ROOT / "docs/simulators.md").read_text()
+    (folder / "room.sdf").write_text(page.split("```xml\n")[1].split("```")[0])
+    shutil.copy(folder / f"{wheels}.sdf", folder / "better.sdf")
     engine = f"/usr/lib/{sys.implementation._multiarch}/{ENGINE}"
-    command = ["./gazebo_drive", engine, "room.sdf", "robot", "base_link", "2", *told]
+    command = ["./gazebo_drive", engine, "room.sdf", "second", "base_link", "2", *told]
     printed = subprocess.check_output(command, cwd=folder, text=True).split()
     (x0, y0, at0), (x1, y1, at1) = ([float(v) for v in printed[i:][:3]] for i in (-6, -3))
     turned = math.remainder(at1 - at0, 2 * math.pi)
