@@ -6,7 +6,7 @@ import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from interop.cells import Told, writes
+from interop.cells import Cell, Told, writes
 from interop.robot import MASS_KG, WHEEL_RADIUS_M, WHEELS, write
 from interop.sdf import held_by_sdformat
 
@@ -84,3 +84,8 @@ def bullet(folder: Path) -> Told:
         "camera's frame": "camera_link" in names,
         "mass": math.isclose(sum(masses_kg), MASS_KG),
     }
+
+
+NOT_RUN = [
+    Cell("ros2_control", "writes", "ros2_control", why_not="no package registry has it"),
+]
