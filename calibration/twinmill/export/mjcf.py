@@ -27,7 +27,10 @@ from twinmill.export.drive import wheel_gains
 
 STEP_S = 0.001
 SETTLE_S = 0.001  # of the body behind its wheels
-DELAY_SLOTS_PER_S = 1000  # commands that a delay keeps: one each step
+DELAY_SLOTS_PER_S = 10_000  # commands that a delay keeps: one each step of 0.1 ms or more
+# Taken off a delay: MuJoCo's time is a sum of steps, and a delay of whole steps is one step longer
+# while the sum is rounded to one side.
+ROUNDING_S = 1e-7
 ASPECT = 4 / 3  # of the camera's picture
 CURVES = ("dead_zone", "speed_curve")
 STATIC = (*CURVES, "wheel_gain", "reverse_asymmetry")  # in the duty table
@@ -44,6 +47,14 @@ BY_TABLE = {
     f"rolls as far, from the speed of duty {USUAL_PCT} %; exact is, if <custom> has coasting, to "
     "let ctrl fall at duty 0 by its first number, in m/s^2, and its second times ctrl",
 }
+
+DELAYED = (
+    "The delay of commands holds in MuJoCo in C and in Warp, at steps of 0.1 ms or more.",
+    "MJX with JAX leaves it out, and actearly, without a word. Before the first command it is 0,",
+    "whatever ctrl a keyframe has: mj_initCtrlHistory fills it. data.time set back repeats old",
+    "commands or ends it. Begin a rollout with mj_getState after mj_resetData: from a state of",
+    "zeros one command acts at once.",
+)
 
 
 def mjcf(robot: RobotModel) -> tuple[str, list[Left]]:
@@ -156,6 +167,8 @@ def _about(robot: RobotModel, left: list[Left]) -> str:
         f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash}).",
         f"ctrl: {ctrl}.",
         "Joints x, y, yaw are the pose; the floor is drawn and does not touch.",
+        "A scene that this is attached to needs this integrator: its own options hold there.",
+        *(DELAYED if _delay_s(robot) > 0 else ()),
         "Not carried:",
         *(f"- {item.sentence()}" for item in left),
     ]
@@ -363,8 +376,11 @@ def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict
     options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
     if lag_s > 1e-6 or _values(robot, "coasting"):
         options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
-    if delay_s > 0:
-        options |= {"delay": _n(delay_s), "nsample": str(round(DELAY_SLOTS_PER_S * delay_s) + 1)}
+    if delay_s > ROUNDING_S:
+        options |= {
+            "delay": _n(delay_s - ROUNDING_S),
+            "nsample": str(int(np.ceil(DELAY_SLOTS_PER_S * delay_s)) + 1),
+        }
     return options
 
 
