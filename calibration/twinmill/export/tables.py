@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as compute
 import pyarrow.csv
 import pyarrow.parquet
 import turbopi
@@ -92,9 +93,22 @@ def _by_kind(value: np.ndarray, kind: np.ndarray) -> Iterator[tuple[str, np.ndar
 
 
 def write_csv(table: pa.Table, path: Path) -> None:
-    """With one header row; not-a-number as `nan`."""
+    """With one header row; numbers of a float keep their point, not-a-number is an empty cell.
+
+    Readers that guess types by the first rows would take `0` for an integer and `nan` for a word.
+    """
     options = pyarrow.csv.WriteOptions(quoting_style="needed")
-    pyarrow.csv.write_csv(table, path, options)
+    pyarrow.csv.write_csv(
+        pa.table(dict(zip(table.column_names, map(_said, table), strict=True))), path, options
+    )
+
+
+def _said(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """The words of a column of floats; any other column as it is."""
+    if not pa.types.is_floating(column.type):
+        return column
+    known = compute.if_else(compute.is_nan(column), None, column)
+    return compute.replace_substring_regex(known.cast(pa.string()), r"^(-?\d+)$", r"\1.0")
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:
