@@ -75,6 +75,21 @@ def test_a_heading_that_steps_for_good_is_told_as_that(driven):
     assert "the place does not" in said and "jumps" not in said
 
 
+@pytest.mark.parametrize("turned_deg", [0, 90, 180])
+def test_a_heading_opposite_to_the_motion_is_told_of_a_robot_that_drives_in_arcs_alone(
+    driven, turned_deg
+):
+    """As a tag is that was drawn by AprilTag, and read as OpenCV draws it; across is another's."""
+    robot = driven()
+    robot.pose[:, 2] += np.radians(turned_deg)
+    track = make_track(robot)
+    said = [note for note in track.notes if "of its heading" in note]
+    assert abs(track.astray_rad) == pytest.approx(np.pi * (turned_deg == 180), abs=0.01)
+    assert len(said) == (turned_deg == 180)
+    assert all("--heading-offset-deg R03=" in note and "180" in note for note in said)
+    assert all("--family tag36h11" in note for note in said)
+
+
 def test_a_pose_that_is_left_out_leaves_no_trace(driven):
     """A camera's glitch far off the floor, and the same frame lost."""
     far, lost = driven(), driven()

@@ -126,11 +126,15 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         astray_rad = _astray_rad(robot, pose, segment)
         if astray_rad:
             back = abs(astray_rad) > np.pi - ASTRAY_RAD
+            unless = (
+                ", unless all its commands have the wrong sign (--flip); tags drawn by AprilTag "
+                "stand on their head against OpenCV's (`twinmill track --family tag36h11`)"
+            )
             notes.append(
-                f"driven straight, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
+                f"driven ahead, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
                 "left of its heading; turn the poses by that (`twinmill import "
                 f"--heading-offset-deg R{robot.robot_id:02d}={np.degrees(astray_rad):.0f}`)"
-                f"{', unless all its commands have the wrong sign (--flip)' if back else ''}."
+                f"{unless if back else ''}."
             )
     else:
         heading_smooth = np.where(segment < 0, np.nan, 0.0)
@@ -304,22 +308,39 @@ def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
 
 
 def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float:
-    """As in Track: motion that points elsewhere than the heading of a robot driven straight."""
+    """As in Track: motion that points elsewhere than the heading of a robot driven straight.
+
+    Where it is driven in arcs alone, motion that points backwards.
+    """
+    straight = _straight(robot.command, robot.command_kind)
+    if angle_rad := _way_rad(robot, pose, segment, straight):
+        return angle_rad
+    angle_rad = _way_rad(robot, pose, segment, _arcs(robot), most_bend_rad=np.inf)
+    return angle_rad if abs(angle_rad) > np.pi - ASTRAY_RAD else 0.0
+
+
+def _way_rad(
+    robot: RobotLog,
+    pose: np.ndarray,
+    segment: np.ndarray,
+    command: np.ndarray,
+    most_bend_rad: float = SPIN_RAD,
+) -> float:
+    """Angle from the heading to the way of a robot under (M,) commands ahead; 0 if it is small."""
     half = max(1, round(0.25 / float(np.median(np.diff(robot.pose_t_s)))))
     middle = np.arange(half, len(pose) - half)
     whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
     middle = middle[whole]
     first, last = middle - half, middle + half
-    straight = _straight(robot.command, robot.command_kind)[:, None]
     forward = np.column_stack(
         [
-            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, straight)
+            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, command[:, None])
             for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)
         ]
     )
     steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
     bend = np.median(_bend_rad(pose, first, middle, last)[steady]) if steady.any() else 0.0
-    if bend > SPIN_RAD:
+    if bend > most_bend_rad:
         return 0.0
     if np.count_nonzero(steady) < half:
         return 0.0
@@ -359,3 +380,13 @@ def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:
     if kind == "twist":
         return np.where((command[:, 1:3] == 0).all(axis=1), command[:, 0], 0.0)
     return np.where(np.ptp(command, axis=1) == 0, command[:, 0], 0.0)
+
+
+def _arcs(robot: RobotLog) -> np.ndarray:
+    """(M,) forward command where it asks for an arc, else 0."""
+    command = robot.command
+    if robot.command_kind == "twist":
+        return np.where((command[:, 1] == 0) & (command[:, 2] != 0), command[:, 0], 0.0)
+    left, right = command[:, 0], command[:, 1]
+    sides = (left == command[:, 2]) & (right == command[:, 3]) & (left != right)
+    return np.where(sides & (left * right > 0), left, 0.0)
