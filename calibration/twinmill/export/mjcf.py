@@ -27,7 +27,7 @@ from twinmill.export.drive import wheel_gains
 
 STEP_S = 0.001
 SETTLE_S = 0.001  # of the body behind its wheels
-DELAY_SLOTS_PER_S = 1000  # commands that a delay keeps: one each step
+DELAY_SLOTS_PER_S = 10_000  # commands that a delay keeps: one each step of 0.1 ms or more
 ASPECT = 4 / 3  # of the camera's picture
 CURVES = ("dead_zone", "speed_curve")
 STATIC = (*CURVES, "wheel_gain", "reverse_asymmetry")  # in the duty table
@@ -364,7 +364,10 @@ def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict
     if lag_s > 1e-6 or _values(robot, "coasting"):
         options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
     if delay_s > 0:
-        options |= {"delay": _n(delay_s), "nsample": str(round(DELAY_SLOTS_PER_S * delay_s) + 1)}
+        options |= {
+            "delay": _n(delay_s),
+            "nsample": str(int(np.ceil(DELAY_SLOTS_PER_S * delay_s)) + 1),
+        }
     return options
 
 

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What runs one other program on one file, and the table of what came of it.
+
+The other program's side of a cell runs in a Python of its own that has its packages alone, so its
+module imports at the top nothing but the standard library and this module.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+BEGIN, END = "<!-- interop:begin -->", "<!-- interop:end -->"
+HEAD = f"| format | Twinmill | other program | version | run | carried | ignored |\n{'|---' * 7}|"
+Told = dict[str, bool]  # what was looked at, and whether it came through
+
+
+class NotInstalled(Exception):
+    """A package of Debian that a cell needs is not there."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One format between Twinmill and one other program, in one direction.
+
+    Attributes:
+        format: what the file is.
+        direction: what Twinmill does with it, `writes` or `reads`.
+        program: the other one.
+        packages: that it needs, its own first: `name==version` of PyPI, `name` of Debian.
+        theirs: its side; given a folder. Tells what came through if it reads.
+        ours: Twinmill's side, likewise.
+        why_not: it cannot be run, for this reason.
+    """
+
+    format: str
+    direction: str
+    program: str
+    packages: tuple[str, ...] = ()
+    theirs: Callable[[Path], Told | None] | None = None
+    ours: Callable[[Path], Told | None] | None = None
+    why_not: str = ""
+
+    def run(self, folder: Path) -> Told:
+        """Both sides, the writing one first.
+
+        Raises:
+            NotInstalled: a package of Debian is missing.
+            subprocess.CalledProcessError: the other side failed; its error is on stderr.
+        """
+        version_of(self)
+        if self.direction == "writes":
+            self.ours(folder)
+            return self._theirs_apart(folder)
+        self._theirs_apart(folder)
+        return self.ours(folder)
+
+    def _theirs_apart(self, folder: Path) -> Told | None:
+        paths = [str(Path(__file__).parents[1])]
+        pinned = [name for name in self.packages if "==" in name]
+        if pinned:
+            paths.insert(0, str(_installed(pinned)))
+        python = [sys.executable, *(["-S"] if pinned else [])]
+        names = [self.theirs.__module__, self.theirs.__name__, str(folder)]
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        subprocess.run(
+            [*python, "-m", "interop.apart", *names], env=environment, cwd=folder, check=True
+        )
+        return json.loads((folder / "told.json").read_text())
+
+
+def writes(format: str, program: str, *packages: str, ours: Callable) -> Callable:
+    """Marks a function that reads with another program what `ours` wrote into a folder."""
+    return lambda theirs: _marked(Cell(format, "writes", program, packages, theirs, ours))
+
+
+def reads(format: str, program: str, *packages: str, ours: Callable) -> Callable:
+    """Marks a function that writes into a folder, with another program, what `ours` reads."""
+    return lambda theirs: _marked(Cell(format, "reads", program, packages, theirs, ours))
+
+
+def _marked(cell: Cell) -> Callable:
+    cell.theirs.cell = cell
+    return cell.theirs
+
+
+def cells_of(module) -> list[Cell]:
+    """Those of a format's module, in the order that they stand in; `NOT_RUN` comes last."""
+    marked = [thing.cell for thing in vars(module).values() if hasattr(thing, "cell")]
+    return [*marked, *getattr(module, "NOT_RUN", ())]
+
+
+def version_of(cell: Cell) -> str:
+    """The other program's.
+
+    Raises:
+        NotInstalled: a package of Debian is missing.
+    """
+    versions = [name.partition("==")[2] or _debian(name) for name in cell.packages]
+    return versions[0] if versions else ""
+
+
+def _debian(package: str) -> str:
+    command = ["dpkg-query", "--show", "--showformat", "${Version}", package]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode or not done.stdout:
+        raise NotInstalled(f"{package} is not installed (Debian: apt install {package})")
+    return re.sub(r"^\d+:|[+~-].*$", "", done.stdout)
+
+
+def _installed(pinned: list[str]) -> Path:
+    """Folder of these packages of PyPI and what they need."""
+    folder = ROOT / ".deps/interop" / "_".join(pinned)
+    done = folder / "complete"
+    if not done.exists():
+        pip = [
+            sys.executable,
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--no-warn-conflicts",
+            "--upgrade",
+            "--target",
+        ]
+        subprocess.run([*pip, str(folder), *pinned], check=True)
+        done.touch()
+    return folder
+
+
+def row(cell: Cell, told: Told, date: str) -> str:
+    """A line of the table."""
+    names = [cell.format, cell.direction, cell.program]
+    if cell.why_not:
+        return "| " + " | ".join([*names, "", "", f"not run, because {cell.why_not}", ""]) + " |"
+    sides = ["; ".join(what for what in told if bool(told[what]) is came) for came in (True, False)]
+    return "| " + " | ".join([*names, version_of(cell), date, *sides]) + " |"
+
+
+def rows_of(page: str) -> list[str]:
+    """Lines of the table in a page, without its head."""
+    table = page.split(BEGIN)[1].split(END)[0]
+    return table.strip().splitlines()[2:]
+
+
+def dateless(line: str) -> str:
+    """A line of the table without the day that it was run."""
+    parts = line.split("|")
+    return "|".join([*parts[:5], "", *parts[6:]])
