@@ -11,6 +11,7 @@ from twinmill.data.log import CommandKind, LogError, RobotLog
 from twinmill.data.lost_commands import lost_commands, words
 
 LIFT_M = 0.05  # height above the median that no driving robot has
+PLANE_ROUNDS, PLANE_M = 20, 1e-4  # of a plane's fit; nearer than a tracker tells
 SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not known any more
 HELD_S, HELDS = 2.0, 3  # a last command holds for this, or so many times the longest before it
 STANDING_M = 0.05  # within which a robot that stands is seen
@@ -172,6 +173,13 @@ def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) ->
 def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndarray:
     """(N,) bool: poses that are valid, on the floor, and taken while commands are known."""
     lifted = np.abs(robot.z_m - np.nanmedian(robot.z_m)) > LIFT_M  # NaN compares false
+    if lifted.any() and (floor := tilted_floor(robot)):
+        lifted = np.abs(floor.height_m) > LIFT_M
+        notes.append(
+            f"the capture's z is tilted by {np.degrees(floor.tilt_rad):.1f} degrees against the "
+            "floor on which the poses lie; heights are counted from that. Level its axes, for "
+            "example with its calibration square."
+        )
     if lifted.any():
         notes.append(
             f"{np.count_nonzero(lifted)} poses from {robot.pose_t_s[lifted][0]:.3f} s on "
@@ -192,6 +200,34 @@ def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndar
             f"taken while no commands are in the log{ended}; left out."
         )
     return robot.valid & ~lifted & ~silent & ~lost
+
+
+@dataclass(frozen=True)
+class TiltedFloor:
+    """A plane on which a robot drove: its tilt, and (N,) heights of the poses over it."""
+
+    tilt_rad: float
+    height_m: np.ndarray
+
+
+def tilted_floor(robot: RobotLog) -> TiltedFloor | None:
+    """The plane through most of a robot's places; None where a level one fits as well.
+
+    The least sum of distances, since a robot that is carried about is no part of it; found by
+    weights of one over each distance (Schlossmacher 1973). A few poses that are carried far tilt
+    such a plane, but then most lie worse on it than on a level one.
+    """
+    z_m = robot.z_m[robot.valid]
+    across = np.column_stack([robot.pose[:, :2], np.ones(len(robot.pose))])
+    on, weight = across[robot.valid], np.ones(len(z_m))
+    for _ in range(PLANE_ROUNDS):
+        root = np.sqrt(weight)
+        plane, *_ = np.linalg.lstsq(on * root[:, None], z_m * root, rcond=None)
+        weight = 1 / np.maximum(np.abs(z_m - on @ plane), PLANE_M)
+    level_m = np.median(np.abs(z_m - np.median(z_m)))
+    if np.median(np.abs(z_m - on @ plane)) > level_m / 2:
+        return None
+    return TiltedFloor(float(np.arctan(np.hypot(*plane[:2]))), robot.z_m - across @ plane)
 
 
 def _silent(robot: RobotLog) -> np.ndarray:
@@ -324,6 +360,7 @@ def _way_rad(
     pose: np.ndarray,
     segment: np.ndarray,
     command: np.ndarray,
+    *,
     most_bend_rad: float = SPIN_RAD,
 ) -> float:
     """Angle from the heading to the way of a robot under (M,) commands ahead; 0 if it is small."""
