@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 import twinmill_native as native
 import yaml
+from mujoco import rollout
 
 import twinmill as tm
 from twinmill.data.importers.import_log import ImportOptions, import_log
@@ -71,6 +72,7 @@ name = "mass_offset"
 x_m = 0.004
 y_m = -0.003
 """
+STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 KINDS = ("mjcf", "sdf", "urdf", "ros2_control", "json")
 
 
@@ -180,6 +182,64 @@ def test_in_stock_mujoco_a_robot_has_63_percent_of_its_speed_after_the_lag(
     assert data.qvel[0] > 0.2  # it does drive straight on
     slack = 1.5 * 0.001 / lag_s / np.e  # slope of the curve there
     assert after_lag_mps / data.qvel[0] == pytest.approx(1 - 1 / np.e, abs=slack)
+
+
+def delayed(folder, model_text, delay_s=0.03, lag=True):
+    """An MJCF file of a robot with a delay, and without a lag if wanted."""
+    text = model_text("m", **({} if lag else {"motor_lag_s": 0}))
+    robot = open_text(folder, text + f'[[effect]]\nname = "input_delay"\ndelay_s = {delay_s}\n')
+    return mjcf(robot)[0]
+
+
+def first_moves(model, data, steps=200):
+    """The step, counted from 0, after which a robot at rest first moves."""
+    for step in range(steps):
+        mujoco.mj_step(model, data)
+        if abs(data.qvel[0]) > 1e-6:
+            return step
+    return None
+
+
+@pytest.mark.parametrize("delay_s", [0.03, 0.0304, 0.3])
+@pytest.mark.parametrize("step_s", [0.002, 0.0005, 0.0001])
+def test_a_delay_in_stock_mujoco_is_as_long_at_any_step(step_s, delay_s, folder, model_text):
+    """Told to drive at rest, it moves after the delay; a step later where time is rounded down."""
+    text = delayed(folder, model_text, delay_s)
+    model = mujoco.MjModel.from_xml_string(text.replace("0.001", f"{step_s}", 1))
+    assert model.opt.timestep == step_s
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 0.3
+    late = first_moves(model, data, 4000) - np.ceil(delay_s / step_s - 1e-6)
+    assert late in (0, 1)
+
+
+def test_what_the_file_says_of_its_delay_holds_in_mujoco(folder, model_text):
+    text = delayed(folder, model_text, lag=False)
+    assert "mj_initCtrlHistory" in text and "MJX with JAX" in text
+    key = '<keyframe><key name="go" ctrl="0.3 0.3 0.3 0.3"/></keyframe></mujoco>'
+    model = mujoco.MjModel.from_xml_string(text.replace("</mujoco>", key))
+    data, delayed_steps = mujoco.MjData(model), 30
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    assert first_moves(model, data) == delayed_steps  # for all that ctrl is 0.3 before the first
+
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    for k in range(model.nu):
+        told = np.full(model.actuator_history[k, 0], data.ctrl[k])
+        mujoco.mj_initCtrlHistory(model, data, k, None, told)
+    assert first_moves(model, data) == 0
+
+    mujoco.mj_resetData(model, data)
+    data.time, data.ctrl[:] = -1, 0.3
+    assert first_moves(model, data) == 1  # no delay: the command of the step before
+
+    data.ctrl[:], zero = 0.3, np.zeros(mujoco.mj_stateSize(model, STATE))
+    after_reset = np.copy(zero)
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_getState(model, data, after_reset, STATE)
+    ahead = np.full((1, 40, model.nu), 0.3)
+    for begun, moves in ((zero, 1), (after_reset, delayed_steps)):
+        states, _ = rollout.rollout(model, data, begun[None], ahead)
+        assert np.argmax(np.abs(states[0, :, 1 + model.nq]) > 1e-6) == moves
 
 
 BY_HAND = """
@@ -324,6 +384,29 @@ def test_sdf_passes_its_own_library(wheels, folder, model_text):
     assert check(b"m.sdf") == 0
     (folder / "broken.sdf").write_text((folder / "m.sdf").read_text().replace(">base_link<", ">?<"))
     assert check(b"broken.sdf") != 0
+
+
+@pytest.mark.parametrize(("wheels", "rolling"), [("mecanum", 4), ("omni3", 3), ("differential", 4)])
+def test_sdformat_holds_the_frame_of_friction_by_the_letters_that_each_gazebo_asks_for(
+    wheels, rolling, folder, model_text, capfd
+):
+    """Gazebo's physics compares `ignition:` in Fortress, `gz:` since Garden, as letters.
+
+    What the library prints is what it holds. For XML the two are one name if they stand for one
+    address, and no other parser would then open the file.
+    """
+    library = ctypes.util.find_library("sdformat12")
+    if not library:
+        pytest.skip("libsdformat12 is not installed (Debian: libsdformat12-12)")
+    open_text(folder, model_text("m").replace('"mecanum"', f'"{wheels}"'))
+    run(["export-model", "m.toml", "--to", "sdf"])
+    capfd.readouterr()
+    ctypes.CDLL(library).cmdPrint(b"m.sdf", 0, 0, 0, 17, 0)
+    ctypes.CDLL(None).fflush(None)
+    printed = capfd.readouterr().out
+    ET.fromstring(printed)
+    frames = re.findall(r"<fdir1 (\S+)='base_link' (\S+)='base_link'>", printed)
+    assert frames == [("ignition:expressed_in", "gz:expressed_in")] * rolling
 
 
 def test_a_controller_told_the_exported_numbers_drives_as_fast_as_it_is_asked(folder, model_text):

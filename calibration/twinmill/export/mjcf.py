@@ -45,6 +45,14 @@ BY_TABLE = {
     "let ctrl fall at duty 0 by its first number, in m/s^2, and its second times ctrl",
 }
 
+DELAYED = (
+    "The delay of commands holds in MuJoCo in C and in Warp, at steps of 0.1 ms or more.",
+    "MJX with JAX leaves it out, and actearly, without a word. Before the first command it is 0,",
+    "whatever ctrl a keyframe has: mj_initCtrlHistory fills it. data.time set back repeats old",
+    "commands or ends it. Begin a rollout with mj_getState after mj_resetData: from a state of",
+    "zeros one command acts at once.",
+)
+
 
 def mjcf(robot: RobotModel) -> tuple[str, list[Left]]:
     """The file's text, and what it does not carry.
@@ -156,6 +164,7 @@ def _about(robot: RobotModel, left: list[Left]) -> str:
         f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash}).",
         f"ctrl: {ctrl}.",
         "Joints x, y, yaw are the pose; the floor is drawn and does not touch.",
+        *(DELAYED if _delay_s(robot) > 0 else ()),
         "Not carried:",
         *(f"- {item.sentence()}" for item in left),
     ]

@@ -14,13 +14,24 @@ DRIVES = {
     "differential": ("gz-sim-diff-drive-system", "gz::sim::systems::DiffDrive"),
 }
 LONG = {"f": "front", "r": "back"}
-ROLLERS = {1: "1 1 0", -1: "1 -1 0"}  # along which a mecanum wheel grips, by the sign of its y
+ROLLERS = ("mecanum", "omni3")  # wheels that grip along one line of the floor alone
+# A plain wheel's grip sideways over that along. Four of them turn as fast as told while this is
+# less than their track over their wheelbase; with one friction for all ways, a third slower.
+PLAIN_GRIP = 0.5
+# Before the name of the attribute that holds a direction of friction still while its wheel turns.
+# Gazebo's physics compares the letters: Fortress with the first prefix, Garden with either, later
+# ones with the second. For XML they are two attributes only if they have two addresses.
+PREFIXES = {
+    "ignition": "http://ignitionrobotics.org/schema",
+    "gz": "http://gazebosim.org/schema",
+}
 
 
 def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
     """The file's text, and what it does not carry."""
     left = _left(robot)
-    root = ET.Element("sdf", version=VERSION)
+    prefixes = {f"xmlns:{prefix}": name for prefix, name in PREFIXES.items()}
+    root = ET.Element("sdf", version=VERSION, **prefixes)
     said = [f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash})."]
     said += ["Not carried:", *(f"- {item.sentence()}" for item in left)]
     text = "\n    ".join(line.replace("--", "- -") for line in said)
@@ -49,6 +60,9 @@ def _left(robot: RobotModel) -> list[Left]:
     left = left_by_drive(robot, "SDF")
     if robot.model.wheel_kind not in DRIVES:
         left.append(Left("drive", f"Gazebo has none for {robot.model.wheel_kind} wheels"))
+    if robot.model.wheel_kind == "differential" and robot.get("robot.half_wheelbase_m"):
+        why = "Gazebo turns four plain wheels in curves about one axle, not about the middle"
+        left.append(Left("middle of curves", why))
     left.append(Left("sensor", "a camera's picture is carried, no bit of detection"))
     return [*left, *robot.left_effects(("view_angle", "view_pan", "view_range"), "Gazebo")]
 
@@ -82,14 +96,7 @@ def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
         mass_kg=robot.wheel_mass_kg,
         inertia_kgm2=robot.wheel_inertia_kgm2(),
     )
-    if robot.model.wheel_kind == "mecanum":
-        surface = ET.SubElement(link.find("collision"), "surface")
-        ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
-        _text(ode, "mu", "1")
-        _text(ode, "mu2", "0")
-        along = ET.SubElement(ode, "fdir1")
-        along.text = ROLLERS[int(np.sign(wheel["grip"][1]))]
-        along.set("{http://gazebosim.org/schema}expressed_in", "base_link")
+    _grip(link.find("collision"), robot, wheel)
     joint = ET.SubElement(model, "joint", name=f"{name}_wheel_joint", type="revolute")
     _text(joint, "parent", "base_link")
     _text(joint, "child", f"{name}_wheel")
@@ -100,6 +107,19 @@ def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
     _text(limit, "upper", "1e16")
     if robot.top_rim_mps:
         _text(limit, "velocity", _n(robot.top_rim_mps / radius_m))
+
+
+def _grip(collision: ET.Element, robot: RobotModel, wheel: dict) -> None:
+    """Touches in one point under the axle, as a ball does: a cylinder stands on its inner edge."""
+    shape = collision.find("geometry")
+    shape.clear()
+    _text(ET.SubElement(shape, "sphere"), "radius", _n(robot.get("robot.wheel_radius_m")))
+    surface = ET.SubElement(collision, "surface")
+    ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
+    _text(ode, "mu", "1")
+    _text(ode, "mu2", "0" if robot.model.wheel_kind in ROLLERS else _n(PLAIN_GRIP))
+    expressed = {f"{prefix}:expressed_in": "base_link" for prefix in PREFIXES}
+    ET.SubElement(ode, "fdir1", expressed).text = _n(*wheel["grip"], 0)
 
 
 def _drive(model: ET.Element, robot: RobotModel) -> None:
@@ -115,7 +135,8 @@ def _drive(model: ET.Element, robot: RobotModel) -> None:
     if kind == "mecanum":
         _text(plugin, "wheelbase", _n(2 * drive.scale * robot.get("robot.half_wheelbase_m")))
     _text(plugin, "wheel_radius", _n(drive.radius_m))
-    if drive.top_mps and drive.top_radps:
+    # The mecanum drive has one number for m/s and rad/s; there the joints' limits hold.
+    if kind == "differential" and drive.top_mps and drive.top_radps:
         for key, top in (("linear", drive.top_mps), ("angular", drive.top_radps)):
             _text(plugin, f"min_{key}_velocity", _n(-top))
             _text(plugin, f"max_{key}_velocity", _n(top))

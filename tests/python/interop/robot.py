@@ -7,6 +7,7 @@ MASS_KG = 1.2  # what the library takes where a model states none
 LAG_S, DELAY_S, FORWARD_GAIN = 0.06, 0.03, 0.97
 BODY_RADIUS_M, WHEEL_RADIUS_M = 0.1, 0.0325
 MARKER_M = (0.02, -0.01)
+WHEELS = ("fl", "fr", "rl", "rr")
 
 TEXT = f"""
 name = "robot"

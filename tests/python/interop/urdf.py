@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """URDF: ROS's own parser, MuJoCo's and sdformat's readers."""
 
+import math
 import subprocess
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from interop.cells import Told, writes
-from interop.robot import MASS_KG, write
+from interop.robot import MASS_KG, WHEEL_RADIUS_M, WHEELS, write
+from interop.sdf import held_by_sdformat
 
 FILE = "robot.urdf"
-WHEELS = ("fl", "fr", "rl", "rr")
+JOINTS = {f"{wheel}_wheel_joint" for wheel in WHEELS}
 
 
 def _write(folder: Path) -> None:
@@ -29,17 +32,53 @@ def urdfdom(folder: Path) -> Told:
 
 @writes("URDF", "MuJoCo", "mujoco-core==4.0.1", ours=_write)
 def mujoco(folder: Path) -> Told:
-    """MuJoCo's importer."""
+    """MuJoCo's importer, which welds the root to the world and keeps no frame without a joint."""
     import mujoco
-    import numpy as np
 
     model = mujoco.MjModel.from_xml_path(str(folder / FILE))
     bodies = {model.body(i).name for i in range(model.nbody)}
-    joints = {model.joint(i).name for i in range(model.njnt)}
     return {
-        "wheels' joints": {f"{wheel}_wheel_joint" for wheel in WHEELS} <= joints,
-        "mass": np.isclose(model.body_mass.sum(), MASS_KG),
-        "base as a body": "base_link" in bodies,
+        "wheels' joints": {model.joint(i).name for i in range(model.njnt)} == JOINTS,
+        "shapes": model.ngeom == 1 + len(WHEELS),
+        "mass": math.isclose(model.body_mass.sum(), MASS_KG),
+        "base": "base_link" in bodies,
         "camera's frame": "camera_link" in bodies,
-        "limits of speed": False,
+        "top speed of wheels": model.nu > 0,
+    }
+
+
+@writes("URDF", "sdformat", "libsdformat12-12", ours=_write)
+def sdformat(folder: Path) -> Told:
+    """Gazebo's parser, which makes SDF of it and lumps what is fixed together."""
+    held = ET.fromstring(held_by_sdformat(folder / FILE))
+    links = {link.get("name") for link in held.iter("link")}
+    frames = {frame.get("name") for frame in held.iter("frame")}
+    return {
+        "wheels' joints": {joint.get("name") for joint in held.iter("joint")} == JOINTS,
+        "mass": math.isclose(sum(float(m.text) for m in held.iter("mass")), MASS_KG),
+        "top speed of wheels": held.find(".//limit/velocity") is not None,
+        "camera's frame": "camera_link" in frames,
+        "base as a link": "base_link" in links,
+    }
+
+
+@writes("URDF", "PyBullet", "pybullet==3.2.7", "numpy==2.4.6", ours=_write)
+def bullet(folder: Path) -> Told:
+    """Bullet's importer, which gives each frame without a mass 1 kg."""
+    import pybullet
+
+    pybullet.connect(pybullet.DIRECT)
+    keep = pybullet.URDF_USE_INERTIA_FROM_FILE
+    robot = pybullet.loadURDF(str(folder / FILE), flags=keep)
+    joints = [pybullet.getJointInfo(robot, k) for k in range(pybullet.getNumJoints(robot))]
+    names = [one[12].decode() for one in joints]
+    masses_kg = [pybullet.getDynamicsInfo(robot, k)[0] for k in range(-1, len(joints))]
+    turning = {one[1].decode() for one in joints if one[2] == pybullet.JOINT_REVOLUTE}
+    wheel = pybullet.getDynamicsInfo(robot, names.index("fl_wheel"))
+    return {
+        "wheels' joints": turning == JOINTS,
+        "top speed of wheels": joints[names.index("fl_wheel")][11] > 0,
+        "inertia, with its flag": math.isclose(wheel[2][2], 0.5 * wheel[0] * WHEEL_RADIUS_M**2),
+        "camera's frame": "camera_link" in names,
+        "mass": math.isclose(sum(masses_kg), MASS_KG),
     }
