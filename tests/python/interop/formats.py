@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """All cells, in the order of the table; a new format's module is named here."""
 
-from interop import mjcf, sdf, urdf
+from interop import lcm_log, mcap_file, mjcf, rosbag, sdf, tables, urdf
 from interop.cells import cells_of
 
-CELLS = [cell for module in (mjcf, urdf, sdf) for cell in cells_of(module)]
+MODULES = (mjcf, urdf, sdf, rosbag, mcap_file, lcm_log, tables)
+CELLS = [cell for module in MODULES for cell in cells_of(module)]
