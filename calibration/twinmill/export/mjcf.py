@@ -28,6 +28,9 @@ from twinmill.export.drive import wheel_gains
 STEP_S = 0.001
 SETTLE_S = 0.001  # of the body behind its wheels
 DELAY_SLOTS_PER_S = 10_000  # commands that a delay keeps: one each step of 0.1 ms or more
+# Taken off a delay: MuJoCo's time is a sum of steps, and a delay of whole steps is one step longer
+# while the sum is rounded to one side.
+ROUNDING_S = 1e-7
 ASPECT = 4 / 3  # of the camera's picture
 CURVES = ("dead_zone", "speed_curve")
 STATIC = (*CURVES, "wheel_gain", "reverse_asymmetry")  # in the duty table
@@ -372,9 +375,9 @@ def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict
     options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
     if lag_s > 1e-6 or _values(robot, "coasting"):
         options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
-    if delay_s > 0:
+    if delay_s > ROUNDING_S:
         options |= {
-            "delay": _n(delay_s),
+            "delay": _n(delay_s - ROUNDING_S),
             "nsample": str(int(np.ceil(DELAY_SLOTS_PER_S * delay_s)) + 1),
         }
     return options

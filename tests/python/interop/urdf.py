@@ -22,8 +22,10 @@ def _write(folder: Path) -> None:
 def urdfdom(folder: Path) -> Told:
     """ROS's parser; it tells the tree alone."""
     command = ["check_urdf", str(folder / FILE)]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    said = done.stdout
     return {
+        "parsed without a complaint": not done.stderr,
         "root": "root Link: base_footprint" in said,
         "tree of links": all(f":  {wheel}_wheel" in said for wheel in WHEELS),
         "camera's frame": ":  camera_link" in said,
