@@ -125,6 +125,11 @@ def _debian(package: str) -> str:
     return re.sub(r"^\d+:|[+~-].*$", "", done.stdout)
 
 
+def packages_at(*names: str) -> Path:
+    """Folder of packages of PyPI, for a program in them."""
+    return _installed(list(names))
+
+
 def _installed(pinned: list[str]) -> Path:
     """Folder of these packages of PyPI and what they need."""
     folder = ROOT / ".deps/interop" / "_".join(pinned)

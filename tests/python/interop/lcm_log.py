@@ -46,7 +46,7 @@ def _told(events: list[tuple[int, str, bytes]]) -> Told:
 
 
 class _Event(ctypes.Structure):
-    _fields_ = [  # noqa: RUF012
+    _fields_ = [
         ("eventnum", ctypes.c_int64),
         ("timestamp", ctypes.c_int64),
         ("channellen", ctypes.c_int32),

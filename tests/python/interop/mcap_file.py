@@ -10,7 +10,8 @@ from interop.cells import Cell, NotInstalled, Told, writes
 
 FILE = "drive.mcap"
 POSE = "R01_POSE"
-READ = """
+READ = (
+    """
 const fs = require("fs/promises");
 const { McapIndexedReader } = require("@mcap/core");
 (async () => {
@@ -32,7 +33,9 @@ const { McapIndexedReader } = require("@mcap/core");
   const schemas = [...reader.schemasById.values()].map((s) => [s.name, s.encoding]);
   console.log(JSON.stringify({ stamps, schemas, chunks: reader.chunkIndexes.length }));
 })();
-""" % POSE
+"""
+    % POSE
+)
 
 
 def _write(folder: Path) -> None:
@@ -70,7 +73,8 @@ def python(folder: Path) -> Told:
             for k, (_, m) in enumerate(rows)
             if drive.seen(k)
         ),
-        "lost poses": [bool(m.valid) for _, m in rows] == [drive.seen(k) for k in range(drive.COUNT)],
+        "lost poses": [bool(m.valid) for _, m in rows]
+        == [drive.seen(k) for k in range(drive.COUNT)],
         "frames for a 3D view": frames == drive.COUNT - drive.LOST,
     }
 

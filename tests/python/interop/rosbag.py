@@ -106,7 +106,10 @@ def foxglove_writes(folder: Path) -> None:
         for k in range(drive.COUNT):
             at_ns = 1000 * (drive.START_US + k * drive.STEP_US)
             writer.write_message("/r01/pose", schemas["/r01/pose"], _pose(k), at_ns, at_ns)
-            twist = {"linear": _vector(drive.SPEED_MPS * (k >= drive.STANDS)), "angular": _vector(0)}
+            twist = {
+                "linear": _vector(drive.SPEED_MPS * (k >= drive.STANDS)),
+                "angular": _vector(0),
+            }
             writer.write_message("/r01/cmd_vel", schemas["/r01/cmd_vel"], twist, at_ns, at_ns)
         writer.finish()
 
@@ -163,7 +166,11 @@ def _messages(types: dict, **header):
         place = types["geometry_msgs/msg/Pose"](point(x_m, 0.0, 0.0), turn(0.0, 0.0, 0.0, 1.0))
         yield at_ns, "/r01/pose", types[POSE](head, place)
         speed_mps = drive.SPEED_MPS * (k >= drive.STANDS)
-        yield at_ns, "/r01/cmd_vel", types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+        yield (
+            at_ns,
+            "/r01/cmd_vel",
+            types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0)),
+        )
 
 
 NOT_RUN = [

@@ -10,7 +10,12 @@ from pathlib import Path
 from interop import drive
 from interop.cells import Told, reads, writes
 
-PANDAS, POLARS, DUCKDB, PYARROW = "pandas==3.1.1", "polars==2.1.0", "duckdb==2.0.1", "pyarrow==26.0.1"
+PANDAS, POLARS, DUCKDB, PYARROW = (
+    "pandas==3.1.1",
+    "polars==2.1.0",
+    "duckdb==2.0.1",
+    "pyarrow==26.0.1",
+)
 FOLDER, POSES, COMMANDS, LOG = "tables", "poses.csv", "commands.csv", "read.lcmlog"
 
 
@@ -95,13 +100,18 @@ def duckdb_parquet(folder: Path) -> Told:
 def _of_duckdb(folder: Path, ending: str) -> Told:
     import duckdb
 
-    poses = duckdb.sql(f"SELECT x_m, seq FROM '{folder / FOLDER / 'pose'}.{ending}'")
+    file = f"'{folder / FOLDER / 'pose'}.{ending}'"
+    poses = duckdb.sql(f"SELECT x_m, seq FROM {file}")
     told = duckdb.sql(f"SELECT battery_V FROM '{folder / FOLDER / 'telemetry'}.{ending}'")
     kinds = [str(kind) for kind in (*poses.types, *told.types)]
     x_m, seq = zip(*poses.fetchall(), strict=True)
     volts = [row[0] for row in told.fetchall()]
     floats = kinds[0] == kinds[2] == "DOUBLE"
-    return _told(list(x_m), volts, list(seq), floats, kinds[1] in ("BIGINT", "INTEGER"))
+    lost = duckdb.sql(f"SELECT count(*) FROM {file} WHERE x_m IS NULL").fetchall()
+    whole = kinds[1] in ("BIGINT", "INTEGER")
+    return _told(list(x_m), volts, list(seq), floats, whole) | {
+        "gaps, asked for": lost == [(drive.LOST,)]
+    }
 
 
 @writes("CSV", "pyarrow", PYARROW, ours=_write("csv"))
@@ -124,7 +134,9 @@ def pyarrow_parquet(folder: Path) -> Told:
     files = (folder / FOLDER / f"{n}.parquet" for n in ("pose", "telemetry"))
     poses, told = map(pq.read_table, files)
     source = json.loads(poses.schema.metadata[b"twinmill"])
-    return _of_pyarrow(poses, told) | {"where it comes from": source["t0_utime_us"] == drive.START_US}
+    return _of_pyarrow(poses, told) | {
+        "where it comes from": source["t0_utime_us"] == drive.START_US
+    }
 
 
 def _of_pyarrow(poses, told) -> Told:
