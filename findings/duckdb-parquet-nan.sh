@@ -5,7 +5,7 @@
 # Guess: a query of a file gives what the same query of the same table in memory gives.
 # Seen: a row group's least and largest value are written without NaN, and DuckDB passes over row groups by
 #   them, although it holds NaN for larger than all: isnan(v) finds 0 rows of the file and 1 of the table, and
-#   v > 5 likewise. Of a file that DuckDB wrote itself both are 1. One NaN among gaps as NULL is safe.
+#   v > 5 likewise. Of a file that DuckDB wrote itself both are 1. Gaps as NULL are found.
 set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -28,7 +28,7 @@ const { McapIndexedReader } = require("@mcap/core");
   const decompressHandlers = await loadDecompressHandlers();
   const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
   const stamps = [];
-  for await (const message of reader.readMessages({ topics: ["%s"] }))
+  for await (const message of reader.readMessages({ topics: [process.argv[2]] }))
     stamps.push(String(message.logTime));
   const schemas = [...reader.schemasById.values()].map((s) => [s.name, s.encoding]);
   console.log(JSON.stringify({ stamps, schemas, chunks: reader.chunkIndexes.length }));
@@ -86,7 +86,7 @@ def node(folder: Path) -> Told:
 
     if not shutil.which("node"):
         raise NotInstalled("node is not installed (Debian: apt install nodejs)")
-    command = ["node", "-e", READ, str(folder / FILE)]
+    command = ["node", "-e", READ, str(folder / FILE), POSE]
     done = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
     return {
         "index of chunks": done["chunks"] > 0,
