@@ -4,6 +4,7 @@
 import ctypes
 import struct
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from interop import drive
@@ -39,9 +40,7 @@ def _told(events: list[tuple[int, str, bytes]]) -> Told:
         "events in order of time": stamps == sorted(stamps),
         "channels": {channel for _, channel, _ in events} >= {POSE, "R01_DRIVE"},
         "poses": len(poses) == drive.COUNT,
-        "steps of their stamps": all(
-            abs(b - a - drive.STEP_US) <= 1 for a, b in zip(first, first[1:], strict=False)
-        ),
+        "steps of their stamps": all(abs(b - a - drive.STEP_US) <= 1 for a, b in pairwise(first)),
     }
 
 

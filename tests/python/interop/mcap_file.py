@@ -10,8 +10,7 @@ from interop.cells import Cell, NotInstalled, Told, writes
 
 FILE = "drive.mcap"
 POSE = "R01_POSE"
-READ = (
-    """
+READ = """
 const fs = require("fs/promises");
 const { McapIndexedReader } = require("@mcap/core");
 (async () => {
@@ -34,8 +33,6 @@ const { McapIndexedReader } = require("@mcap/core");
   console.log(JSON.stringify({ stamps, schemas, chunks: reader.chunkIndexes.length }));
 })();
 """
-    % POSE
-)
 
 
 def _write(folder: Path) -> None:
