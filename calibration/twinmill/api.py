@@ -110,6 +110,7 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "receive_stamps": ("receive_stamps", *SWITCH),
     "wheelbase_m": ("wheelbase_m", *NUMBER),
     "full_duty": ("full_duty", *NUMBER),
+    "wheel_factor": ("wheel_factor", *NUMBER),
 }
 Form = TypeVar("Form", LogFormat, ModelFormat)
 Result = TypeVar("Result")
@@ -1553,7 +1554,8 @@ def import_log(
             `up`;
             `pose_shift_s` and `pose_clock_ppm`, numbers, or dictionaries by robot;
             `heading_from_path`, `same_clock`; of a bag `pose` and `command` (lists of
-            topics), `receive_stamps`, `wheelbase_m`, `full_duty`.
+            topics), `receive_stamps`, `wheelbase_m`, `full_duty`; of wheel speeds
+            `wheel_factor`.
 
     Returns:
         A log; its file goes with the object unless it is saved.

@@ -11,6 +11,9 @@ import subprocess
 
 import lcm
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 import turbopi
@@ -152,6 +155,31 @@ def test_import_reads_other_makers_commands_back(write_log, message, tmp_path, k
     np.testing.assert_array_equal(after.command[0], before.command[0])
 
 
+def test_csv_of_a_robot_that_starts_at_rest_has_numbers_for_readers_that_guess_by_first_rows(
+    write_log, message, tmp_path
+):
+    """It stands for 2 s, is lost for a while, and drives; its voltage is measured now and then."""
+    events = []
+    for k in range(400):
+        x_m, there = max(0, k - 200) * 0.003, k % 50 < 47
+        pose = message("pose", utime_us=T0_US + 10_000 * k, robot_id=1, seq=k)
+        pose.position_m = [x_m, 0.0, 0.0] if there else [math.nan] * 3
+        pose.valid = int(there)
+        told = message("telemetry", utime_us=T0_US + 10_000 * k, robot_id=1, seq=k)
+        told.battery_V = 8.0 if k % 10 == 0 else math.nan
+        events += [("R01_POSE", pose), ("R01_TELEMETRY", told)]
+    run(["export", str(write_log(*events)), "--to", "csv", "-o", str(tmp_path / "t")])
+    in_blocks = pyarrow.csv.ReadOptions(block_size=4096)  # types are those of the first
+    poses = pyarrow.csv.open_csv(tmp_path / "t" / "pose.csv", in_blocks).read_all()
+    assert poses["x_m"].type == poses["y_m"].type == poses["t_s"].type == pa.float64()
+    assert poses["seq"].type == poses["utime_us"].type == pa.int64()
+    assert poses["x_m"].null_count == poses["theta_rad"].null_count + 24 == 24
+    assert poses["x_m"].to_pylist()[-4] == pytest.approx(0.003 * 196)
+    volts = pd.read_csv(tmp_path / "t" / "telemetry.csv", keep_default_na=False, na_values=[""])
+    assert volts["battery_V"].dtype == float and volts["battery_V"].count() == 40
+    assert "nan" not in (tmp_path / "t" / "telemetry.csv").read_text()
+
+
 def test_parquet_keeps_integers_and_where_it_comes_from(log, tmp_path):
     run(["export", str(log), "--to", "parquet", "-o", str(tmp_path / "t")])
     assert {file.name for file in (tmp_path / "t").iterdir()} == {
@@ -162,6 +190,7 @@ def test_parquet_keeps_integers_and_where_it_comes_from(log, tmp_path):
     stamps = [m.utime_us for channel, _, m in lcm_events(log) if channel == "R01_TELEMETRY"]
     assert table["utime_us"].to_pylist() == stamps
     assert table["fr_pct"].to_pylist() == [-k for k in range(40)]
+    assert table["battery_V"].null_count == 40  # not-a-number is in no file's statistics
     assert json.loads(table.schema.metadata[b"twinmill"])["log_sha256"] == read_log(log).sha256
 
 
@@ -226,7 +255,7 @@ def test_a_new_message_is_exported_with_its_fields(write_log, tmp_path, monkeypa
         events.append(("R01_HEAT", heat))
     run(["export", str(write_log(*events)), "--to", "csv", "-o", str(tmp_path / "out")])
     rows = list(csv.DictReader((tmp_path / "out" / "heat.csv").open()))
-    assert [row["motor_degC_1"] for row in rows] == ["41", "41"]
+    assert [row["motor_degC_1"] for row in rows] == ["41.0", "41.0"]
     assert [row["spot_degC_1"] for row in rows] == ["", "3.5"]
     assert rows[0]["note"] == "a, b"
     assert rows[0]["tag"] == "0a2c00"  # a comma and a new line of a CSV they must not be

@@ -75,6 +75,21 @@ def test_a_heading_that_steps_for_good_is_told_as_that(driven):
     assert "the place does not" in said and "jumps" not in said
 
 
+@pytest.mark.parametrize("turned_deg", [0, 90, 180])
+def test_a_heading_opposite_to_the_motion_is_told_of_a_robot_that_drives_in_arcs_alone(
+    driven, turned_deg
+):
+    """As a tag is that was drawn by AprilTag, and read as OpenCV draws it; across is another's."""
+    robot = driven()
+    robot.pose[:, 2] += np.radians(turned_deg)
+    track = make_track(robot)
+    said = [note for note in track.notes if "of its heading" in note]
+    assert abs(track.astray_rad) == pytest.approx(np.pi * (turned_deg == 180), abs=0.01)
+    assert len(said) == (turned_deg == 180)
+    assert all("--heading-offset-deg R03=" in note and "180" in note for note in said)
+    assert all("--family tag36h11" in note for note in said)
+
+
 def test_a_pose_that_is_left_out_leaves_no_trace(driven):
     """A camera's glitch far off the floor, and the same frame lost."""
     far, lost = driven(), driven()
@@ -128,6 +143,35 @@ def test_lifted_robot_is_cut(driven):
     robot.z_m[500:700] += 0.2
     track = make_track(robot)
     assert (track.segment[500:700] == -1).all() and track.segment.max() == 1
+
+
+@pytest.mark.parametrize("tilt_deg", [3.0, -8.0])
+@pytest.mark.parametrize("way_m", [4.0, 0.0], ids=["over the room", "in a line"])
+def test_a_robot_under_tilted_axes_is_on_the_floor_unless_it_is_lifted(driven, tilt_deg, way_m):
+    """The floor leans along x; the robot drives 4 m of it, and is carried for 1.6 s."""
+    robot = driven()
+    robot.pose[:, :2] += np.linspace(0, way_m, len(robot.pose))[:, None] + [[1.0, -2.0]]
+    if not way_m:
+        robot.pose[:, :2] = np.linspace([0, 0], [4, 0], len(robot.pose))
+    robot.z_m[:] = 0.1 + np.tan(np.radians(tilt_deg)) * robot.pose[:, 0]
+    robot.z_m[500:700] += 0.2
+    track = make_track(robot)
+    assert np.flatnonzero(track.segment < 0)[[0, -1]] == pytest.approx([500, 699], abs=20)
+    assert (track.segment[500:700] == -1).all()
+    (said,) = (note for note in track.notes if "tilted" in note)
+    assert f"tilted by {abs(tilt_deg):.1f} degrees" in said
+
+
+def test_a_robot_that_is_carried_elsewhere_tilts_no_floor(driven):
+    """It drives within 0.2 m, is held 0.2 m high for 3 of 10 s, and goes 3 m aside with that."""
+    robot = driven()
+    robot.pose[:, :2] *= 0.15
+    robot.z_m[300:660] += 0.2
+    robot.pose[300:660, 0] += np.linspace(0, 3, 360)
+    robot.z_m[:] += np.random.default_rng(1).normal(0, 3e-4, len(robot.z_m))
+    track = make_track(robot)
+    assert (track.segment[300:660] == -1).all()
+    assert not any("tilted" in note for note in track.notes)
 
 
 def test_rest_lies_inside_the_stretch_of_zero_commands(driven):

@@ -163,6 +163,13 @@ def _command(
             "all lie within."
         ),
     ] = None,
+    wheel_factor: Annotated[
+        float | None,
+        typer.Option(
+            help="Multiplies wheel speeds that are in another unit, or of motors before a gear: to "
+            "rad/s of the wheels."
+        ),
+    ] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option(
@@ -289,6 +296,7 @@ def _command(
         receive_stamps=receive_stamps,
         wheelbase_m=wheelbase_m,
         full_duty=full_duty,
+        wheel_factor=wheel_factor,
         robot_id=robot_id,
         rename=renames.pop(None, {}),
         own_renames=renames,

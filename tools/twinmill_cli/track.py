@@ -41,7 +41,7 @@ if working():  # not for --help
     from twinmill.track.ruler import Ruler, against_ruler
     from twinmill.track.together import Pair, clocks, compared, merged, on_clock
 
-WHOLE = 0.98  # of the frames that a container promises; some count them wrongly by a few
+MISSING = 0.02  # of a film's duration: some round it, and sound may outlast the pictures
 
 Rate = Annotated[
     float | None,
@@ -100,7 +100,11 @@ def _track(
     ] = 0.10,
     family: Annotated[
         str,
-        typer.Option("--family", metavar="NAME", help="Of tags, as in OpenCV: 4x4_50, 5x5_100 ..."),
+        typer.Option(
+            "--family",
+            metavar="NAME",
+            help="Of tags, as OpenCV draws them: 4x4_50, apriltag_25h9 ...; or AprilTag: tag36h11.",
+        ),
     ] = "apriltag_36h11",
     out: Annotated[
         Path | None,
@@ -227,6 +231,10 @@ class _Found:
         return [
             {
                 "video": str(film.path),
+                "frames": frames,
+                "duration_in_file_s": film.duration_s,
+                "missing_s": film.missing_s,
+                "turned_deg": film.turned_deg,
                 "start_s": start_s,
                 "camera_height_m": float(view.position_m[2]),
                 "camera_tilt_rad": view.tilt_rad,
@@ -235,8 +243,8 @@ class _Found:
                 "apart_rad": pair and pair.apart_rad,
                 "overlap_s": pair and pair.overlap_s,
             }
-            for film, view, start_s, pair in zip(
-                self.films, self.views, self.starts_s, self.pairs, strict=True
+            for film, frames, view, start_s, pair in zip(
+                self.films, self.frames, self.views, self.starts_s, self.pairs, strict=True
             )
         ]
 
@@ -244,10 +252,17 @@ class _Found:
         """Sentences on the films and on where their cameras are."""
         many, said = len(self.films) > 1, []
         for k, (film, view) in enumerate(zip(self.films, self.views, strict=True)):
-            if self.frames[k] < WHOLE * film.count:
-                of = f" {film.path}" * many
-                words = f"of {film.count} frames {self.frames[k]} can be read."
+            of = f" {film.path}" * many
+            if film.missing_s > MISSING * film.duration_s:
+                words = (
+                    f"the last {film.missing_s:.2f} of its {film.duration_s:.2f} s are not there."
+                )
                 said.append(f"! The film{of} breaks off: {words}")
+            if film.turned_deg:
+                words = f"its pictures turned by {film.turned_deg} degrees, and so they are"
+                said.append(
+                    f"The film{of} wants {words}; lens and floor must be of pictures that are, too."
+                )
             said.append(
                 f"The camera{f' of {film.path}' * many} is {view.position_m[2]:.2f} m over the "
                 f"floor, tilted by {np.degrees(view.tilt_rad):.1f}°; the floor's points miss by "

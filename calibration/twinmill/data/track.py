@@ -11,6 +11,7 @@ from twinmill.data.log import CommandKind, LogError, RobotLog
 from twinmill.data.lost_commands import lost_commands, words
 
 LIFT_M = 0.05  # height above the median that no driving robot has
+PLANE_ROUNDS, PLANE_M = 20, 1e-4  # of a plane's fit; nearer than a tracker tells
 SILENCE_S = 0.25  # telemetry comes every 22 ms: after this the duties are not known any more
 HELD_S, HELDS = 2.0, 3  # a last command holds for this, or so many times the longest before it
 STANDING_M = 0.05  # within which a robot that stands is seen
@@ -126,11 +127,15 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         astray_rad = _astray_rad(robot, pose, segment)
         if astray_rad:
             back = abs(astray_rad) > np.pi - ASTRAY_RAD
+            unless = (
+                ", unless all its commands have the wrong sign (--flip); tags drawn by AprilTag "
+                "stand on their head against OpenCV's (`twinmill track --family tag36h11`)"
+            )
             notes.append(
-                f"driven straight, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
+                f"driven ahead, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
                 "left of its heading; turn the poses by that (`twinmill import "
                 f"--heading-offset-deg R{robot.robot_id:02d}={np.degrees(astray_rad):.0f}`)"
-                f"{', unless all its commands have the wrong sign (--flip)' if back else ''}."
+                f"{unless if back else ''}."
             )
     else:
         heading_smooth = np.where(segment < 0, np.nan, 0.0)
@@ -168,6 +173,13 @@ def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) ->
 def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndarray:
     """(N,) bool: poses that are valid, on the floor, and taken while commands are known."""
     lifted = np.abs(robot.z_m - np.nanmedian(robot.z_m)) > LIFT_M  # NaN compares false
+    if lifted.any() and (floor := tilted_floor(robot)):
+        lifted = np.abs(floor.height_m) > LIFT_M
+        notes.append(
+            f"the capture's z is tilted by {np.degrees(floor.tilt_rad):.1f} degrees against the "
+            "floor on which the poses lie; heights are counted from that. Level its axes, for "
+            "example with its calibration square."
+        )
     if lifted.any():
         notes.append(
             f"{np.count_nonzero(lifted)} poses from {robot.pose_t_s[lifted][0]:.3f} s on "
@@ -188,6 +200,34 @@ def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndar
             f"taken while no commands are in the log{ended}; left out."
         )
     return robot.valid & ~lifted & ~silent & ~lost
+
+
+@dataclass(frozen=True)
+class TiltedFloor:
+    """A plane on which a robot drove: its tilt, and (N,) heights of the poses over it."""
+
+    tilt_rad: float
+    height_m: np.ndarray
+
+
+def tilted_floor(robot: RobotLog) -> TiltedFloor | None:
+    """The plane through most of a robot's places; None where a level one fits as well.
+
+    The least sum of distances, since a robot that is carried about is no part of it; found by
+    weights of one over each distance (Schlossmacher 1973). A few poses that are carried far tilt
+    such a plane, but then most lie worse on it than on a level one.
+    """
+    z_m = robot.z_m[robot.valid]
+    across = np.column_stack([robot.pose[:, :2], np.ones(len(robot.pose))])
+    on, weight = across[robot.valid], np.ones(len(z_m))
+    for _ in range(PLANE_ROUNDS):
+        root = np.sqrt(weight)
+        plane, *_ = np.linalg.lstsq(on * root[:, None], z_m * root, rcond=None)
+        weight = 1 / np.maximum(np.abs(z_m - on @ plane), PLANE_M)
+    level_m = np.median(np.abs(z_m - np.median(z_m)))
+    if np.median(np.abs(z_m - on @ plane)) > level_m / 2:
+        return None
+    return TiltedFloor(float(np.arctan(np.hypot(*plane[:2]))), robot.z_m - across @ plane)
 
 
 def _silent(robot: RobotLog) -> np.ndarray:
@@ -304,22 +344,40 @@ def _note_frozen(robot: RobotLog, notes: list[str]) -> None:
 
 
 def _astray_rad(robot: RobotLog, pose: np.ndarray, segment: np.ndarray) -> float:
-    """As in Track: motion that points elsewhere than the heading of a robot driven straight."""
+    """As in Track: motion that points elsewhere than the heading of a robot driven straight.
+
+    Where it is driven in arcs alone, motion that points backwards.
+    """
+    straight = _straight(robot.command, robot.command_kind)
+    if angle_rad := _way_rad(robot, pose, segment, straight):
+        return angle_rad
+    angle_rad = _way_rad(robot, pose, segment, _arcs(robot), most_bend_rad=np.inf)
+    return angle_rad if abs(angle_rad) > np.pi - ASTRAY_RAD else 0.0
+
+
+def _way_rad(
+    robot: RobotLog,
+    pose: np.ndarray,
+    segment: np.ndarray,
+    command: np.ndarray,
+    *,
+    most_bend_rad: float = SPIN_RAD,
+) -> float:
+    """Angle from the heading to the way of a robot under (M,) commands ahead; 0 if it is small."""
     half = max(1, round(0.25 / float(np.median(np.diff(robot.pose_t_s)))))
     middle = np.arange(half, len(pose) - half)
     whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
     middle = middle[whole]
     first, last = middle - half, middle + half
-    straight = _straight(robot.command, robot.command_kind)[:, None]
     forward = np.column_stack(
         [
-            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, straight)
+            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, command[:, None])
             for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)
         ]
     )
     steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
     bend = np.median(_bend_rad(pose, first, middle, last)[steady]) if steady.any() else 0.0
-    if bend > SPIN_RAD:
+    if bend > most_bend_rad:
         return 0.0
     if np.count_nonzero(steady) < half:
         return 0.0
@@ -359,3 +417,13 @@ def _straight(command: np.ndarray, kind: CommandKind) -> np.ndarray:
     if kind == "twist":
         return np.where((command[:, 1:3] == 0).all(axis=1), command[:, 0], 0.0)
     return np.where(np.ptp(command, axis=1) == 0, command[:, 0], 0.0)
+
+
+def _arcs(robot: RobotLog) -> np.ndarray:
+    """(M,) forward command where it asks for an arc, else 0."""
+    command = robot.command
+    if robot.command_kind == "twist":
+        return np.where((command[:, 1] == 0) & (command[:, 2] != 0), command[:, 0], 0.0)
+    left, right = command[:, 0], command[:, 1]
+    sides = (left == command[:, 2]) & (right == command[:, 3]) & (left != right)
+    return np.where(sides & (left * right > 0), left, 0.0)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as compute
 import pyarrow.csv
 import pyarrow.parquet
 import turbopi
@@ -57,7 +58,19 @@ def _table(channels: list[Channel], t0_us: int) -> pa.Table:
     }
     for field in messages[0].__slots__:
         columns.update(_columns(field, messages))
-    return pa.table(columns).take(pa.array(np.argsort(utime_us, kind="stable")))
+    table = pa.table({name: _known(column) for name, column in columns.items()})
+    return table.take(pa.array(np.argsort(utime_us, kind="stable")))
+
+
+def _known(column: list | np.ndarray) -> pa.Array:
+    """A column in which not-a-number is missing.
+
+    Parquet's statistics leave it out, and readers that go by them pass over the rows that have it.
+    """
+    array = pa.array(column)
+    if not pa.types.is_floating(array.type):
+        return array
+    return compute.if_else(compute.is_nan(array), None, array)
 
 
 def _columns(field: str, messages: list) -> Iterator[tuple[str, np.ndarray]]:
@@ -92,9 +105,21 @@ def _by_kind(value: np.ndarray, kind: np.ndarray) -> Iterator[tuple[str, np.ndar
 
 
 def write_csv(table: pa.Table, path: Path) -> None:
-    """With one header row; not-a-number as `nan`."""
+    """With one header row; numbers of a float keep their point.
+
+    Readers that guess types by the first rows would take `0` for an integer.
+    """
     options = pyarrow.csv.WriteOptions(quoting_style="needed")
-    pyarrow.csv.write_csv(table, path, options)
+    pyarrow.csv.write_csv(
+        pa.table(dict(zip(table.column_names, map(_said, table), strict=True))), path, options
+    )
+
+
+def _said(column: pa.ChunkedArray) -> pa.ChunkedArray:
+    """The words of a column of floats; any other column as it is."""
+    if not pa.types.is_floating(column.type):
+        return column
+    return compute.replace_substring_regex(column.cast(pa.string()), r"^(-?\d+)$", r"\1.0")
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:

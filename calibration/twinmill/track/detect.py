@@ -6,12 +6,28 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+
+@dataclass(frozen=True)
+class Family:
+    """Drawings of tags: OpenCV's dictionary, and whether they stand on their head against it."""
+
+    dictionary: int
+    turned: bool = False
+
+
 # By its name in OpenCV: `apriltag_36h11`, `4x4_50` and others of ArUco.
-FAMILIES = {
-    name.removeprefix("DICT_").lower(): number
+BY_OPENCV = {
+    name.removeprefix("DICT_").lower(): Family(number)
     for name, number in vars(cv2.aruco).items()
     if name.startswith("DICT_")
 }
+# By its name in AprilTag, as `tag36h11`: the same bits, read from the opposite corner.
+BY_APRILTAG = {
+    name.replace("apriltag_", "tag"): Family(family.dictionary, turned=True)
+    for name, family in BY_OPENCV.items()
+    if name.startswith("apriltag_")
+}
+FAMILIES = BY_OPENCV | BY_APRILTAG
 FAMILY = "apriltag_36h11"
 ROBOTS = range(100)  # a robot's tag is its number
 FLOOR = range(500, 504)  # as `twinmill tags --floor` prints them
@@ -56,7 +72,8 @@ class Detector:
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
         settings.cornerRefinementWinSize = WINDOW_PX
         settings.relativeCornerRefinmentWinSize = WINDOW_MODULES
-        book = cv2.aruco.getPredefinedDictionary(FAMILIES[family])
+        self._first = 2 if FAMILIES[family].turned else 0
+        book = cv2.aruco.getPredefinedDictionary(FAMILIES[family].dictionary)
         self._detector = cv2.aruco.ArucoDetector(book, settings)
 
     def find(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +82,15 @@ class Detector:
         corners, numbers, _ = self._detector.detectMarkers(grey)
         if numbers is None or len(numbers) == 0:
             return np.empty(0, int), np.empty((0, 4, 2))
-        return numbers.ravel().astype(int), np.array(corners, float).reshape(-1, 4, 2)
+        from_front = np.roll(np.array(corners, float).reshape(-1, 4, 2), self._first, axis=1)
+        return numbers.ravel().astype(int), from_front
+
+
+def other_drawing(family: str) -> str | None:
+    """The family of the same tags that stand on their head; None where there is none."""
+    own = FAMILIES[family]
+    twins = (name for name, f in FAMILIES.items() if f.dictionary == own.dictionary)
+    return next((name for name in twins if FAMILIES[name].turned != own.turned), None)
 
 
 def check_single(seen: Sightings) -> None:

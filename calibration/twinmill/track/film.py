@@ -15,8 +15,12 @@ class Film:
     """Frames of a file.
 
     Attributes:
-        count: how many the container says there are; 0 if it does not.
-        size_px: width and height.
+        count: about how many there are, 0 if that is not known. Of Matroska and its like it is the
+            duration times a nominal rate: half as many again where a webcam slows in the dark.
+        duration_s: that the container says; 0 if it does not.
+        turned_deg: by which the container says that pictures are to be turned, as they are.
+        size_px: width and height, when turned.
+        missing_s: from the end of the last frame that was read to the duration.
     """
 
     def __init__(self, path: Path, rate_hz: float | None = None):
@@ -35,8 +39,12 @@ class Film:
         self._capture = _open(str(path))
         if not self._capture.isOpened() or not self._capture.get(cv2.CAP_PROP_FRAME_WIDTH):
             raise ValueError(f"{path}: is no video that can be read; MP4, AVI, MKV and MOV can be.")
-        self.count = max(0, int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+        count, mean_hz = map(self._capture.get, (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FPS))
+        self.count = max(0, int(count))
+        self.duration_s = self.count / mean_hz if mean_hz > 0 else 0.0
+        self.turned_deg = round(self._capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
         self.size_px = _size_px(self._capture)
+        self.missing_s = 0.0
 
     def frames(self) -> Iterator[tuple[float, np.ndarray]]:
         """Stamp in s from the film's start, and (H, W, 3) bytes.
@@ -44,14 +52,14 @@ class Film:
         Raises:
             ValueError: it has no frames, or the container's stamps do not ascend.
         """
-        k, before_s = 0, -np.inf
+        k, before_s, at_s, step_s = 0, -np.inf, 0.0, 0.0
         while True:
             good, picture = self._capture.read()
             if not good:
                 break
-            stamp_s = (
-                k / self.rate_hz if self.rate_hz else self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
-            )
+            contained_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
+            at_s, step_s = contained_s, contained_s - at_s
+            stamp_s = k / self.rate_hz if self.rate_hz else contained_s
             if stamp_s <= before_s:
                 raise ValueError(
                     f"{self.path}: frame {k} is stamped {stamp_s:.3f} s, not later than the one "
@@ -60,6 +68,7 @@ class Film:
             yield stamp_s, picture
             k, before_s = k + 1, stamp_s
         self._capture.release()
+        self.missing_s = max(0.0, self.duration_s - at_s - step_s)
         if k == 0:
             raise ValueError(f"{self.path}: is no video with frames in it; record it again.")
 

@@ -26,7 +26,7 @@ class Tags:
         size_m: side of the black square.
         height_m: over the floor.
         robots: which are there; None: all that are seen.
-        family: as OpenCV calls it.
+        family: of `detect.FAMILIES`.
     """
 
     size_m: float

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from twinmill.track.detect import other_drawing
 from twinmill.track.floor import View
 from twinmill.track.paths import RobotPath, Tags
 
@@ -14,6 +15,8 @@ EVEN = 0.3  # frames are evenly spaced if their steps differ by less than this s
 CORNERS_PX = 0.5  # a sharp tag's miss by 0.1 to 0.3
 SPEED_MPS, WINDOW_S = 0.3, 0.5
 GRID, RIM = 9, 0.05  # places in the picture at which noise is told, within this share of its edge
+MOVED_M = 0.03  # in WINDOW_S: more than a robot that stands seems to
+BACKWARDS, ALONG = 0.9, np.cos(np.radians(30))  # share of its way; of a step, nearly along its axis
 LEVER_M = 0.126  # half wheelbase and half track of a TurboPi
 
 
@@ -29,6 +32,7 @@ class RobotQuality:
         error_px: RMS miss of its corners.
         position_noise_m, heading_noise_rad: standard deviation from one frame to the next.
         corner_position_m, corner_heading_rad: what the corners' misses alone would make.
+        backward_share: of the windows in which it moved, those in which it did against its heading.
     """
 
     robot_id: int
@@ -41,6 +45,7 @@ class RobotQuality:
     heading_noise_rad: float
     corner_position_m: float
     corner_heading_rad: float
+    backward_share: float
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,7 @@ class Quality:
         position_over_floor_m, heading_over_floor_rad: least and largest standard deviation that the
             corners' misses make, over all that the camera sees.
         weakest_wheel: smallest loss of one wheel's speed that one window shows, as a share.
+        family: of the tags.
     """
 
     robots: list[RobotQuality]
@@ -65,6 +71,7 @@ class Quality:
     position_over_floor_m: tuple[float, float]
     heading_over_floor_rad: tuple[float, float]
     weakest_wheel: float
+    family: str
 
     def to_json(self) -> dict:
         """All of it, warnings, and the sentence."""
@@ -73,13 +80,27 @@ class Quality:
     @property
     def warnings(self) -> list[str]:
         """What makes poses wrong that look quiet."""
+        said = [self._backwards(r.robot_id) for r in self.robots if r.backward_share > BACKWARDS]
         worst_px = max((r.error_px for r in self.robots if np.isfinite(r.error_px)), default=0.0)
-        if worst_px < CORNERS_PX:
-            return []
-        return [
-            f"the tags' corners miss by {worst_px:.2f} px: the lens file or the height does not "
-            "fit, or the size; poses may be off by centimetres."
-        ]
+        if worst_px >= CORNERS_PX:
+            said.append(
+                f"the tags' corners miss by {worst_px:.2f} px: the lens file or the height does "
+                "not fit, or the size; poses may be off by centimetres."
+            )
+        return said
+
+    def _backwards(self, robot_id: int) -> str:
+        """What a heading that is opposite to the motion may come from, and what to do."""
+        other = other_drawing(self.family)
+        drawn = other and (
+            f"if its tag is drawn as {'AprilTag' if other.startswith('tag') else 'OpenCV'} draws "
+            f"it, which is upside down against {self.family}, track it with --family {other}; "
+        )
+        return (
+            f"robot {robot_id} moves opposite to its heading: {drawn or ''}if its front is the "
+            f"tag's lower edge, import with --heading-offset-deg R{robot_id:02d}=180; else it was "
+            "driven backwards."
+        )
 
     @property
     def sentence(self) -> str:
@@ -128,6 +149,7 @@ def judge(paths: list[RobotPath], view: View, tags: Tags) -> Quality:
         position_over_floor_m=tuple(_of_place(m) for m in off_m),
         heading_over_floor_rad=tuple(_of_heading(m, tags.size_m) for m in off_m),
         weakest_wheel=3 * np.sqrt(2) * noise_rad / turn_rad,
+        family=tags.family,
     )
 
 
@@ -150,7 +172,19 @@ def _robot(path: RobotPath, size_m: float) -> RobotQuality:
         heading_noise_rad=_noise(path.t_s, heading),
         corner_position_m=_of_place(one_m),
         corner_heading_rad=_of_heading(one_m, size_m),
+        backward_share=_backward_share(path.t_s[valid], path.pose[valid]),
     )
+
+
+def _backward_share(t_s: np.ndarray, pose: np.ndarray) -> float:
+    """Share of windows with motion in which (N, 3) poses move against their heading; 0 of none."""
+    end = np.searchsorted(t_s, t_s + WINDOW_S)
+    begin = np.flatnonzero(end < len(t_s))
+    end = end[begin]
+    step = (pose[end, :2] - pose[begin, :2]) @ [1, 1j]
+    ahead = np.real(step * np.exp(-1j * pose[(begin + end) // 2, 2]))
+    moved = np.abs(step) > MOVED_M
+    return float(np.mean(ahead[moved] < -ALONG * np.abs(step[moved]))) if moved.any() else 0.0
 
 
 def _of_one(rms_px: float) -> float:

@@ -131,7 +131,7 @@ def _draw_tag(page: _Page, number: int, size_m: float, paper: str) -> float:
             f"--size {size_m:g}: does not fit on {paper}, the largest is {room_m / CUT:.3f} m; "
             "choose a larger --paper."
         )
-    book = cv2.aruco.getPredefinedDictionary(FAMILIES[FAMILY])
+    book = cv2.aruco.getPredefinedDictionary(FAMILIES[FAMILY].dictionary)
     tag = book.generateImageMarker(number, MODULES, borderBits=1)
     x_m, y_m = page.middle
     page.picture(np.kron(tag, np.ones((DOTS, DOTS), np.uint8)), x_m, y_m, w_m=size_m, h_m=size_m)

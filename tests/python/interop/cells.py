@@ -8,6 +8,7 @@ module imports at the top nothing but the standard library and this module.
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -32,7 +33,8 @@ class Cell:
         format: what the file is.
         direction: what Twinmill does with it, `writes` or `reads`.
         program: the other one.
-        packages: that it needs, its own first: `name==version` of PyPI, `name` of Debian.
+        packages: that it needs, its own first: `name==version` of PyPI, `name@version` of npm,
+            `name` of Debian.
         theirs: its side; given a folder. Tells what came through if it reads.
         ours: Twinmill's side, likewise.
         why_not: it cannot be run, for this reason.
@@ -68,6 +70,8 @@ class Cell:
         python = [sys.executable, *(["-S"] if pinned else [])]
         names = [self.theirs.__module__, self.theirs.__name__, str(folder)]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        if of_npm := [name for name in self.packages if "@" in name]:
+            environment["NODE_PATH"] = str(_installed_by_npm(of_npm))
         subprocess.run(
             [*python, "-m", "interop.apart", *names], env=environment, cwd=folder, check=True
         )
@@ -101,8 +105,16 @@ def version_of(cell: Cell) -> str:
     Raises:
         NotInstalled: a package of Debian is missing.
     """
-    versions = [name.partition("==")[2] or _debian(name) for name in cell.packages]
+    versions = [_version(name) for name in cell.packages]
     return versions[0] if versions else ""
+
+
+def _version(package: str) -> str:
+    for mark in ("==", "@"):
+        name, _, version = package.rpartition(mark)
+        if name:
+            return version
+    return _debian(package)
 
 
 def _debian(package: str) -> str:
@@ -111,6 +123,11 @@ def _debian(package: str) -> str:
     if done.returncode or not done.stdout:
         raise NotInstalled(f"{package} is not installed (Debian: apt install {package})")
     return re.sub(r"^\d+:|[+~-].*$", "", done.stdout)
+
+
+def packages_at(*names: str) -> Path:
+    """Folder of packages of PyPI, for a program in them."""
+    return _installed(list(names))
 
 
 def _installed(pinned: list[str]) -> Path:
@@ -131,6 +148,18 @@ def _installed(pinned: list[str]) -> Path:
         subprocess.run([*pip, str(folder), *pinned], check=True)
         done.touch()
     return folder
+
+
+def _installed_by_npm(names: list[str]) -> Path:
+    """Folder of these packages of npm and what they need, where Node looks for modules."""
+    if not shutil.which("npm"):
+        raise NotInstalled("npm is not installed (Debian: apt install npm)")
+    folder = ROOT / ".deps/interop" / "_".join(names).replace("/", "+")
+    if not (folder / "node_modules").exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        command = ["npm", "install", "--silent", "--no-audit", "--no-fund", *names]
+        subprocess.run(command, cwd=folder, check=True)
+    return folder / "node_modules"
 
 
 def row(cell: Cell, told: Told, date: str) -> str:

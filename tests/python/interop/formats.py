@@ -1,7 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """All cells, in the order of the table; a new format's module is named here."""
 
-from interop import mjcf, sdf, urdf
+from interop import (
+    capture,
+    films,
+    lcm_log,
+    mcap_file,
+    mjcf,
+    rerun_file,
+    rosbag,
+    sdf,
+    tables,
+    tags,
+    urdf,
+)
 from interop.cells import cells_of
 
-CELLS = [cell for module in (mjcf, urdf, sdf) for cell in cells_of(module)]
+MODULES = (mjcf, urdf, sdf, rosbag, mcap_file, lcm_log, tables, rerun_file, films, tags, capture)
+CELLS = [cell for module in MODULES for cell in cells_of(module)]

@@ -118,6 +118,20 @@ def test_poses_are_within_3_mm_and_1_degree(tracked, tag):
     assert np.degrees(np.sqrt(np.mean(miss[:, 2] ** 2))) < 1
 
 
+def test_robots_that_move_opposite_to_their_headings_are_told_with_the_other_drawing(
+    folder, tracked, tmp_path, capsys
+):
+    """The film shows tags as OpenCV draws them; read as AprilTag's they stand on their head."""
+    found = track(folder, "--family", "tag36h11", "--out", tmp_path / "p.csv")
+    told = [word for word in found["warnings"] if "opposite to its heading" in word]
+    assert [word.split()[1] for word in told] == ["1", "2", "3"]
+    assert all("track it with --family apriltag_36h11" in word for word in told)
+    assert not any("opposite" in word for word in tracked[0]["warnings"])
+    assert "--heading-offset-deg R02=180" in told[1] and told[1] in " ".join(
+        capsys.readouterr().out.split()
+    )
+
+
 def test_tags_of_aruco_are_followed_too(tmp_path):
     def of_aruco(tag, number):
         return replace(tag, number=number, family=cv2.aruco.DICT_6X6_250)
@@ -463,7 +477,10 @@ def test_a_film_that_breaks_off_is_read_so_far_and_that_is_said(folder, tmp_path
     (tmp_path / "cut.avi").write_bytes(data[: len(data) * 6 // 10])
     found = track(folder, "--out", tmp_path / "o.csv", video=tmp_path / "cut.avi")
     assert 2 <= found["frames"] < 6 == found["frames_in_file"]
-    assert "The film breaks off: of 6 frames" in capsys.readouterr().out
+    (camera,) = found["cameras"]
+    assert camera["missing_s"] == pytest.approx((6 - found["frames"]) / RATE_HZ)
+    words = f"The film breaks off: the last {camera['missing_s']:.2f} of its 0.20 s"
+    assert words in capsys.readouterr().out
 
 
 def points(rows):

@@ -21,6 +21,7 @@ from twinmill.data.checks.commands import (
     check_foreign,
 )
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
+from twinmill.data.checks.rolling import check_rolling
 from twinmill.data.checks.series import (
     check_changes,
     check_commanded,
@@ -72,7 +73,7 @@ def check_recorded(tracks: Tracks, model: native.Model | None) -> list[InputFind
     robots = Counter(label for label, _ in tracks)
     for label, track in tracks:
         own = own_option(track.robot_id, robots[label])
-        found += check_drive(track, model, label) if model else []
+        found += check_drive(track, model, label) if model else check_rolling(track, label)
         found += check_track(track, label, own)
     return of_all_robots(found, robots)
 

@@ -17,6 +17,7 @@ from twinmill.data.checks.clocks import FAR_S, shift_s, stepped
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
+from twinmill.data.checks.rolling import factor_words
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.checks.words import described, of_robot
 from twinmill.data.log import KINDS, CommandKind
@@ -50,18 +51,6 @@ TURN_UNITS = (
         (1 / 130, 1 / 25),
         "the commanded turns are in degrees per second",
         {"omega_radps": "omega_degps"},
-    ),
-)
-WHEEL_UNITS = (
-    (
-        (0.08, 0.13),
-        "the wheel speeds are in rounds per minute",
-        {f"w{k}_radps": f"w{k}_rpm" for k in range(1, 5)},
-    ),
-    (
-        (0.012, 0.025),
-        "the wheel speeds are in degrees per second",
-        {f"w{k}_radps": f"w{k}_degps" for k in range(1, 5)},
     ),
 )
 IN_ROOM = {"vx_mps": "vx_world_mps", "vy_mps": "vy_world_mps"}
@@ -260,8 +249,6 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     kind = checked.track.command_kind
     tried = [(speed, unit) for unit in UNITS[: len(UNITS) if kind == "twist" else 2]]
     tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
-    if kind == "wheel_speed":
-        tried += [(speed, unit) for unit in WHEEL_UNITS]
     (low, high), *_ = TURN_UNITS[0]
     if low < turn < high:  # speeds along axes of a wrong heading tell nothing
         speed, tried = 0.0, [(turn, TURN_UNITS[0])]
@@ -270,6 +257,8 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
         for ratio, ((low, high), what, names) in tried
         if low < ratio < high
     ]
+    if kind == "wheel_speed" and (words := factor_words(speed)):
+        told.append(checked.finding(words[0], _pace(speed), words[1]))
     if kind == "twist" and any(low < speed < high for low, high in TENFOLD):
         told.append(
             checked.finding(

@@ -86,6 +86,7 @@ class ImportOptions:
         receive_stamps: of a ROS bag, take the times of receipt, not those in the headers.
         wheelbase_m: of a ROS bag with steering angles.
         full_duty: of a ROS bag with duties, the number that stands for full duty.
+        wheel_factor: by which wheel speeds are multiplied to be those of the wheels in rad/s.
         force: replace an output that exists.
     """
 
@@ -107,6 +108,7 @@ class ImportOptions:
     receive_stamps: bool = False
     wheelbase_m: float | None = None
     full_duty: float | None = None
+    wheel_factor: float | None = None
     force: bool = False
 
 
@@ -186,6 +188,8 @@ def import_log(
         command_series = _read_commands(
             commands, io_tsv, options, of_files=of_files, poses=pose_series
         )
+    if options.wheel_factor is not None:
+        command_series = _geared(command_series, options.wheel_factor)
     _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
     pose_series = _exchanged(pose_series, options.exchange)
     pose_series = [_moved(series, options) for series in pose_series]
@@ -260,6 +264,21 @@ def _read_tables(
         return read(path, replace(columns, robot_id=number, lacks_robot=lacks))
 
     return read_each(paths, of_files, of, kind)
+
+
+def _geared(commands: list[CommandSeries], factor: float) -> list[CommandSeries]:
+    """Wheel speeds multiplied, of each robot that has them."""
+    if not (np.isfinite(factor) and factor):
+        raise LogError(f"--wheel-factor {factor:g}: must be a number other than 0.")
+    if not any(series.kind == "wheel_speed" for series in commands):
+        raise LogError(
+            f"--wheel-factor {factor:g}: does nothing, since the commands are no wheel speeds; "
+            "leave it out."
+        )
+    return [
+        replace(own, value=factor * own.value) if own.kind == "wheel_speed" else own
+        for own in commands
+    ]
 
 
 def _detections(
@@ -543,6 +562,7 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "command_topics": list(options.command_topics),
                 "wheelbase_m": options.wheelbase_m or 0.0,
                 "full_duty": options.full_duty or 0.0,
+                "wheel_factor": 1.0 if options.wheel_factor is None else options.wheel_factor,
                 "mapping": options.mapping.read_text() if options.mapping else "",
                 "flips": _flips_in_toml(options.flips),
                 "heading_offset_rad": _in_toml(options.heading_offset_rad),

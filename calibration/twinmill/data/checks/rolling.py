@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel speeds in another unit, or of motors before a gear: told by how far the robot rolls."""
+
+import numpy as np
+
+from twinmill.data.checks.finding import InputFinding
+from twinmill.data.checks.settings import CHECKS
+from twinmill.data.track import Track, command_at, local_line
+
+STEADY_S = (-0.5, -0.25, 0.0, 0.25, 0.5)  # about a pose: clocks and lags lie within
+HALF_S = 0.15  # of the line that tells a speed
+UNITS = (  # of a wheel's speed, in rad/s
+    ("rounds per second", 2 * np.pi),
+    ("rounds per minute", np.pi / 30),
+    ("degrees per second", np.pi / 180),
+    ("radians per minute", 1 / 60),
+)
+
+
+def check_rolling(track: Track, label: str) -> list[InputFinding]:
+    """A finding where no wheel rolls as far in a radian as the robot does, whatever the model."""
+    if track.command_kind != "wheel_speed":
+        return []
+    rolled_m = _rolled_m(track)
+    if rolled_m is None or CHECKS.least_wheel_m <= rolled_m <= CHECKS.most_wheel_m:
+        return []
+    units = [
+        f"{unit}, on wheels of {1e3 * rolled_m / factor:.0f} mm (--wheel-factor {factor:.5g})"
+        for unit, factor in UNITS
+        if CHECKS.least_wheel_m <= rolled_m / factor <= CHECKS.most_wheel_m
+    ]
+    if rolled_m < CHECKS.least_wheel_m:
+        least, most = (m / rolled_m for m in (CHECKS.least_wheel_m, CHECKS.most_wheel_m))
+        units.append(
+            f"those of motors before a gear of 1:{least:.0f} to 1:{most:.0f} (--wheel-factor with "
+            "1 over the gear's ratio, times that of the unit)"
+        )
+    return [
+        InputFinding(
+            "the wheel speeds are not the wheels' in rad/s",
+            f"the robot rolls {1e3 * rolled_m:.2g} mm in a radian of them, which would be the "
+            "radius of its wheels",
+            f"they may be {', or '.join(units) or 'of another robot'}: import anew",
+            True,
+            label,
+            track.robot_id,
+        )
+    ]
+
+
+def factor_words(ratio: float) -> tuple[str, str] | None:
+    """What wheel speeds are by whose ratio the robot is slower or faster than told; the remedy."""
+    near = [(unit, f) for unit, f in UNITS if 1 / CHECKS.unit_off < ratio / f < CHECKS.unit_off]
+    if near:
+        names = " or ".join(unit for unit, _ in near)
+        options = " or ".join(f"--wheel-factor {factor:.5g}" for _, factor in near)
+        return f"the wheel speeds are in {names}", f"import anew with {options}"
+    if ratio < CHECKS.geared:
+        return (
+            f"the wheel speeds are of motors before a gear of about 1:{1 / ratio:.0f}, or in "
+            "another unit",
+            f"import anew with --wheel-factor {ratio:.3g}, or with the gear's own ratio",
+        )
+    return None
+
+
+def _rolled_m(track: Track) -> float | None:
+    """How far the robot goes in a radian of its wheels, where all turn one way; None if unknown."""
+    half_s = max(HALF_S, 1.5 * track.timing.pose_period_s)
+    _, slope = local_line(track.pose_t_s, track.pose[:, :2], track.segment, half_s)
+    speed_mps = np.hypot(*slope.T)
+    told = np.stack(
+        [command_at(track.pose_t_s + s, track.command_t_s, track.command) for s in STEADY_S]
+    )
+    ahead = (told > 0).all(axis=(0, 2)) | (told < 0).all(axis=(0, 2))
+    seen = ahead & (speed_mps > CHECKS.least_mps)  # NaN compares false
+    if np.count_nonzero(seen) < max(CHECKS.fewest_poses, np.count_nonzero(ahead) / 2):
+        return None
+    return float(np.median(speed_mps[seen] / np.abs(told.mean(axis=(0, 2)))[seen]))

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ROS bags: read and written by Foxglove's ROS 2 library and by rosbags, without ROS."""
+
+from pathlib import Path
+
+from interop import drive
+from interop.cells import Cell, Told, reads, writes
+
+BAG, LOG = "bag", "read.lcmlog"
+POSE, TWIST = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Twist"
+TOPICS = {"/r01/pose": POSE, "/r01/cmd_vel": TWIST}
+FILES = {"foxglove": "bag.mcap", "ros2": "bag_db3", "ros1": "drive.bag"}
+LINE = "=" * 80 + "\n"
+DEFINITIONS = {  # as `ros2 bag record` puts them into a file
+    POSE: LINE.join(
+        [
+            "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
+            "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+            "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+            "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\n"
+            "geometry_msgs/Quaternion orientation\n",
+            "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n",
+            "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
+        ]
+    ),
+    TWIST: LINE.join(
+        [
+            "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
+            "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
+        ]
+    ),
+}
+
+
+def _write(folder: Path) -> None:
+    drive.export(folder, "rosbag2", BAG)
+
+
+def _told(rows: dict[str, list]) -> Told:
+    """What stands in topics, rows of (stamp of the bag in ns, message)."""
+    poses, duties = rows["/r01/pose"], rows["/r01/duty_pct"]
+    stamps_us = [m.header.stamp.sec * 10**6 + m.header.stamp.nanosec // 1000 for _, m in poses]
+    here = [k for k in range(drive.COUNT) if drive.seen(k)]
+    return {
+        "poses that are valid": len(poses) == drive.COUNT - drive.LOST,
+        "stamps of headers": stamps_us == [drive.START_US + k * drive.STEP_US for k in here],
+        "stamps of the bag": [at // 1000 for at, _ in poses] == stamps_us,
+        "places": all(
+            abs(m.pose.position.x - drive.x_m(k)) < 1e-9
+            for k, (_, m) in zip(here, poses, strict=True)
+        ),
+        "duties": len(duties) == drive.COUNT and list(duties[-1][1].data) == [50.0] * 4,
+    }
+
+
+@writes("rosbag2", "mcap-ros2-support", "mcap-ros2-support==0.6.0", ours=_write)
+def foxglove(folder: Path) -> Told:
+    """Foxglove's library."""
+    from mcap.reader import make_reader
+    from mcap_ros2.decoder import DecoderFactory
+
+    rows: dict[str, list] = {}
+    (path,) = (folder / BAG).glob("*.mcap")
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            rows.setdefault(channel.topic, []).append((message.log_time, decoded))
+    return _told(rows)
+
+
+@writes("rosbag2", "rosbags", "rosbags==0.11.9", ours=_write)
+def rosbags(folder: Path) -> Told:
+    """Its high-level reader, which goes by the folder's metadata."""
+    from rosbags.highlevel import AnyReader
+
+    rows: dict[str, list] = {}
+    with AnyReader([folder / BAG]) as reader:
+        for connection, at_ns, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            rows.setdefault(connection.topic, []).append((at_ns, message))
+    return _told(rows)
+
+
+def _reads(name: str):
+    def ours(folder: Path) -> Told:
+        import twinmill as tm
+
+        pose, command = TOPICS
+        log = tm.import_log(bag=folder / FILES[name], pose=[pose], command=[command], robot_id=1)
+        log.save(folder / LOG)
+        return drive.told_of_import(folder / LOG, "twist")
+
+    return ours
+
+
+@reads("rosbag2", "mcap-ros2-support", "mcap-ros2-support==0.6.0", ours=_reads("foxglove"))
+def foxglove_writes(folder: Path) -> None:
+    """One MCAP file without a folder's metadata."""
+    from mcap_ros2.writer import Writer
+
+    with (folder / FILES["foxglove"]).open("wb") as stream:
+        writer = Writer(stream)
+        schemas = {
+            topic: writer.register_msgdef(kind, DEFINITIONS[kind]) for topic, kind in TOPICS.items()
+        }
+        for k in range(drive.COUNT):
+            at_ns = 1000 * (drive.START_US + k * drive.STEP_US)
+            writer.write_message("/r01/pose", schemas["/r01/pose"], _pose(k), at_ns, at_ns)
+            twist = {
+                "linear": _vector(drive.SPEED_MPS * (k >= drive.STANDS)),
+                "angular": _vector(0),
+            }
+            writer.write_message("/r01/cmd_vel", schemas["/r01/cmd_vel"], twist, at_ns, at_ns)
+        writer.finish()
+
+
+def _vector(x: float) -> dict:
+    return {"x": float(x), "y": 0.0, "z": 0.0}
+
+
+def _pose(k: int) -> dict:
+    sec, nanosec = divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9)
+    x_m = drive.x_m(k) if drive.seen(k) else float("nan")
+    return {
+        "header": {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": "map"},
+        "pose": {"position": _vector(x_m), "orientation": _vector(0) | {"w": 1.0}},
+    }
+
+
+@reads("rosbag2", "rosbags, SQLite", "rosbags==0.11.9", ours=_reads("ros2"))
+def rosbags_writes(folder: Path) -> None:
+    """A folder as `ros2 bag record` makes it by SQLite."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    with Writer(folder / FILES["ros2"], version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        of = {t: writer.add_connection(t, kind, typestore=store) for t, kind in TOPICS.items()}
+        for at_ns, topic, message in _messages(store.types):
+            writer.write(of[topic], at_ns, store.serialize_cdr(message, TOPICS[topic]))
+
+
+@reads("rosbag1", "rosbags", "rosbags==0.11.9", ours=_reads("ros1"))
+def rosbags_writes_ros1(folder: Path) -> None:
+    """A file as `rosbag record` makes it."""
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Writer(folder / FILES["ros1"]) as writer:
+        of = {t: writer.add_connection(t, kind, typestore=store) for t, kind in TOPICS.items()}
+        for at_ns, topic, message in _messages(store.types, seq=0):
+            writer.write(of[topic], at_ns, store.serialize_ros1(message, TOPICS[topic]))
+
+
+def _messages(types: dict, **header):
+    """Stamps in ns, topics, and messages of rosbags."""
+    point, turn, vector = (
+        types[f"geometry_msgs/msg/{name}"] for name in ("Point", "Quaternion", "Vector3")
+    )
+    for k in range(drive.COUNT):
+        at_ns = 1000 * (drive.START_US + k * drive.STEP_US)
+        x_m = drive.x_m(k) if drive.seen(k) else float("nan")
+        stamp = types["builtin_interfaces/msg/Time"](*divmod(at_ns, 10**9))
+        head = types["std_msgs/msg/Header"](stamp=stamp, frame_id="map", **header)
+        place = types["geometry_msgs/msg/Pose"](point(x_m, 0.0, 0.0), turn(0.0, 0.0, 0.0, 1.0))
+        yield at_ns, "/r01/pose", types[POSE](head, place)
+        speed_mps = drive.SPEED_MPS * (k >= drive.STANDS)
+        yield (
+            at_ns,
+            "/r01/cmd_vel",
+            types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0)),
+        )
+
+
+NOT_RUN = [
+    Cell("rosbag2", "writes", "PlotJuggler", why_not="it is a window and no registry has it"),
+    Cell("rosbag2", "reads", "`ros2 bag`", why_not="ROS is in no registry that is used here"),
+]
