@@ -114,8 +114,10 @@ def _conditioned(p: Problem, h: Hypothesis, grown: _Grown) -> Always:
     linear = h.linear(view.fitter.whiten)
     if there:
         linear = linear.with_columns(_white(view, grown.kernels))
-    root = block_diag(np.linalg.cholesky(h.cov), np.eye(len(labels) - len(h.labels)))
-    mean = np.r_[h.mean, np.zeros(len(labels) - len(h.labels))] + root @ linear.mean
+    weights = len(labels) - len(h.labels)
+    root = block_diag(np.linalg.cholesky(h.cov), np.eye(weights))
+    mean = np.r_[h.mean, np.zeros(weights)] + root @ linear.mean
+    mean[: len(h.labels)] = np.clip(mean[: len(h.labels)], h.low, h.high)
     cov = root @ linear.covariance @ root.T
     kept = [k for k, n in enumerate(labels) if k < len(h.labels) or n in lasting]
     noise = grown.noise
