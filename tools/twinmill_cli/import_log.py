@@ -14,7 +14,6 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
 
 if working():  # not for --help
-
     from twinmill.data.importers.columns import Guess, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
     from twinmill.data.importers.robot_files import files_of
