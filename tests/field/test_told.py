@@ -52,7 +52,7 @@ FAULTS = {
         "Ctrl-S for 2.5 s, then SIGTERM", ("All stand.",), 0, is_brief=True
     ),
     "terminal_halted_at_the_start": Fault(
-        "Ctrl-S before the start, then SIGINT", ("All stand",), 0
+        "Ctrl-S before the start, then SIGINT", ("All stand",), 0, is_brief=True
     ),
     "hung_up": Fault("terminal closed", (), 1),
     "ctrl_z": Fault("Ctrl-Z", ("All stand.",), 0),
