@@ -28,6 +28,11 @@ enum outcome
     OUTCOME_CONFIRMED,
 };
 
+static enum outcome best_of(enum outcome a, enum outcome b)
+{
+    return a > b ? a : b;
+}
+
 // Boards that the configuration names: one, or one of each kind.
 #define NAMED_MAX 2
 
@@ -128,18 +133,23 @@ static enum outcome search_kind(const struct app_config *config, const char *kin
     {
         char *path = strcmp(kind, "i2c") == 0 ? other.i2c_device : other.uart_device;
         (void)snprintf(path, CONFIG_TEXT_MAX, "%s", found.gl_pathv[i]);
-        const enum outcome outcome = stop_if_there(&other);
-        best = outcome > best ? outcome : best;
+        best = best_of(best, stop_if_there(&other));
     }
     globfree(&found);
     return best;
 }
 
-static enum outcome search(const struct app_config *config)
+// The Pi's own buses and lines first. What hangs on USB may be anything, and opening alone resets
+// some of it: that is asked only if no board has confirmed.
+static enum outcome search(const struct app_config *config, enum outcome outcome)
 {
-    const enum outcome i2c = search_kind(config, "i2c", "/dev/i2c-*");
-    const enum outcome uart = search_kind(config, "uart", "/dev/{ttyAMA*,ttyS0,ttyUSB*,ttyACM*}");
-    return i2c > uart ? i2c : uart;
+    outcome = best_of(outcome, search_kind(config, "i2c", "/dev/i2c-*"));
+    outcome = best_of(outcome, search_kind(config, "uart", "/dev/{ttyAMA*,ttyS0}"));
+    if (outcome != OUTCOME_CONFIRMED)
+    {
+        outcome = best_of(outcome, search_kind(config, "uart", "/dev/{ttyUSB*,ttyACM*}"));
+    }
+    return outcome;
 }
 
 // Asks the program that has a board to end. @return its pid, 0 if there is none.
@@ -213,8 +223,7 @@ int stop_command(const struct options *options)
     }
     if (outcome != OUTCOME_CONFIRMED || !options->is_whole)
     {
-        const enum outcome others = search(&options->config);
-        outcome = others > outcome ? others : outcome;
+        outcome = search(&options->config, outcome);
     }
     if (outcome != OUTCOME_CONFIRMED)
     {
