@@ -28,11 +28,6 @@ enum outcome
     OUTCOME_CONFIRMED,
 };
 
-static enum outcome best_of(enum outcome a, enum outcome b)
-{
-    return a > b ? a : b;
-}
-
 // Boards that the configuration names: one, or one of each kind.
 #define NAMED_MAX 2
 
@@ -117,39 +112,36 @@ static enum outcome stop_if_there(const struct app_config *config)
     return outcome;
 }
 
-// @return the best that came of it.
+// @return the better of what came of it, and of before.
 static enum outcome search_kind(const struct app_config *config, const char *kind,
-                                const char *pattern)
+                                const char *pattern, enum outcome before)
 {
     struct app_config other = *config;
     glob_t found;
-    enum outcome best = OUTCOME_NOTHING;
     if (glob(pattern, GLOB_BRACE, NULL, &found) != 0)
     {
-        return best;
+        return before;
     }
     (void)snprintf(other.board, sizeof other.board, "%s", kind);
+    char *path = kind[0] == 'i' ? other.i2c_device : other.uart_device;
     for (size_t i = 0; i < found.gl_pathc; ++i)
     {
-        char *path = strcmp(kind, "i2c") == 0 ? other.i2c_device : other.uart_device;
         (void)snprintf(path, CONFIG_TEXT_MAX, "%s", found.gl_pathv[i]);
-        best = best_of(best, stop_if_there(&other));
+        const enum outcome outcome = stop_if_there(&other);
+        before = outcome > before ? outcome : before;
     }
     globfree(&found);
-    return best;
+    return before;
 }
 
 // The Pi's own buses and lines first. What hangs on USB may be anything, and opening alone resets
 // some of it: that is asked only if no board has confirmed.
-static enum outcome search(const struct app_config *config, enum outcome outcome)
+static enum outcome search(const struct app_config *config, enum outcome best)
 {
-    outcome = best_of(outcome, search_kind(config, "i2c", "/dev/i2c-*"));
-    outcome = best_of(outcome, search_kind(config, "uart", "/dev/{ttyAMA*,ttyS0}"));
-    if (outcome != OUTCOME_CONFIRMED)
-    {
-        outcome = best_of(outcome, search_kind(config, "uart", "/dev/{ttyUSB*,ttyACM*}"));
-    }
-    return outcome;
+    best = search_kind(config, "i2c", "/dev/i2c-*", best);
+    best = search_kind(config, "uart", "/dev/{ttyAMA*,ttyS0}", best);
+    return best == OUTCOME_CONFIRMED ? best
+                                     : search_kind(config, "uart", "/dev/tty{USB,ACM}*", best);
 }
 
 // Asks the program that has a board to end. @return its pid, 0 if there is none.
