@@ -5,7 +5,8 @@ It may hold escape sequences that rewrite a terminal, marks that turn the order 
 pages of characters. Before it is shown, logged or written to a table it goes through this module.
 """
 
-LINE_MAX = 100  # characters of a name, a version, a reason: robots give at most 96
+NAME_MAX = 48  # characters of a name or a version, as on the robot
+LINE_MAX = 100  # characters of a reason: robots give at most 96
 MESSAGE_MAX = 4000  # characters of a sentence that quotes such texts
 REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 ELLIPSIS = "\N{HORIZONTAL ELLIPSIS}"

@@ -12,7 +12,14 @@ pytestmark = pytest.mark.skipif(
     not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program"
 )
 PERIOD_US = 22_000  # the model's control period
-CUT_SHORT = ("key", "ctrl_c", "full_disk", "lost_poses", "lost_telemetry")
+CUT_SHORT = (
+    "key",
+    "ctrl_c",
+    "stopped_by_another",
+    "full_disk",
+    "lost_poses",
+    "lost_telemetry",
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +54,7 @@ def test_whatever_goes_wrong_stops_the_robot_and_keeps_the_log(session, how):
 def test_reasons_are_told(session):
     ended = {how: session[how]["ended"] for how in CUT_SHORT}
     assert "key" in ended["key"] and "Ctrl-C" in ended["ctrl_c"]
+    assert ended["stopped_by_another"] == "stopped: stopped by another command"
     assert "the log cannot be written" in ended["full_disk"]
     assert "pose" in ended["lost_poses"] and "telemetry" in ended["lost_telemetry"]
 

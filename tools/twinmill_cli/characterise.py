@@ -42,6 +42,7 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile
     from twinmill.robots import tell
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet
+    from twinmill.robots.hold import SCRIPT_OVER, Held
     from twinmill.robots.key import load_or_make
     from twinmill.robots.remote import Remote
     from twinmill.terminal import progress_bar
@@ -269,9 +270,9 @@ class Run:
         with ended_by_signals(self.fleet, self.voice.check):
             try:
                 with self._watched("starts; any key stops", countdown_s, pressed):
-                    self._start(script, countdown_s)
+                    held = self._start(script, countdown_s)
                 with self._watched("plays; any key stops", end_s, pressed):
-                    self._play(end_s)
+                    self._play(held, end_s)
                 why = ""
             except Abort as abort:
                 why = f"stopped: {abort}"
@@ -309,7 +310,7 @@ class Run:
         # So that the log says whose it is.
         self.fleet.listen(RUN_PERIOD_S, lambda: self.fleet.robots[self.robot_id].run is not None)
 
-    def _start(self, script: str, countdown_s: float) -> None:
+    def _start(self, script: str, countdown_s: float) -> Held:
         begun = tell.start(
             self.fleet,
             {self.robot_id},
@@ -321,14 +322,20 @@ class Run:
         (answer,) = begun.answers
         if begun.called_off:
             raise ValueError(f"robot {self.robot_id} does not play {script}: {answer.reason}.")
+        return Held(self.fleet, begun)
 
-    def _play(self, end_s: float | None) -> None:
+    def _play(self, held: Held, end_s: float | None) -> None:
         robot, begin_s = self.fleet.robots[self.robot_id], time.monotonic()
         while robot.mode == "script":
             self.fleet.listen(0.1)
+            held.news()
         passed_s = time.monotonic() - begin_s
         if robot.mode == "fault":
             raise Abort("the robot reports a fault (camera, board or battery)")
+        self.fleet.listen(LOST_S, lambda: not held.news() and held.is_over)
+        (state,) = held.states.values()
+        if state.stands and state != SCRIPT_OVER:
+            raise Abort(state.words)
         if robot.mode == "running" or (end_s is not None and passed_s < end_s - 1):
             raise Abort(f"the robot left the script after {passed_s:.1f} s")
 

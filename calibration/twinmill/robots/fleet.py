@@ -14,7 +14,7 @@ import turbopi
 
 from twinmill.data.bus import Senders, open_bus
 from twinmill.defaults import URL
-from twinmill.foreign_text import plain_line
+from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
 
 BACKLOG_S = 0.02  # what waits is taken in for so long at once
@@ -37,7 +37,7 @@ ALARMS = (
 # A robot with one of these may be moving, whatever it was told.
 MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
 # Fields of text, which may be anybody's: most of these messages are not signed.
-TEXTS = ("source", "version", "behavior", "reason")
+TEXTS = {"source": NAME_MAX, "version": NAME_MAX, "behavior": NAME_MAX, "reason": LINE_MAX}
 HOLD_S = 0.1  # so often robots that were started hear that the operator is there
 
 
@@ -232,9 +232,9 @@ class Fleet:
             message = getattr(turbopi, f"{kind.lower()}_t").decode(data)
         except (ValueError, struct.error, IndexError):
             return  # another program's type on this channel, or half a message
-        for text in TEXTS:
+        for text, most in TEXTS.items():
             if hasattr(message, text):
-                setattr(message, text, plain_line(getattr(message, text)))
+                setattr(message, text, plain_line(getattr(message, text), most))
         robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
         now_s = robot.heard_s = time.monotonic()
         if kind in ("LINK", "SIGNED_ACK"):

@@ -10,6 +10,7 @@ from twinmill.robots.tell import Start
 # A robot signs ten times a second; without a word for as long as it would wait for its operator,
 # nobody knows what it does.
 SILENT_S = 2.0
+SETTLE_S = 0.3  # a state that lasts is told; a camera that stutters would be a flood of words
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ DRIVES = State("drives", is_meant=True)
 WAITS = State("has accepted the start, and has not driven yet: is its clock behind?")
 DRIVES_ANEW = State("drives, though its program was started anew: it has autostart")
 SILENT = State("is not heard any more: nobody knows whether it stands")
+DOUBLE = State("is two robots of one number, or hears another: nobody knows which does what")
 UNCONFIRMED = State("says that it stands, but not that its motor board took zero")
 RESTARTED = State("its program was started anew", stands=True)
 LINK_LOST = State("it had lost its link to this command", stands=True)
@@ -58,11 +60,14 @@ class Held:
         }
         self._drove: dict[int, int] = {}  # mode in which a robot drove last
         self._told = dict.fromkeys(self._sessions, DRIVES)
+        self._seen = dict.fromkeys(self._sessions, (DRIVES, 0.0))  # and since when
         self._begin_s = time.monotonic()
 
     def _state(self, robot: Robot) -> State:
         """By its newest link, which what it says unsigned may only contradict."""
         link = robot.link
+        if robot.is_double:
+            return DOUBLE
         if time.monotonic() - robot.link_s > SILENT_S:
             return SILENT
         if robot.link_s < self._begin_s:
@@ -94,11 +99,13 @@ class Held:
         return SCRIPT_OVER if was_script else BY_BUTTON
 
     def news(self) -> list[str]:
-        """A sentence of each robot that is in another state than was told last."""
-        said = []
+        """A sentence of each robot that has for a while been in another state than was told."""
+        said, now_s = [], time.monotonic()
         for robot in self.robots:
-            state = self._state(robot)
-            if state != self._told[robot.robot_id]:
+            state, (before, since_s) = self._state(robot), self._seen[robot.robot_id]
+            if state != before:
+                self._seen[robot.robot_id] = state, now_s
+            elif state != self._told[robot.robot_id] and now_s - since_s >= SETTLE_S:
                 self._told[robot.robot_id] = state
                 said.append(f"{state.told_of(f'R{robot.robot_id:02d}')}.")
         return said
