@@ -54,6 +54,9 @@ FAULTS = {
     "terminal_halted_at_the_start": Fault(
         "Ctrl-S before the start, then SIGINT", ("All stand",), 0, is_brief=True
     ),
+    "untethered_at_a_halted_terminal": Fault(
+        "the same with --untethered, whose words cannot be told", ("All stand",), 0
+    ),
     "hung_up": Fault("terminal closed", (), 1),
     "ctrl_z": Fault("Ctrl-Z", ("All stand.",), 0),
     "killed": Fault("tool killed (SIGKILL)", (), -9, LINK_LOST_S),

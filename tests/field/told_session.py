@@ -191,10 +191,10 @@ class Field:
         operator.type(b"\x11")  # Ctrl-Q: the terminal goes on
         return self.row(fault_s, operator.end()) | {"drove": drove, "stood_before_ctrl_q": stood}
 
-    def terminal_halted_at_the_start(self) -> dict:
+    def terminal_halted_at_the_start(self, *options: str) -> dict:
         """Nothing of the start can be told, and the wheels turn already."""
         begin_s = time.monotonic()
-        self.operator = operator = Operator(self.key_file, *START)
+        self.operator = operator = Operator(self.key_file, *START, *options)
         operator.type(CTRL_S)
         assert wait_until(lambda: all(self.moved(i, begin_s) for i in IDS), 20)
         time.sleep(0.2)
@@ -203,6 +203,9 @@ class Field:
         wait_until(lambda: all(r.duties() == ZERO for r in self.robots.values()), 5)
         operator.type(b"\x11")
         return self.row(fault_s, operator.end())
+
+    def untethered_at_a_halted_terminal(self) -> dict:
+        return self.terminal_halted_at_the_start("--untethered")
 
     def hung_up(self) -> dict:
         operator = self.held()

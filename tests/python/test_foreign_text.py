@@ -24,7 +24,7 @@ from twinmill_cli.output import say
 from twinmill_cli.swarm_screen import status_table
 from twinmill_cli.swarm_verdict import Verdict
 
-EXAMPLES = int(os.environ.get("TWINMILL_FUZZ_EXAMPLES", "100"))
+EXAMPLES = int(os.environ.get("TWINMILL_FUZZ_EXAMPLES", "50"))
 fuzzed = settings(
     max_examples=EXAMPLES,
     deadline=None,

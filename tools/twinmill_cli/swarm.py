@@ -151,7 +151,7 @@ def _drive(
         if started.called_off or not held.robots or options["link_timeout_ms"] == 0:
             while not voice.is_idle:
                 fleet.listen(0.1)
-            voice.check()
+            fleet.watch()  # the last that ends it, while robots drive on
             return begun
         _hold(fleet, held, voice)
         ended = of_end(begun, held.states, None)
@@ -159,7 +159,8 @@ def _drive(
         given = tell.stop(fleet, asked)
         ended = of_end(begun, held.states if held else {}, of_stop(given))
         if begun is None:
-            voice.tell(lambda: _finish("start", given, ended, {}, as_json=as_json))
+            data = {"start_utime_us": None, "called_off": False}
+            voice.tell(lambda: _finish("start", given, ended, data, as_json=as_json))
         if not isinstance(error, KeyboardInterrupt):
             voice.say(ended.sentence)
             raise

@@ -11,18 +11,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html.parser import HTMLParser
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
-
-from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.workbench.panel import commands_html, escaped
 
 FOREIGN = '<img src=x onerror="window.owned=1"><script>window.owned=1</script>'
 NAME = "<img src=x onerror=window.owned=1>.lcmlog"
@@ -150,28 +144,3 @@ def test_no_other_page_has_it_in_a_frame(workbench, page, stranger):
     page.wait_for_timeout(500)
     assert any("frame" in text.lower() for text in refused)
     assert page.frames[1].url.startswith("chrome-error:")
-
-
-class Seen(HTMLParser):
-    """Tags and text, as a browser finds them."""
-
-    def __init__(self, text: str):
-        super().__init__()
-        self.tags, self.text = [], ""
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-
-    def handle_data(self, data):
-        self.text += data
-
-
-@given(st.lists(st.text() | st.sampled_from(["<", ">", '"', "'", "&lt;", "<b", "{}"])).map("".join))
-@example(FOREIGN)
-def test_texts_are_texts_in_pages(text):
-    seen = Seen(escaped('<b title="{}">{}</b>', text, text))
-    assert seen.tags == ["b"]
-    assert seen.text == plain_line(text, MESSAGE_MAX)
-    assert set(Seen(commands_html([text])).tags) == {"pre", "span"}
