@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from network import run_session
+from network import run_session_at
 
 ALL = os.environ.get("FAULTS") == "all"
 pytestmark = pytest.mark.skipif(
@@ -130,7 +130,9 @@ RUN = [name for name, fault in FAULTS.items() if ALL or fault.is_brief]
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
     """What happened: see told_session.py."""
-    rows = run_session("told_session.py", tmp_path_factory.mktemp("told"), *RUN)
+    script = Path(__file__).with_name("told_session.py")
+    folder = tmp_path_factory.mktemp("told")
+    rows = run_session_at(script, folder, *RUN, timeout_s=30 * len(RUN))
     if ALL:
         write_table(Path(os.environ["BUILD"]) / "operator_faults.md", rows)
     return rows
