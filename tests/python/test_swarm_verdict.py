@@ -59,6 +59,11 @@ SENTENCES = [
     (of_start(begun(FAULTY, GOOD), untethered=False), "Started at", 1),
     (of_start(begun(REFUSED), untethered=False), "NOBODY STARTED: R03 refused", 1),
     (of_start(begun(REFUSED, stopped=[STANDS]), untethered=False), "Called off: R03 refused", 1),
+    (
+        of_start(begun(UNHEARD, GOOD, stopped=[STANDS]), untethered=False),
+        "Called off: R05 did not acknowledge in time",
+        1,
+    ),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),
     (of_end(ILL, {"R01": DRIVES}, WELL), "All stand, but not all had started.", 1),

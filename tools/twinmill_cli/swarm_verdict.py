@@ -129,8 +129,7 @@ def _why(given: list[Answer]) -> str:
     refused = [a for a in given if a.accepted is False]
     if refused:
         return f"{_names(refused)} refused, see above{_hint(given)}"
-    wrong = _disobeyed(given)
-    return f"{_names(wrong)} did not acknowledge in time" if wrong else "all stand again"
+    return f"{_names(_disobeyed(given))} did not acknowledge in time"
 
 
 def _hint(given: list[Answer]) -> str:

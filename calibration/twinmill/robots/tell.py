@@ -268,7 +268,7 @@ class Start:
 
     Attributes:
         utime_us: the instant.
-        answers: of each robot.
+        answers: of each robot; of a start that was called off, those for which it was.
         sessions: that the start was meant for, by robot; of those that have signed it.
         stopped: what they answered to the stop where the start was called off, as not all had
             acknowledged in time; else empty.
@@ -328,7 +328,9 @@ def start(
         for i in robots
         if (robot := fleet.robots.get(i)) and command.seq in robot.signed_acks
     }
-    return Start(command.start_utime_us, answers(fleet, command, robots), sessions, stopped)
+    # An answer that came after the start was called off does not tell why it was.
+    final = given if stopped else answers(fleet, command, robots)
+    return Start(command.start_utime_us, final, sessions, stopped)
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
