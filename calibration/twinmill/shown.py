@@ -11,11 +11,12 @@ from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 import pandas as pd
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 
 from twinmill import report
 from twinmill.arguments import checked, in_python
 from twinmill.files import check_report, plain, replacing
+from twinmill.terminal import PlainConsole
 from twinmill.version import __version__
 
 WIDEST_COLUMNS = 100  # of a printed result; text in longer lines is hard to read
@@ -58,8 +59,8 @@ class Shown:
         out = StringIO()
         lines = [f"! {said}" for said in self.left_out]
         width = min(shutil.get_terminal_size().columns, WIDEST_COLUMNS)
-        Console(file=out, width=width, color_system=None).print(
-            *lines, self._text(), sep="\n", markup=False, highlight=False
+        PlainConsole(file=out, width=width, color_system=None).print(
+            *lines, self._text(), sep="\n", highlight=False
         )
         return "\n".join(map(str.rstrip, out.getvalue().splitlines())).rstrip()
 

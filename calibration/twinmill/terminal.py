@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables and progress in terminals of any width: no word or number of them is cut."""
+"""What is shown in terminals: foreign text as it is, tables and progress of any width uncut."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.measure import Measurement
 from rich.progress import (
     BarColumn,
@@ -17,11 +18,32 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
 from rich.table import Column, Table
 from rich.text import Text
 
+from twinmill.foreign_text import printable
+
 MOST_WIDE = 1000  # columns that no terminal has
 BAR_FROM = 60  # columns of a terminal that has room for more than words and numbers
+
+
+class PlainConsole(Console):
+    """A console in which no text is markup, and through which no control character gets.
+
+    Args:
+        options: as of rich's Console.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, emoji=False, **options)
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Segments of text and style; those of rich's own control codes stay as they are."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else printable(text), style, control)
 
 
 def whole(command: str) -> Text:
@@ -122,7 +144,7 @@ def progress_bar(counted: bool = True) -> Progress:
     """
     done = MofNCompleteColumn if counted else TaskProgressColumn
     columns = [SpinnerColumn(), _words(), done(table_column=_whole())]
-    if Console(stderr=True).width >= BAR_FROM:
+    if PlainConsole(stderr=True).width >= BAR_FROM:
         columns.insert(2, BarColumn(bar_width=None, table_column=Column(max_width=40)))
         columns.append(TimeElapsedColumn(table_column=_whole()))
     left = TextColumn("left", table_column=_whole())
@@ -140,13 +162,13 @@ def progress_words(transient: bool = True) -> Progress:
 
 
 def _shown(columns: list[ProgressColumn], transient: bool = True) -> Progress:
-    console = Console(stderr=True)
+    console = PlainConsole(stderr=True)
     return Progress(*columns, console=console, transient=transient, disable=not console.is_terminal)
 
 
 def _words() -> TextColumn:
     """What is being done; it wraps."""
-    return TextColumn("{task.description}", table_column=Column(overflow="fold"))
+    return TextColumn("{task.description}", markup=False, table_column=Column(overflow="fold"))
 
 
 def _whole() -> Column:

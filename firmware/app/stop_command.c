@@ -112,34 +112,36 @@ static enum outcome stop_if_there(const struct app_config *config)
     return outcome;
 }
 
-// @return the best that came of it.
+// @return the better of what came of it, and of before.
 static enum outcome search_kind(const struct app_config *config, const char *kind,
-                                const char *pattern)
+                                const char *pattern, enum outcome before)
 {
     struct app_config other = *config;
     glob_t found;
-    enum outcome best = OUTCOME_NOTHING;
     if (glob(pattern, GLOB_BRACE, NULL, &found) != 0)
     {
-        return best;
+        return before;
     }
     (void)snprintf(other.board, sizeof other.board, "%s", kind);
+    char *path = kind[0] == 'i' ? other.i2c_device : other.uart_device;
     for (size_t i = 0; i < found.gl_pathc; ++i)
     {
-        char *path = strcmp(kind, "i2c") == 0 ? other.i2c_device : other.uart_device;
         (void)snprintf(path, CONFIG_TEXT_MAX, "%s", found.gl_pathv[i]);
         const enum outcome outcome = stop_if_there(&other);
-        best = outcome > best ? outcome : best;
+        before = outcome > before ? outcome : before;
     }
     globfree(&found);
-    return best;
+    return before;
 }
 
-static enum outcome search(const struct app_config *config)
+// The Pi's own buses and lines first. What hangs on USB may be anything, and opening alone resets
+// some of it: that is asked only if no board has confirmed.
+static enum outcome search(const struct app_config *config, enum outcome best)
 {
-    const enum outcome i2c = search_kind(config, "i2c", "/dev/i2c-*");
-    const enum outcome uart = search_kind(config, "uart", "/dev/{ttyAMA*,ttyS0,ttyUSB*,ttyACM*}");
-    return i2c > uart ? i2c : uart;
+    best = search_kind(config, "i2c", "/dev/i2c-*", best);
+    best = search_kind(config, "uart", "/dev/{ttyAMA*,ttyS0}", best);
+    return best == OUTCOME_CONFIRMED ? best
+                                     : search_kind(config, "uart", "/dev/tty{USB,ACM}*", best);
 }
 
 // Asks the program that has a board to end. @return its pid, 0 if there is none.
@@ -213,8 +215,7 @@ int stop_command(const struct options *options)
     }
     if (outcome != OUTCOME_CONFIRMED || !options->is_whole)
     {
-        const enum outcome others = search(&options->config);
-        outcome = others > outcome ? others : outcome;
+        outcome = search(&options->config, outcome);
     }
     if (outcome != OUTCOME_CONFIRMED)
     {

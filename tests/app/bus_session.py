@@ -16,7 +16,7 @@ from robot_process import LEFT, ZERO, Robot
 
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
-from twinmill.robots.key import load, of_robot
+from twinmill.robots.key import load_or_make, of_robot
 
 ID = 3
 URL = "udpm://239.255.76.67:7667?ttl=0"
@@ -46,7 +46,7 @@ def heard_again(fleet: Fleet) -> bool:
 def main(folder: Path, program: list[str]) -> dict:
     network(up=True)
     result = {}
-    key = load(folder / "operator.key")
+    key = load_or_make(folder / "operator.key")
     own_key = folder / "key"
     own_key.touch(mode=0o600)
     own_key.write_text(of_robot(key, ID).hex())

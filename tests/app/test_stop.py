@@ -5,13 +5,16 @@ Each fault has a limit from the moment it happens to the zero that the board kee
 """
 
 import contextlib
+import fcntl
 import itertools
 import os
 import pty
 import resource
+import select
 import shlex
 import signal
 import socket
+import struct
 import subprocess
 import time
 from pathlib import Path
@@ -21,6 +24,8 @@ from robot_process import LEFT, ZERO, Robot, full_pipe, wait_until
 
 TURBOPI = shlex.split(os.environ.get("TURBOPI", ""))
 pytestmark = pytest.mark.skipif(not TURBOPI, reason="TURBOPI does not name the program")
+
+TIOCSPTLCK, TIOCGPTN = 0x40045431, 0x80045430  # of a pseudo terminal, <asm-generic/ioctls.h>
 
 # The program's promise, and what a machine that is busy with other tests may add.
 LIMIT_S, SLACK_S = 0.5, 1.0
@@ -251,6 +256,55 @@ def test_stop_needs_no_configuration(stops, what):
     assert process.returncode == 0, said
     assert record.read_text().endswith(",0,0,0,0\n")
     assert f"{record}: zero to all wheels, confirmed" in said
+
+
+# A folder /dev of its own, in which two pseudo terminals have the names of lines.
+OWN_DEV = """
+mount -t tmpfs none "$1" && mkdir "$1/pts" && mount --bind /dev/pts "$1/pts" && touch "$1/null" &&
+mount --bind /dev/null "$1/null" && ln -s "pts/$2" "$1/ttyAMA0" && ln -s "pts/$3" "$1/ttyUSB0" &&
+mount --rbind "$1" /dev && shift 3 && exec "$@"
+"""
+
+
+def unopened_line():
+    """A pseudo terminal whose far end nobody has opened: its near end and its number."""
+    near = os.open("/dev/ptmx", os.O_RDWR | os.O_NOCTTY)
+    fcntl.ioctl(near, TIOCSPTLCK, struct.pack("i", 0))
+    (number,) = struct.unpack("i", fcntl.ioctl(near, TIOCGPTN, bytes(4)))
+    return near, number
+
+
+def was_opened(near):
+    """Linux says that the far end hung up once somebody has opened and closed it."""
+    line = select.poll()
+    line.register(near, 0)
+    return any(event & select.POLLHUP for _, event in line.poll(0))
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount")
+@pytest.mark.parametrize("confirms", [True, False], ids=["its board confirms", "none does"])
+def test_what_hangs_on_usb_is_opened_only_if_no_board_confirms(tmp_path, confirms):
+    """Opening alone resets some devices: with a wrong configuration, too, its own are asked."""
+    (tmp_path / "dev").mkdir()
+    (own, own_number), (usb, usb_number) = unopened_line(), unopened_line()
+    board = f"stub:{tmp_path}/board.csv" if confirms else "uart"
+    (tmp_path / "conf").write_text(
+        f"board = {board}\nuart_device = /nowhere\nbehaviour = milling\n"
+    )
+    command = ["unshare", "--mount", "sh", "-c", OWN_DEV, "sh", str(tmp_path / "dev")]
+    command += [str(own_number), str(usb_number)]
+    done = subprocess.run(
+        [*command, *TURBOPI, "--stop", "--config", str(tmp_path / "conf")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    if "unshare: " in done.stderr or "mount: " in done.stderr:
+        pytest.skip(f"no mounts here: {done.stderr.strip()}")
+    assert done.returncode == (0 if confirms else 1), done.stderr
+    assert was_opened(own) and was_opened(usb) == (not confirms)
+    os.close(own)
+    os.close(usb)
 
 
 def test_stop_waits_for_no_pipe(tmp_path):

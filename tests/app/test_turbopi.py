@@ -141,6 +141,21 @@ def test_unplugged_camera_comes_back(driving):
     assert driving.wait_for(LEFT)
 
 
+def test_camera_that_comes_back_under_another_name_is_found_by_its_lasting_one(tmp_path):
+    """As by /dev/v4l/by-id, whose entries lead to the name that the camera has now."""
+    lasting = tmp_path / "by-id"
+    lasting.symlink_to(tmp_path / "camera")
+    with Robot(TURBOPI, tmp_path, "--start", "--camera", f"stub:unix:{lasting}") as robot:
+        assert robot.wait_for(LEFT)
+        robot.camera.unplug()
+        assert robot.wait_for(ZERO)
+        lasting.unlink()
+        lasting.symlink_to(tmp_path / "another")
+        robot.camera.path = tmp_path / "another"
+        robot.camera.plug()
+        assert robot.wait_for(LEFT)
+
+
 def test_script_is_played_once(tmp_path):
     script = tmp_path / "s.csv"
     script.write_text(

@@ -20,7 +20,9 @@ from pathlib import Path
 import lcm
 import turbopi
 
+from twinmill.robots import tell
 from twinmill.robots.fleet import URL, Fleet
+from twinmill.robots.key import load
 
 SCRIPT = (
     "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,0,0,0,0\n0.4,50,50,50,50\n1.2,-50,-50,-50,-50\n2,0,0,0,0\n"
@@ -32,7 +34,13 @@ LONG = "t_s,speed_input,turn_input\n0,20,0\n60,0,0\n"
 def twin(folder: Path, *options: str):
     """A twin of four robots that wait."""
     command = [os.environ["TWIN_RUN"], "--plant", "planar", "--n", "4", "--wait"]
-    command += ["--script-dir", str(folder), "--key", str(folder / "operator.key"), *options]
+    command += [
+        "--script-dir",
+        str(folder / "robot"),
+        "--key",
+        str(folder / "operator.key"),
+        *options,
+    ]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
         try:
             time.sleep(0.5)
@@ -42,11 +50,16 @@ def twin(folder: Path, *options: str):
 
 
 def characterise(folder: Path, name: str, script: str, act=lambda: None) -> dict:
-    """Runs the command at a terminal of its own; does `act` once the robot plays."""
+    """Runs the command at a terminal of its own; does `act` once the robot plays.
+
+    A script that does not lie in the folder is one on the robot.
+    """
     log = folder / f"{name}.lcmlog"
     code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
     command = [sys.executable, "-c", code, "characterise", "--robot", "3", "--json"]
-    command += ["--script", str(folder / script), "--out", str(log), "--countdown-s", "1"]
+    here = folder / script
+    command += ["--script", str(here) if here.exists() else script]
+    command += ["--out", str(log), "--countdown-s", "1"]
     command += ["--key", str(folder / "operator.key"), "--arm"]
     keyboard, terminal = pty.openpty()
     with subprocess.Popen(
@@ -80,6 +93,11 @@ def say_poses(lost: threading.Event) -> None:
         time.sleep(0.05)
 
 
+def stop_as_another(folder: Path) -> None:
+    """`swarm stop` of somebody else; the script's length is known to the robot alone."""
+    tell.stop(Fleet(URL, key=load(folder / "operator.key")), {3})
+
+
 def fill_disk(_, process: subprocess.Popen) -> None:
     """No file of the command's may grow: its newest events are in memory, and lost."""
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (6000, 6000))
@@ -100,6 +118,10 @@ def what_was_logged(log: Path, act_s: float) -> dict:
 def main(folder: Path) -> dict:
     (folder / "steps.csv").write_text(SCRIPT)
     (folder / "long.csv").write_text(LONG)
+    (folder / "robot").mkdir()
+    for script in ("steps.csv", "long.csv", "on_the_robot.csv"):
+        text = (folder / script).read_text() if (folder / script).exists() else LONG
+        (folder / "robot" / script).write_text(text)
     result = {}
     with twin(folder):
         result["played"] = characterise(folder, "played", "steps.csv", lambda *_: None)
@@ -108,6 +130,9 @@ def main(folder: Path) -> dict:
         )
         result["ctrl_c"] = characterise(
             folder, "ctrl_c", "long.csv", lambda _, process: process.send_signal(signal.SIGINT)
+        )
+        result["stopped_by_another"] = characterise(
+            folder, "stopped_by_another", "on_the_robot.csv", lambda *_: stop_as_another(folder)
         )
         result["full_disk"] = characterise(folder, "full_disk", "long.csv", fill_disk)
 

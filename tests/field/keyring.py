@@ -3,13 +3,13 @@
 
 from pathlib import Path
 
-from twinmill.robots.key import load, of_robot
+from twinmill.robots.key import load_or_make, of_robot
 
 
 def operator_key(folder: Path) -> tuple[Path, bytes]:
     """A key file, made if there is none, and what is in it."""
     path = folder / "operator.key"
-    return path, load(path)
+    return path, load_or_make(path)
 
 
 def robot_options(folder: Path, robot_id: int) -> list[str]:

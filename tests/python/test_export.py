@@ -232,6 +232,17 @@ def test_same_log_same_bytes(log, tmp_path):
     assert made[0] == made[1]
 
 
+def test_names_of_strangers_are_plain_in_tables(write_log, message, tmp_path):
+    said = message("run", utime_us=T0_US, behavior="\x1b[2J=a\nb", config_toml="a = 1\r\nb = 2\n")
+    path = write_log(("R01_RUN", said), ("R01_POSE", message("pose", utime_us=T0_US, robot_id=1)))
+    run(["export", str(path), "--to", "csv", "-o", str(tmp_path / "out")])
+    (table,) = (tmp_path / "out").glob("*run.csv")
+    with table.open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert row["behavior"] == "\ufffd[2J=a b"
+    assert row["config_toml"] == "a = 1\ufffd\nb = 2\n"
+
+
 def test_a_new_message_is_exported_with_its_fields(write_log, tmp_path, monkeypatch):
     """As one who adds a message to lcm_types/: a type that no code here knows."""
     (tmp_path / "heat_t.lcm").write_text(

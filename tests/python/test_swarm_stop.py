@@ -20,7 +20,20 @@ def test_a_stop_that_nobody_hears_says_at_once_what_it_waits_for(monkeypatch, tm
     url = "udpm://239.255.76.67:7999?ttl=0"
     code, out, _ = twinmill("swarm", "stop", "--lcm-url", url, "--timeout-s", "2")
     assert code == 1 and len(said_s) == 1 and said_s[0] < 1.5
-    assert "No robot was heard" in out
+    assert "No robot was heard" in out and "--host" in out
+
+
+def test_who_never_commanded_a_robot_gets_no_key_by_stopping_or_looking(
+    monkeypatch, tmp_path, twinmill
+):
+    """A new key is no robot's: it would say nothing but that none signs with it."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    url = "udpm://239.255.76.67:7999?ttl=0"
+    for words in (["stop", "--timeout-s", "0.5"], ["status", "--once"]):
+        code, _, err = twinmill("swarm", *words, "--lcm-url", url)
+        assert code == 1 and "there is no key here" in err
+    assert not list(tmp_path.rglob("*.key"))
 
 
 def test_a_word_that_nobody_reads_keeps_no_stop_waiting():

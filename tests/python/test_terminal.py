@@ -14,7 +14,7 @@ from rich.table import Table
 from twinmill.robots.fleet import Robot
 from twinmill.terminal import Fitting, progress_bar, progress_words
 from twinmill_cli import main as cli
-from twinmill_cli.swarm import status_table
+from twinmill_cli.swarm_screen import status_table
 
 WIDTHS = [40, 48, 80, 200]
 

@@ -12,7 +12,7 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out, effects_beginning
-from twinmill_cli.output import AsJson, busy
+from twinmill_cli.output import AsJson, busy, say
 
 if working():  # not for --help
     from twinmill.files import check_new_file
@@ -147,7 +147,7 @@ def _add(
     if "formula" in known and formula is None:
         used = {**known, **texts}
         usual = f"{used['adds_to']} += {used['formula']}"
-        typer.echo(f"twinmill: without --formula, {usual} is fitted.", err=True)
+        say(f"without --formula, {usual} is fitted.")
     held = hold or []
     given = [w for name, text in texts.items() for w in (option(name), text)]
     verb = shlex.join(["add", effect, *of_robot(robot), *given, *holding(held)])

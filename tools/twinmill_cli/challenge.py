@@ -25,7 +25,7 @@ if working():  # not for --help
     from concurrent.futures import ProcessPoolExecutor, as_completed
 
     import numpy as np
-    from rich.console import Console, Group
+    from rich.console import Group
     from rich.text import Text
 
     import twinmill as tm
@@ -37,7 +37,7 @@ if working():  # not for --help
     from twinmill.files import alone_in, check_holds, check_report
     from twinmill.model.model_file import write_whole
     from twinmill.report import challenge as page
-    from twinmill.terminal import progress_bar
+    from twinmill.terminal import PlainConsole, progress_bar
     from twinmill.version import __version__
     from twinmill_cli.main import run
 
@@ -129,7 +129,7 @@ def _exam(
     cases = [draw(number, seed, robots, duration_s) for number in range(count)]
     answers = seal(cases)
     digest = hashlib.sha256(answers.encode()).hexdigest()
-    Console(stderr=True).print(f"sealed answers: sha256 {digest}", soft_wrap=True)
+    PlainConsole(stderr=True).print(f"sealed answers: sha256 {digest}", soft_wrap=True)
     driven = sorted({case.robot for case in cases})
     how = {"duration_s": duration_s, "judge": judge}
     bases = {k: base_of(out, k, robots[k], seed, **how) for k in driven}

@@ -42,12 +42,15 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile
     from twinmill.robots import tell
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet
-    from twinmill.robots.key import load
+    from twinmill.robots.hold import SCRIPT_OVER, Held
+    from twinmill.robots.key import load_or_make
     from twinmill.robots.remote import Remote
     from twinmill.terminal import progress_bar
     from twinmill_cli.keyboard import any_key
     from twinmill_cli.ros_script import write_script
-    from twinmill_cli.swarm import refuse_doubles, warn_of_clocks
+    from twinmill_cli.swarm import ended_by_signals, refuse_doubles, warn_of_clocks
+    from twinmill_cli.swarm_verdict import of_stop
+    from twinmill_cli.voice import Voice
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
 AFTER_S = 1.0  # logged after the end: the robot still rolls
@@ -122,11 +125,13 @@ def _characterise(
     name = Path(script).name
     if host:
         copy_script(Remote(host, ssh_config), Path(script), name)
-    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
-    with Recorder(out, force) as recorder, any_key() as pressed:
-        why = Run(fleet, recorder, robot, channel_prefix, arm).drive(
-            name, end_s, countdown_s, pressed
-        )
+    fleet, voice = Fleet(lcm_url, channel_prefix, key=load_or_make(key)), Voice()
+    try:
+        with Recorder(out, force) as recorder, any_key() as pressed:
+            run = Run(fleet, recorder, robot, channel_prefix, voice, arm)
+            why = run.drive(name, end_s, countdown_s, pressed)
+    finally:
+        voice.end(1)
     if recorder.failed and not why:
         why = f"played to its end, but the end of the log is lost: {recorder.failed}"
     ended = why or "played to its end"
@@ -236,6 +241,7 @@ class Run:
     recorder: Recorder
     robot_id: int
     channel_prefix: str
+    voice: Voice
     arm: bool = False  # though it was stopped
     pose_s: float = -1e9  # when a valid one came last, by time.monotonic()
 
@@ -261,22 +267,23 @@ class Run:
         refuse_doubles(self.fleet, {self.robot_id})
         if self.arm:
             tell.arm(self.fleet, {self.robot_id})
-        try:
-            with self._watched("starts; any key stops", countdown_s, pressed):
-                self._start(script, countdown_s)
-            with self._watched("plays; any key stops", end_s, pressed):
-                self._play(end_s)
-            why = ""
-        except Abort as abort:
-            why = f"stopped: {abort}"
-        except KeyboardInterrupt:
-            why = "stopped: Ctrl-C"
-        finally:
-            (answer,) = tell.stop(self.fleet, {self.robot_id})
-            self.fleet.listen(AFTER_S)
-        if not (answer.accepted and answer.signed and answer.stands):
-            why += "; NO STOP WAS CONFIRMED: SWITCH THE ROBOT OFF BY HAND"
-        return why
+        with ended_by_signals(self.fleet, self.voice.check):
+            try:
+                with self._watched("starts; any key stops", countdown_s, pressed):
+                    held = self._start(script, countdown_s)
+                with self._watched("plays; any key stops", end_s, pressed):
+                    self._play(held, end_s)
+                why = ""
+            except Abort as abort:
+                why = f"stopped: {abort}"
+            except KeyboardInterrupt:
+                why = "stopped: Ctrl-C, or another signal"
+            finally:
+                given = tell.stop(self.fleet, {self.robot_id})
+                with self.fleet.unwatched():
+                    self.fleet.listen(AFTER_S)
+        stopped = of_stop(given)
+        return why if stopped.ok else "; ".join(filter(None, [why, stopped.sentence]))
 
     def _listen(self) -> None:
         prefix = f"{self.channel_prefix}R{self.robot_id:02d}_"
@@ -303,7 +310,7 @@ class Run:
         # So that the log says whose it is.
         self.fleet.listen(RUN_PERIOD_S, lambda: self.fleet.robots[self.robot_id].run is not None)
 
-    def _start(self, script: str, countdown_s: float) -> None:
+    def _start(self, script: str, countdown_s: float) -> Held:
         begun = tell.start(
             self.fleet,
             {self.robot_id},
@@ -315,14 +322,20 @@ class Run:
         (answer,) = begun.answers
         if begun.called_off:
             raise ValueError(f"robot {self.robot_id} does not play {script}: {answer.reason}.")
+        return Held(self.fleet, begun)
 
-    def _play(self, end_s: float | None) -> None:
+    def _play(self, held: Held, end_s: float | None) -> None:
         robot, begin_s = self.fleet.robots[self.robot_id], time.monotonic()
         while robot.mode == "script":
             self.fleet.listen(0.1)
+            held.news()
         passed_s = time.monotonic() - begin_s
         if robot.mode == "fault":
             raise Abort("the robot reports a fault (camera, board or battery)")
+        self.fleet.listen(LOST_S, lambda: not held.news() and held.is_over)
+        (state,) = held.states.values()
+        if state.stands and state != SCRIPT_OVER:
+            raise Abort(state.words)
         if robot.mode == "running" or (end_s is not None and passed_s < end_s - 1):
             raise Abort(f"the robot left the script after {passed_s:.1f} s")
 
@@ -331,20 +344,23 @@ class Run:
         self, what: str, duration_s: float | None, pressed: Callable[[], bool]
     ) -> Iterator[None]:
         """Shows how long something takes on stderr, and ends it by Abort if it must not go on."""
-        with progress_bar(counted=False) as progress:
-            task, begin_s = progress.add_task(what, total=duration_s), time.monotonic()
+        progress = progress_bar(counted=False)  # which the voice draws
+        task, begin_s = progress.add_task(what, total=duration_s), time.monotonic()
+        watch_signals = self.fleet.watch
 
-            def watch() -> None:
-                progress.update(task, completed=time.monotonic() - begin_s)
-                if why := self._why_stop(pressed):
-                    self.fleet.watch = lambda: None  # the stop that follows is heard out
-                    raise Abort(why)
+        def watch() -> None:
+            watch_signals()
+            progress.update(task, completed=time.monotonic() - begin_s)
+            self.voice.show(progress.get_renderable)
+            if why := self._why_stop(pressed):
+                raise Abort(why)
 
-            self.fleet.watch = watch
-            try:
-                yield
-            finally:
-                self.fleet.watch = lambda: None
+        self.fleet.watch = watch
+        try:
+            yield
+        finally:
+            self.fleet.watch = watch_signals
+            self.voice.clear()
 
     def _why_stop(self, pressed: Callable[[], bool]) -> str:
         if pressed():

@@ -17,7 +17,6 @@ from typing import Annotated, Any
 import numpy as np
 import tomlkit
 import typer
-from rich.console import Console
 from rich.text import Text
 
 from twinmill.challenge.script import write_rich_script
@@ -28,6 +27,7 @@ from twinmill.report import Figure, Section, show, write_report
 from twinmill.report import diagnosis as present
 from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
 from twinmill.report.tables import Cell, Table, number, tone
+from twinmill.terminal import PlainConsole
 from twinmill_cli import main as cli
 from twinmill_cli.frame import provenance
 
@@ -97,8 +97,8 @@ def main(
     print(f"$ sha256sum {SEALED}\n{_digest()}  {SEALED}\nIt is the same file.")
     hidden = _unsealed()
     grade, words = judged(hidden, result)
-    Console().print(show.table(_table(hidden, result)))
-    Console().print(Text(words, f"bold {TONES[grade][1]}"))
+    PlainConsole().print(show.table(_table(hidden, result)))
+    PlainConsole().print(Text(words, f"bold {TONES[grade][1]}"))
     page = _section(hidden, result, words, grade)
     report = write_report(
         FOLDER / "report",
@@ -237,7 +237,7 @@ def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
 
 
 def _say(text: str) -> None:
-    Console().rule(f"[bold]{text}", align="left")
+    PlainConsole().rule(Text(text, "bold"), align="left")
 
 
 def _shell(*command: str) -> None:

@@ -17,7 +17,7 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
-from twinmill_cli.output import STOPPED, AsJson, deliver, telling
+from twinmill_cli.output import STOPPED, AsJson, deliver, say, telling
 
 if working():  # not for --help
     import twinmill_native as native
@@ -125,7 +125,7 @@ def _with_swarm(path: Path, result: Diagnosis) -> tuple[Diagnosis, dict | None]:
 def _hint(measurements: Measurements, model_file: ModelFile) -> None:
     """Says what stands out, before anything is tested, to a person who waits."""
     if sys.stderr.isatty() and (seen := at_first_sight(measurements, model_file)):
-        typer.echo(f"twinmill: at first sight {seen}; this is now tested.", err=True)
+        say(f"at first sight {seen}; this is now tested.")
 
 
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:

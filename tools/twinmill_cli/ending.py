@@ -11,7 +11,8 @@ from typing import Any, NoReturn
 
 import typer
 
-from twinmill_cli.output import STOPPED, begin_telling, has_told, print_object
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill_cli.output import STOPPED, begin_telling, has_told, print_object, say
 
 QUOTED = 80  # letters of what a sentence quotes
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
@@ -38,10 +39,10 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     except (typer.TyperException, ModuleNotFoundError, OSError, ValueError) as error:
         code, sentence = _told(error)
         if sentence:
-            print(f"{program}: {sentence}", file=sys.stderr)
+            say(sentence, program)
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
-        print(f"{program}: {stopped}", file=sys.stderr)
+        say(stopped, program)
     sys.exit(code)
 
 
@@ -64,7 +65,7 @@ def _told(error: Exception) -> tuple[int, str]:
 
 def _short(sentence: str) -> str:
     long = rf"(?<=[\s(=])'([^\s'][^']{{{QUOTED}}})[^']+'"  # an apostrophe stands behind a letter
-    return re.sub(long, r"'\1...'", " ".join(sentence.split()))
+    return re.sub(long, r"'\1...'", plain_line(sentence, MESSAGE_MAX))
 
 
 def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:

@@ -22,7 +22,7 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.robots.fleet import Fleet
-    from twinmill.robots.key import load
+    from twinmill.robots.key import load_or_make
     from twinmill.robots.package import Packages, read_package
     from twinmill.robots.robot_update import (
         Outcome,
@@ -118,7 +118,7 @@ def _flash(
     if give_back and (rollback or take_over or dry_run):
         raise ValueError("--hand-back stands alone: give no --rollback, --take-over, --dry-run.")
     given = read_package(package) if package else None
-    own_key = load(key)
+    own_key = load_or_make(key)
     request = UpdateRequest(
         packages=None if rollback else Packages(given),
         settings=settings,

@@ -15,7 +15,7 @@ from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
 from twinmill.provenance import Provenance
 from twinmill.version import __version__
-from twinmill_cli.output import STOPPED, deliver
+from twinmill_cli.output import STOPPED, deliver, say
 
 if TYPE_CHECKING:  # slow to import, and JSON needs none of it
     from rich.console import RenderableType
@@ -65,7 +65,7 @@ def load(logs: list[Path], model_file: ModelFile) -> Measurements:
     measurements = load_measurements(logs, model_file.model)
     mild = [str(finding) for finding in measurements.findings if not finding.fatal]
     for sentence in [*measurements.excluded, *mild]:
-        typer.echo(f"twinmill: {sentence}", err=True)
+        say(sentence)
     return measurements
 
 
@@ -112,7 +112,7 @@ def finish(
         raise ValueError(f"what is told above stands, but there is no report: {failed}")
     if not done:
         if out:
-            typer.echo("twinmill: stopped; no report was drawn.", err=True)
+            say("stopped; no report was drawn.")
         raise typer.Exit(STOPPED)
 
 

@@ -14,8 +14,6 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
 
 if working():  # not for --help
-    from rich.console import Console
-
     from twinmill.data.importers.columns import Guess, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
     from twinmill.data.importers.robot_files import files_of
@@ -27,6 +25,7 @@ if working():  # not for --help
     from twinmill.files import replacing
     from twinmill.report import show
     from twinmill.report.tables import Cell, Table
+    from twinmill.terminal import PlainConsole
 
 SHOWN = 10  # warnings in the terminal; --json has all
 
@@ -345,8 +344,8 @@ def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
         for t in topics
     ]
     table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
-    Console().print(show.table(table))
-    typer.echo(f"Try: {line}" if line else _unpaired(topics))
+    PlainConsole().print(show.table(table))
+    PlainConsole().print(f"Try: {line}" if line else _unpaired(topics), soft_wrap=True)
 
 
 def _unpaired(topics: list[Topic]) -> str:
@@ -377,7 +376,7 @@ def _explain(
         temporary.write_text(to_toml(guesses), encoding="utf-8")
     for kind, (read, columns) in explained.items():
         for note in read.notes:
-            typer.echo(note)
+            PlainConsole().print(note, soft_wrap=True)
         rows = [[g.column, ", ".join(g.targets) or "-", g.why] for g in columns]
         table = Table(
             kind,
@@ -385,7 +384,7 @@ def _explain(
             [[Cell(text) for text in row] for row in rows],
             words=(0, 1, 2),
         )
-        Console().print(show.table(table))
+        PlainConsole().print(show.table(table))
     words = ["twinmill", "import"]
     for kind, paths in asked.items():
         for path in paths or [kind.upper()]:
@@ -395,7 +394,7 @@ def _explain(
         words += ["--robot-id", str(1 if robot_id is None else robot_id)]
     line = shlex.join([*words, "--mapping", str(out), "-o", "run.lcmlog"])
     told = [word for kind in guesses for word in _lacking(kind, guesses[kind])]
-    typer.echo(f"Check {out}{''.join(told)}; then:\n  {line}")
+    PlainConsole().print(f"Check {out}{''.join(told)}; then:\n  {line}", soft_wrap=True)
 
 
 def _lacking(kind: str, columns: list[Guess]) -> list[str]:
@@ -449,9 +448,9 @@ def _print(summary: dict) -> None:
         ],
         words=(1,),
     )
-    console = Console()
+    console = PlainConsole()
     console.print(show.table(table))
     for text in summary["warnings"][:SHOWN]:
-        console.print(f"! {text}", style="yellow", markup=False)
+        console.print(f"! {text}", style="yellow")
     if len(summary["warnings"]) > SHOWN:
         console.print(f"and {len(summary['warnings']) - SHOWN} more (--json has all).")

@@ -15,7 +15,7 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Model, Out, SpreadM, Start
-from twinmill_cli.output import AsJson, busy, deliver, telling
+from twinmill_cli.output import AsJson, busy, deliver, say, telling
 
 if working():  # not for --help
     import hashlib
@@ -163,7 +163,7 @@ def _stoppable(out: Path | None) -> Iterator[None]:
             if out
             else "with --out DIR what is done is kept"
         )
-        typer.echo(f"twinmill: stopped; {kept}.", err=True)
+        say(f"stopped; {kept}.")
         raise
 
 
@@ -179,10 +179,9 @@ def _hidden(logs: list[Path], model_file: ModelFile, folder: Path) -> list[Hidde
     with telling("looking for what the logs do not exclude") as progress:
         diagnosis = diagnose(load(logs, model_file), model_file, progress)
     if diagnosis.found:
-        typer.echo(
-            f"twinmill: these logs show that {model_file.path} lacks {', '.join(diagnosis.found)}; "
-            "twinmill explain adds it. What follows is of the model as it is.",
-            err=True,
+        say(
+            f"these logs show that {model_file.path} lacks {', '.join(diagnosis.found)}; "
+            "twinmill explain adds it. What follows is of the model as it is."
         )
     found = hidden_effects(diagnosis)
     folder.mkdir(parents=True, exist_ok=True)

@@ -17,13 +17,14 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     from dataclasses import asdict
 
-    from rich.console import Console
+    from rich.text import Text
 
     from twinmill.data.bus import open_bus
     from twinmill.data.natnet_stream import Stream, StreamError, find_server
     from twinmill.data.optitrack import Check, Robots, View
     from twinmill.report import show
     from twinmill.report.tables import Cell, Table
+    from twinmill.terminal import PlainConsole
 
 PATIENCE_S = 3.0  # without a frame: something is wrong
 CHECK_S = 5.0
@@ -94,7 +95,7 @@ def _numbers(words: list[str]) -> dict[str, int]:
 
 
 def _check(robots: Robots, duration_s: float, as_json: bool) -> int:
-    with Console(stderr=True).status("listening; turn a robot on the floor by hand"):
+    with PlainConsole(stderr=True).status("listening; turn a robot on the floor by hand"):
         for stamped in robots.stream.frames(duration_s):
             for _ in robots.take(*stamped):
                 pass
@@ -104,7 +105,7 @@ def _check(robots: Robots, duration_s: float, as_json: bool) -> int:
 def _publish(robots: Robots, url: str, duration_s: float, as_json: bool) -> int:
     bus = open_bus(url)
     begin_s = shown_s = time.monotonic()
-    with Console(stderr=True).status("waiting for frames") as status:
+    with PlainConsole(stderr=True).status("waiting for frames") as status:
         try:
             while not robots.frames or time.monotonic() - begin_s < duration_s:
                 for stamped in robots.stream.frames(min(duration_s, PATIENCE_S)):
@@ -113,7 +114,7 @@ def _publish(robots: Robots, url: str, duration_s: float, as_json: bool) -> int:
                     if time.monotonic() - shown_s > SHOWN_S:
                         shown_s = time.monotonic()
                         rate_hz = robots.frames / (shown_s - begin_s)
-                        status.update(f"{rate_hz:.0f} Hz, poses {dict(robots.poses)}")
+                        status.update(Text(f"{rate_hz:.0f} Hz, poses {dict(robots.poses)}"))
                 if not robots.frames:
                     raise StreamError(f"{robots.checks()[1].words}.")
         except KeyboardInterrupt:

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 
 import typer
 
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -58,15 +60,20 @@ def print_object(data: dict) -> None:
     _told_on[:] = [sys.stdout]
 
 
+def say(sentence: str, program: str = "twinmill") -> None:
+    """A sentence on stderr, in one line whatever it quotes."""
+    print(f"{program}: {plain_line(sentence, MESSAGE_MAX)}", file=sys.stderr, flush=True)
+
+
 def deliver(data: dict, text: RenderableType | None, as_json: bool) -> None:
     """Prints the one or the other on stdout; text that must not wrap is not cut either."""
     with unstopped():
         if as_json:
             print_object(data)
         else:
-            from rich.console import Console  # slow to import, and JSON needs none
+            from twinmill.terminal import PlainConsole  # slow to import, and JSON needs none
 
-            Console().print(text, crop=False)
+            PlainConsole().print(text, crop=False)
 
 
 @contextmanager

@@ -9,8 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
-from datetime import datetime
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -19,21 +18,30 @@ import typer
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
-from twinmill_cli.output import AsJson, deliver, print_object
+from twinmill_cli.output import AsJson, deliver, print_object, say
 
 if working():  # not for --help
-    from rich import box
-    from rich.console import Console, Group
+    from rich.console import Group
     from rich.live import Live
-    from rich.table import Table
-    from rich.text import Text
 
     from twinmill.robots import tell
-    from twinmill.robots.fleet import RUN_PERIOD_S, Fleet, Robot
-    from twinmill.robots.key import load
-    from twinmill.terminal import Fitting
+    from twinmill.robots.fleet import RUN_PERIOD_S, Fleet
+    from twinmill.robots.hold import Held
+    from twinmill.robots.key import load, load_or_make
+    from twinmill.terminal import PlainConsole
+    from twinmill_cli.swarm_screen import CLOCK_WARN_S, answer_table, status_table
+    from twinmill_cli.swarm_verdict import (
+        Verdict,
+        of_arm,
+        of_end,
+        of_select,
+        of_start,
+        of_stop,
+    )
+    from twinmill_cli.voice import Voice
 
-CLOCK_WARN_S = 0.05
+# All by which a terminal, a shell or a session that ends asks a program to end or to pause.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 
 Robots = Annotated[
     str,
@@ -111,78 +119,93 @@ def _start(
     """
     if untethered and link_timeout_s is not None:
         raise ValueError("--untethered and --link-timeout-s: give one of them.")
-    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
+    fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
     asked = tell.find(fleet, parse_robots(robots))
     refuse_doubles(fleet, asked)
     warn_of_clocks(fleet, asked)
     if arm:
         tell.arm(fleet, asked)
     timeout_ms = 0 if untethered else round(1e3 * link_timeout_s) if link_timeout_s else -1
-    with ended_by_signals():
-        begun = tell.start(
-            fleet, asked, behavior, ahead_s=in_s, partial=partial, link_timeout_ms=timeout_ms
-        )
-        with stopped_if_it_fails(fleet, asked):
-            ok = all(a.accepted and a.signed and a.mode != "stopped" for a in begun.answers)
-            data = {"start_utime_us": begun.utime_us, "called_off": begun.called_off}
-            words = _start_words(begun, ok, untethered)
-            code = _finish("start", begun.answers, ok, words, data=data, as_json=as_json)
-            if begun.called_off or untethered:
-                return code
-            return max(code, _hold(fleet, asked))
-
-
-def _start_words(begun: tell.Start, ok: bool, untethered: bool) -> str:
-    if begun.called_off:
-        return (
-            f"Called off: {_why(begun.answers)}. All were stopped, and must be armed before they "
-            "start (--arm); --partial starts some."
-        )
-    at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
-    words = f"Started at {at}." if ok else f"Started at {at}, but not all: see above."
-    return f"{words} {'They drive on by themselves.' if untethered else 'Ctrl-C stops them.'}"
-
-
-@contextmanager
-def stopped_if_it_fails(fleet: Fleet, robots: set[int]) -> Iterator[None]:
-    """Whatever ends the command once robots drive, a full disk below its output too, stops them."""
+    options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
+    code, voice = 1, Voice()
     try:
-        yield
+        with ended_by_signals(fleet, voice.check):
+            verdict = _drive(fleet, asked, behavior, voice, as_json=as_json, **options)
+        code = verdict.code
+    finally:
+        voice.end(code)
+    voice.check()
+    return code
+
+
+def _drive(
+    fleet: Fleet, asked: set[int], behavior: str, voice: Voice, *, as_json: bool, **options
+) -> Verdict:
+    """Starts robots and holds them. Whatever ends that stops them before a word is said of it."""
+    begun = held = None
+    try:
+        started = tell.start(fleet, asked, behavior, **options)
+        begun, held = of_start(started, options["link_timeout_ms"] == 0), Held(fleet, started)
+        data = {"start_utime_us": started.utime_us, "called_off": started.called_off}
+        voice.tell(lambda: _finish("start", started.answers, begun, data, as_json=as_json))
+        if started.called_off or not held.robots or options["link_timeout_ms"] == 0:
+            while not voice.is_idle:
+                fleet.listen(0.1)
+            fleet.watch()  # the last that ends it, while robots drive on
+            return begun
+        _hold(fleet, held, voice)
+        ended = of_end(begun, held.states, None)
     except BaseException as error:
-        given = tell.stop(fleet, robots)
-        print(f"twinmill: {_stop_words(given, 10)}", file=sys.stderr)
+        given = tell.stop(fleet, asked)
+        ended = of_end(begun, held.states if held else {}, of_stop(given))
+        if begun is None:
+            data = {"start_utime_us": None, "called_off": False}
+            voice.tell(lambda: _finish("start", given, ended, data, as_json=as_json))
         if not isinstance(error, KeyboardInterrupt):
+            voice.say(ended.sentence)
             raise
-        raise typer.Exit(0 if _all_stand(given) else 1) from error
+    if begun is not None:
+        voice.say(ended.sentence)
+    return ended
 
 
-def _hold(fleet: Fleet, robots: set[int]) -> int:
-    """Robots hear that somebody is there, until Ctrl-C or until all stand by themselves."""
-    held = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
-    console = Console(stderr=True)
-    with (
-        Live(console=console, refresh_per_second=4)
-        if console.is_terminal
-        else nullcontext(None) as live
-    ):
-        while not all(robot.mode == "stopped" for robot in held):
-            fleet.listen(0.25)
-            if live:
-                live.update(status_table(held))
-    words = "All stand: stopped by another command, by their button, or a script is over."
-    print(f"twinmill: {words}", file=sys.stderr)
-    return 0
+def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
+    """Robots hear that somebody is there, until all stand by themselves."""
+    try:
+        while not held.is_over:
+            fleet.listen(0.1)
+            for sentence in held.news():
+                voice.say(sentence)
+            voice.show(lambda: status_table(held.robots))
+    finally:
+        voice.clear()
 
 
 @contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """SIGTERM and a lost terminal end as Ctrl-C does. What kills, robots notice by themselves."""
-    numbers = (signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, signal.default_int_handler) for number in numbers]
+def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[None]:
+    """Signals that ask for the end raise KeyboardInterrupt where the fleet listens, only there.
+
+    So nothing can be cut short but waiting, and a stop not even by a second signal. What kills,
+    robots notice by themselves.
+
+    Args:
+        fleet: whose watch it is.
+        check: raises what else is to end it.
+    """
+    asked: list[int] = []
+
+    def look() -> None:
+        if asked:
+            raise KeyboardInterrupt
+        check()
+
+    before = [signal.signal(number, lambda n, _: asked.append(n)) for number in ENDING]
+    watch, fleet.watch = fleet.watch, look
     try:
         yield
     finally:
-        for number, handler in zip(numbers, before, strict=True):
+        fleet.watch = watch
+        for number, handler in zip(ENDING, before, strict=True):
             signal.signal(number, handler)
 
 
@@ -198,13 +221,11 @@ def _arm(
 
     Example: twinmill swarm arm
     """
-    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
+    fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
     asked = tell.find(fleet, parse_robots(robots))
     refuse_doubles(fleet, asked)
     given = tell.arm(fleet, asked)
-    ok = all(answer.accepted and answer.signed for answer in given)
-    words = "All are armed." if ok else "Not all are armed: see above."
-    return _finish("arm", given, ok, words, data={}, as_json=as_json)
+    return _finish("arm", given, of_arm(given), {}, as_json=as_json)
 
 
 def _stop(
@@ -243,8 +264,7 @@ def _stop(
             waiting=lambda left: say(_waiting_words(left, timeout_s)),
         )
     _tell_fault(fault)
-    words = _stop_words(given, timeout_s)
-    return _finish("stop", given, _all_stand(given), words, data={}, as_json=as_json)
+    return _finish("stop", given, of_stop(given, timeout_s), {}, as_json=as_json)
 
 
 @contextmanager
@@ -279,16 +299,7 @@ def _key_if_there(path: Path | None) -> tuple[bytes | None, str]:
 
 def _tell_fault(fault: str) -> None:
     if fault:
-        print(f"twinmill: {fault}", file=sys.stderr)
-
-
-def _all_stand(given: list[tell.Answer]) -> bool:
-    return bool(given) and not _moving(given)
-
-
-def _moving(given: list[tell.Answer]) -> list[tell.Answer]:
-    """Robots that have not signed that they stand, or of which there are two."""
-    return [a for a in given if not (a.accepted and a.signed and a.stands) or a.is_double]
+        say(fault)
 
 
 def _waiting_words(left: set[int], timeout_s: float) -> str:
@@ -296,16 +307,6 @@ def _waiting_words(left: set[int], timeout_s: float) -> str:
     names = ", ".join(f"R{i:02d}" for i in sorted(left))
     whom = f"{names} to sign that they stand" if names else "a robot to be heard"
     return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
-
-
-def _stop_words(given: list[tell.Answer], timeout_s: float) -> str:
-    """Which robots must be stopped by hand."""
-    if not given:
-        return f"No robot was heard in {timeout_s:g} s; stop was said all the time."
-    names = ", ".join(f"R{a.robot_id:02d}" for a in _moving(given))
-    if not names:
-        return "All stand."
-    return f"NOT ALL STAND: {names}: no stop was confirmed. SWITCH OFF BY HAND what still drives."
 
 
 def _select(
@@ -321,13 +322,11 @@ def _select(
 
     Example: twinmill swarm select diffusing --robots 1,2
     """
-    fleet = Fleet(lcm_url, channel_prefix, key=load(key))
+    fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
     asked = tell.find(fleet, parse_robots(robots))
     command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
     given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
-    ok = all(answer.accepted and answer.signed for answer in given)
-    words = f"All chose {behavior}." if ok else f"Not all did{_hint(given)}."
-    return _finish("select", given, ok, words, data={}, as_json=as_json)
+    return _finish("select", given, of_select(given, behavior), {}, as_json=as_json)
 
 
 def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
@@ -346,39 +345,21 @@ def warn_of_clocks(fleet: Fleet, robots: set[int]) -> None:
     for robot_id in sorted(robots & set(fleet.robots)):
         clock_s = fleet.robots[robot_id].clock_s
         if abs(clock_s) > CLOCK_WARN_S:
-            print(
-                f"twinmill: robot {robot_id}: its clock is {clock_s:+.2f} s from this one, and so "
-                "will be its start; set it (NTP).",
-                file=sys.stderr,
+            say(
+                f"robot {robot_id}: its clock is {clock_s:+.2f} s from this one, and so will be "
+                "its start; set it (NTP)."
             )
 
 
-def _why(given: list[tell.Answer]) -> str:
-    """Why not all start."""
-    refused = [answer for answer in given if answer.accepted is False]
-    words = f"{len(refused)} of {len(given)} refused" if refused else "not all acknowledged in time"
-    return words + _hint(given)
-
-
-def _hint(given: list[tell.Answer]) -> str:
-    unknown = any(answer.reason.startswith("no behaviour") for answer in given)
-    return "; `twinmill flash --behaviors FILE` brings tables to robots" if unknown else ""
-
-
 def _finish(
-    verb: str, given: list[tell.Answer], ok: bool, words: str, *, data: dict, as_json: bool
+    verb: str, given: list[tell.Answer], verdict: Verdict, data: dict, *, as_json: bool
 ) -> int:
-    table = Table(box=box.SIMPLE_HEAD)
-    for column in ("robot", "acknowledged", "now"):
-        table.add_column(column)
-    for answer in given:
-        ok = answer.accepted and answer.signed
-        said = Text("yes", "green") if ok else Text(f"no: {answer.reason}", "red")
-        now = Text("; ".join([answer.mode or "?", *answer.alarms]), "red" if answer.alarms else "")
-        table.add_row(f"R{answer.robot_id:02d}", said, now)
-    data = {"verb": verb, "ok": ok, **data, "robots": [a.to_json() for a in given]}
-    deliver(data, Group(*([Fitting(table)] if given else []), words), as_json)
-    return 0 if ok else 1
+    """Prints what came of a command. Returns its exit code."""
+    robots = [answer.to_json() for answer in given]
+    data = {"verb": verb, "ok": verdict.ok, "sentence": verdict.sentence, **data, "robots": robots}
+    text = Group(*([answer_table(given)] if given else []), verdict.sentence)
+    deliver(data, text, as_json)
+    return verdict.code
 
 
 def _status(
@@ -403,67 +384,13 @@ def _status(
         if as_json:
             print_object({"robots": [r.to_json() for r in robots]})
         else:
-            Console().print(status_table(robots))
+            PlainConsole().print(status_table(robots))
         return 0 if robots else 1
     try:
-        with Live(console=Console(), refresh_per_second=4) as live:
+        with Live(console=PlainConsole(), auto_refresh=False) as live:
             while True:
                 fleet.listen(0.25)
-                live.update(status_table([fleet.robots[i] for i in sorted(fleet.robots)]))
+                robots = [fleet.robots[i] for i in sorted(fleet.robots)]
+                live.update(status_table(robots), refresh=True)
     except KeyboardInterrupt:
         return 0
-
-
-def status_table(robots: list[Robot]) -> Fitting | Text:
-    """One row a robot."""
-    if not robots:
-        return Text("No robot is heard.")
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    for column in ("robot", "source", "version", "behaviour", "mode", "battery", "camera"):
-        table.add_column(column, no_wrap=True)
-    for column in ("sees", "clock", "silent"):
-        table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("link", no_wrap=True)
-    table.add_column("alarms")
-    for robot in robots:
-        run, t = robot.run, robot.telemetry
-        silent_s = time.monotonic() - robot.heard_s
-        table.add_row(
-            f"R{robot.robot_id:02d}",
-            *((run.source, run.version, run.behavior) if run else ("?", "?", "?")),
-            Text(robot.mode or "?", {"fault": "red", "running": "green"}.get(robot.mode, "")),
-            _battery(t),
-            Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
-            _sees(robot),
-            Text(
-                f"{round(robot.clock_s, 2) + 0:+.2f} s",
-                "red" if abs(robot.clock_s) > CLOCK_WARN_S else "",
-            ),
-            Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
-            _link(robot),
-            Text("; ".join(robot.alarms), "bold red"),
-        )
-    return Fitting(table)
-
-
-def _link(robot: Robot) -> Text:
-    """What it has signed of how it may be commanded."""
-    if not robot.link:
-        return Text("not signed", "red")
-    if not robot.is_armed:
-        return Text("stopped: arm it", "yellow")
-    return Text({None: "armed", True: "held", False: "untethered"}[robot.is_tethered])
-
-
-def _battery(telemetry) -> Text:
-    if telemetry is None or telemetry.battery_V != telemetry.battery_V:
-        return Text("?")
-    low = telemetry.status_flags & telemetry.STATUS_BATTERY_LOW
-    return Text(f"{telemetry.battery_V:.2f} V{' LOW' if low else ''}", "red" if low else "")
-
-
-def _sees(robot: Robot) -> Text:
-    if not robot.recent:
-        return Text("?")
-    mark = "● " if robot.telemetry.detected else "○ "
-    return Text(f"{mark}{100 * robot.detected_frac:.0f} %")

@@ -19,14 +19,14 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     import numpy as np
     from rich import box as frame
-    from rich.console import Console, Group
+    from rich.console import Group
     from rich.table import Table
     from rich.text import Text
 
     from twinmill.data.bus import open_bus
     from twinmill.data.importers.plain import Columns, read_commands, read_poses
     from twinmill.files import check_new_file
-    from twinmill.terminal import Fitting, progress_bar
+    from twinmill.terminal import Fitting, PlainConsole, progress_bar
     from twinmill.track.align import align
     from twinmill.track.boards import Board
     from twinmill.track.camera import Camera, read_camera
@@ -413,7 +413,7 @@ def _live(
     """Publishes until the time is over, the cameras end, or Ctrl-C."""
     measured, bus = [read_floor(floor) for floor in floors], open_bus(lcm_url)
     page, sources = Page(len(names), port), []
-    console = Console(stderr=True)
+    console = PlainConsole(stderr=True)
     try:
         for name, eye in zip(names, eyes, strict=True):
             sources.append(LiveCamera(name, eye.size_px))

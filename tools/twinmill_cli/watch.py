@@ -14,18 +14,18 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL, FOREVER_S, URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import DurationS, LcmUrl, Model
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import AsJson, deliver, say
 
 if working():  # not for --help
     from importlib.util import find_spec
 
-    from rich.console import Console
     from rich.progress import track
 
     from twinmill.data.multi_log import PREFIXES
     from twinmill.data.stream import from_bus, from_log
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
+    from twinmill.terminal import PlainConsole
     from twinmill.version import __version__
     from twinmill.watch.live_score import WINDOW_S
     from twinmill_cli.frame import open_model
@@ -74,7 +74,7 @@ def _watch(
     model_file, warnings = open_model(model, None), []
     if save:
         check_new_file(save, force, [log, model_file.path])
-    batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, _warn)
+    batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, say)
     with replacing(save, force) if save else nullcontext() as file:
         show = _show(batches, model_file, log.name if log else None, file, url=connect)
     command = shlex.join(["twinmill", "watch", *([str(log)] if log else []), "--model", model])
@@ -90,10 +90,6 @@ def _watch(
     }
     deliver(data, _text(show, save, warnings), as_json)
     return data
-
-
-def _warn(sentence: str) -> None:
-    print(f"twinmill: {sentence}", file=sys.stderr)
 
 
 def _need_rerun() -> None:
@@ -112,7 +108,7 @@ def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | Non
     if log_name:
         names = {name for _, batch in batches for name in batch.by_channel}
         prefixes = [p for p in PREFIXES if any(name.startswith(f"{p}R") for name in names)]
-        console = Console(stderr=True)
+        console = PlainConsole(stderr=True)
         quiet = not console.is_terminal
         batches = track(batches, "showing", console=console, transient=True, disable=quiet)
     stream = open_stream(log_name, prefixes, file, url)

@@ -22,6 +22,7 @@ from twinmill.data.lcm_log import (
     most_broken,
     split_events,
 )
+from twinmill.foreign_text import NAME_MAX, plain_line
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
@@ -160,8 +161,8 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
         run = _last_run(channels[robot_id].get("RUN", []), robot_id, warnings)
         robots[robot_id] = RobotLog(
             robot_id=robot_id,
-            source=run.source,
-            behavior=run.behavior,
+            source=plain_line(run.source, NAME_MAX),
+            behavior=plain_line(run.behavior, NAME_MAX),
             same_clock=_says_same_clock(run.config_toml),
             **_command_series(commands, t0_us, robot_id, warnings),
             **_pose_series(poses, t0_us, robot_id, warnings),

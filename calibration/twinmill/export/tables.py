@@ -15,6 +15,7 @@ import turbopi
 from twinmill.data.importers.plain import QUATERNION, VALUES
 from twinmill.data.log import KINDS, heading_rad
 from twinmill.export.recording import Channel, Recording
+from twinmill.foreign_text import plain_line, printable
 
 WHEELS = ("fl", "fr", "rl", "rr")
 # Arrays in messages, one column each; those of drive_t are named by its kind.
@@ -75,6 +76,10 @@ def _known(column: list | np.ndarray) -> pa.Array:
 
 def _columns(field: str, messages: list) -> Iterator[tuple[str, np.ndarray]]:
     values = [getattr(message, field) for message in messages]
+    if isinstance(values[0], str):  # which robots, or anybody else, may have said
+        clean = printable if field == "config_toml" else plain_line
+        yield field, [clean(value) for value in values]
+        return
     if isinstance(values[0], bytes):
         yield field, [value.hex() for value in values]
         return

@@ -5,8 +5,8 @@ import re
 import struct
 import time
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +14,7 @@ import turbopi
 
 from twinmill.data.bus import Senders, open_bus
 from twinmill.defaults import URL
+from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
 
 BACKLOG_S = 0.02  # what waits is taken in for so long at once
@@ -35,6 +36,8 @@ ALARMS = (
 )
 # A robot with one of these may be moving, whatever it was told.
 MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
+# Fields of text, which may be anybody's: most of these messages are not signed.
+TEXTS = {"source": NAME_MAX, "version": NAME_MAX, "behavior": NAME_MAX, "reason": LINE_MAX}
 HOLD_S = 0.1  # so often robots that were started hear that the operator is there
 
 
@@ -229,6 +232,9 @@ class Fleet:
             message = getattr(turbopi, f"{kind.lower()}_t").decode(data)
         except (ValueError, struct.error, IndexError):
             return  # another program's type on this channel, or half a message
+        for text, most in TEXTS.items():
+            if hasattr(message, text):
+                setattr(message, text, plain_line(getattr(message, text), most))
         robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
         now_s = robot.heard_s = time.monotonic()
         if kind in ("LINK", "SIGNED_ACK"):
@@ -268,6 +274,15 @@ class Fleet:
                 pass
             self._hold()
             self.watch()
+
+    @contextmanager
+    def unwatched(self) -> Iterator[None]:
+        """What is done in this block is done to its end: nobody is asked whether to go on."""
+        watch, self.watch = self.watch, lambda: None
+        try:
+            yield
+        finally:
+            self.watch = watch
 
     def _hold(self) -> None:
         """Tells the robots that the operator is there, where that is due."""

@@ -17,7 +17,7 @@ def default_path() -> Path:
     return Path(config) / "twinmill" / "swarm.key"
 
 
-def load(path: Path | None = None) -> bytes:
+def load_or_make(path: Path | None = None) -> bytes:
     """The operator's key; one is made if there is none yet.
 
     Raises:
@@ -27,6 +27,22 @@ def load(path: Path | None = None) -> bytes:
     file = path or default_path()
     if not file.exists():
         _make(file)
+    return load(file)
+
+
+def load(path: Path | None = None) -> bytes:
+    """The operator's key.
+
+    Raises:
+        ValueError: there is none, the file is no key, or others may read it.
+        OSError: it cannot be read.
+    """
+    file = path or default_path()
+    if not file.exists():
+        raise ValueError(
+            f"--key {file}: there is no key here, so no robot's answer is believed; copy the "
+            "operator's, or make one: `twinmill flash`."
+        )
     if file.stat().st_mode & 0o077:
         raise ValueError(
             f"--key {file}: others may read it; make a new one (remove it, and flash the robots "

@@ -8,6 +8,8 @@ import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
+
 CONNECT_S = 8
 ROBOT_SCRIPT = Path(__file__).with_name("robot.sh")
 
@@ -29,8 +31,8 @@ class RemoteError(ValueError):
     """
 
     def __init__(self, kind: str, sentence: str):
-        super().__init__(sentence)
-        self.kind = kind
+        super().__init__(plain_line(sentence, MESSAGE_MAX))  # quotes what programs there said
+        self.kind = plain_line(kind)
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,8 @@ class Remote:
         command = "sh -s -- " + shlex.join([step, *arguments])
         said = self._ssh(command, ROBOT_SCRIPT.read_bytes(), timeout_s)
         lines = said.decode(errors="replace").splitlines()
-        return dict(line.split("=", 1) for line in lines if "=" in line)
+        pairs = (line.split("=", 1) for line in lines if "=" in line)
+        return {key: plain_line(value, MESSAGE_MAX) for key, value in pairs}
 
     def copy(self, source: Path, target: str, timeout_s: float = 300) -> None:
         """Copies a file to a path there that the user may write; removed again if it fails.

@@ -6,6 +6,8 @@ operator's signature for each robot and its session. Who is believed what: firmw
 """
 
 import secrets
+import socket
+import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -21,10 +23,12 @@ ALL = -1
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
 # Before the common instant: time to call a start off that not all have acknowledged.
 CALL_OFF_S = 0.3
+BEGUN_S = 0.5  # after the instant: all that start have said that they drive
 TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
+NEVER_HEARD = "was never heard"
 NO_SIGNATURE = (
     "signs nothing with this operator's key: `twinmill flash` brings robots theirs; has it another "
     "--key?"
@@ -97,8 +101,9 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     fleet.listen(FIND_S)
     if not fleet.here():
         raise ValueError(
-            f"no robot was heard in {FIND_S:g} s; are they switched on and on this network, and is "
-            "--lcm-url that of their configuration?"
+            f"no robot was heard in {FIND_S:g} s; are they switched on and on this network, is "
+            "--lcm-url that of their configuration, and does the network carry multicast? Where it "
+            "does not, `twinmill swarm stop --host ROBOT` stops a robot by its address."
         )
     return fleet.here()
 
@@ -161,13 +166,14 @@ def stop(
     """Says stop until all robots have signed that they stand.
 
     By multicast, and to each machine that speaks as one of them: whatever else is wrong on the bus
-    or with what is heard there, this goes out.
+    or with what is heard there, this goes out. It is said to the end, whatever the fleet's watch
+    would raise.
 
     Args:
         fleet: where they are; robots that it held are held no more.
         robots: whom to stop; empty: all that are, or come to be, there.
         timeout_s: gives up after.
-        hosts: machines to be told besides.
+        hosts: machines to be told besides, by name or address.
         waiting: told once, soon after stop was first said, which of the robots that were asked or
             heard have not signed; it must not block.
 
@@ -177,8 +183,21 @@ def stop(
     Raises:
         OSError: it could never be said.
     """
+    with fleet.unwatched():
+        return _stop(fleet, robots, timeout_s, hosts, waiting=waiting)
+
+
+def _stop(
+    fleet: Fleet,
+    robots: set[int],
+    timeout_s: float,
+    hosts: Sequence[str],
+    *,
+    waiting: Callable[[set[int]], None],
+) -> list[Answer]:
     command = make_command(VERBS.VERB_STOP)
     fleet.held -= robots or set(fleet.held)
+    addresses = Addresses(hosts)
     begin_s = time.monotonic()
     error: OSError | None = None
     was_said = was_told = False
@@ -205,7 +224,7 @@ def stop(
             was_said = True
         except OSError as failure:
             error = failure
-        _say_to_hosts(fleet, command, robots, hosts)
+        _say_to_hosts(fleet, command, robots, addresses.known)
         fleet.listen(REPEAT_S)
     if error and not was_said:
         raise error
@@ -217,7 +236,24 @@ def _says_that_it_stands(robot: Robot, seq: int) -> bool:
     return robot.confirms(seq) or (not robot.link and seq in robot.acks and robot.stands)
 
 
-def _say_to_hosts(fleet: Fleet, command, robots: set[int], hosts: Sequence[str]) -> None:
+class Addresses:
+    """Looks names of machines up in threads of their own: a name server may take seconds to answer.
+
+    Attributes:
+        known: addresses found so far.
+    """
+
+    def __init__(self, hosts: Sequence[str]):
+        self.known: set[str] = set()
+        for host in hosts:
+            threading.Thread(target=self._look_up, args=(host,), daemon=True).start()
+
+    def _look_up(self, host: str) -> None:
+        with suppress(OSError, UnicodeError):  # no such machine: it will not answer
+            self.known |= {socket.gethostbyname(host)}
+
+
+def _say_to_hosts(fleet: Fleet, command, robots: set[int], hosts: set[str]) -> None:
     """The same to single machines; those that cannot be reached show in what is not answered."""
     asked = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
     for host in {*hosts, *(host for robot in asked for host in robot.senders.hosts)}:
@@ -232,13 +268,21 @@ class Start:
 
     Attributes:
         utime_us: the instant.
-        answers: of each robot.
-        called_off: not all had acknowledged in time, and all were stopped.
+        answers: of each robot; of a start that was called off, those for which it was.
+        sessions: that the start was meant for, by robot; of those that have signed it.
+        stopped: what they answered to the stop where the start was called off, as not all had
+            acknowledged in time; else empty.
     """
 
     utime_us: int
     answers: list[Answer]
-    called_off: bool
+    sessions: dict[int, int]
+    stopped: list[Answer]
+
+    @property
+    def called_off(self) -> bool:
+        """Nobody was to start."""
+        return bool(self.stopped)
 
 
 def start(
@@ -254,6 +298,7 @@ def start(
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
     From then on they are held: as long as the fleet listens, they hear that the operator is there.
+    Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
 
     Args:
         fleet: where they are.
@@ -268,21 +313,24 @@ def start(
     command.start_utime_us = command.utime_us + int(ahead_s * 1e6)
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
-    try:
-        given = tell(
-            fleet, command, robots, until_s=instant_s - CALL_OFF_S, link_timeout_ms=link_timeout_ms
-        )
-        called_off = not partial and not all(a.accepted and a.signed for a in given)
-        if called_off:
-            stop(fleet, robots)
-        else:
-            fleet.listen(instant_s - time.monotonic())
-            accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-            fleet.listen(0.5, lambda: not any(robot.mode == "stopped" for robot in accepted))
-    except BaseException:
-        stop(fleet, robots)
-        raise
-    return Start(command.start_utime_us, answers(fleet, command, robots), called_off)
+    given = tell(
+        fleet, command, robots, until_s=instant_s - CALL_OFF_S, link_timeout_ms=link_timeout_ms
+    )
+    stopped: list[Answer] = []
+    if partial or all(a.accepted and a.signed for a in given):
+        fleet.listen(instant_s - time.monotonic())
+        accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
+        fleet.listen(BEGUN_S, lambda: not any(robot.mode == "stopped" for robot in accepted))
+    else:
+        stopped = stop(fleet, robots)
+    sessions = {
+        i: robot.signed_acks[command.seq].session
+        for i in robots
+        if (robot := fleet.robots.get(i)) and command.seq in robot.signed_acks
+    }
+    # An answer that came after the start was called off does not tell why it was.
+    final = given if stopped else answers(fleet, command, robots)
+    return Start(command.start_utime_us, final, sessions, stopped)
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
@@ -295,7 +343,7 @@ def _answer(robot: Robot, command) -> Answer:
     if signed and (signed.command_utime_us, signed.verb) != (command.utime_us, command.verb):
         signed = None
     ack = signed or robot.acks.get(command.seq)
-    reason = ack.reason if ack else "no answer" if robot.link else NO_SIGNATURE
+    reason = ack.reason if ack else _why_silent(robot)
     if ack and not signed:
         reason = reason or NO_SIGNATURE
     return Answer(
@@ -308,6 +356,12 @@ def _answer(robot: Robot, command) -> Answer:
         is_double=robot.is_double,
         alarms=robot.alarms,
     )
+
+
+def _why_silent(robot: Robot) -> str:
+    if not robot.heard_s:
+        return NEVER_HEARD
+    return "no answer" if robot.link else NO_SIGNATURE
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:

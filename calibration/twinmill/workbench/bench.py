@@ -48,7 +48,6 @@ class Bench:
         view: what the screen shows: cursor, stretch, robot, tab.
         told: a page has said why nothing can be opened.
         threads: how many are at work.
-        port: of the server, kept so that a page left open finds the next one; 0 before the first.
     """
 
     def __init__(self, session: Session, state: StateFile) -> None:
@@ -59,7 +58,6 @@ class Bench:
         self.view: dict[str, Any] = state.read("view", {})
         self._waiting: Work | None = None
         self.threads = 0
-        self.port: int = state.read("port", 0)
         self._written: tuple = ()
         self._tried_s = 0.0
         self._reading, self._read = False, asyncio.Event()
@@ -265,7 +263,7 @@ class Bench:
         now = (sum(self.changes.values()), json.dumps(self.view), sorted(self.session.held))
         again = self.unkept and monotonic() - self._tried_s > RETRY_S
         if now != self._written or again:
-            kept = {"view": self.view, "session": self.session.to_json(), "port": self.port}
+            kept = {"view": self.view, "session": self.session.to_json()}
             data = plain(kept)
             self._written, self._tried_s = now, monotonic()
             before, self.unkept = self.unkept, ""

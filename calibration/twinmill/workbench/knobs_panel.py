@@ -4,7 +4,7 @@
 from nicegui import events, ui
 
 from twinmill.workbench.knobs import Knob
-from twinmill.workbench.panel import PageActions
+from twinmill.workbench.panel import PageActions, markup
 
 
 class KnobsPanel:
@@ -41,7 +41,7 @@ class KnobsPanel:
         for knob in knobs:
             if knob.group != group:
                 group = knob.group
-                ui.html(f"<div class=group>{group}</div>", sanitize=False)
+                markup("<div class=group>{}</div>", group)
             self._rows[knob.name] = _Row(knob, self)
 
 

@@ -1,15 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The panel of what is missing: the diagnosis, its findings, and buttons to try and to add each."""
 
-import html
-
 from nicegui import ui
 
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.parameters import catalogue, instance_of
 from twinmill.workbench.bench import moves
-from twinmill.workbench.panel import PageActions, estimate, scored, tone
+from twinmill.workbench.panel import PageActions, estimate, markup, scored, tone
 from twinmill.workbench.session import beside_label, effect_of
 from twinmill.workbench.typeset import typeset
 
@@ -66,7 +64,7 @@ class MissingPanel:
         found = self.bench.session.diagnosis
         with self.body:
             for note in self.bench.session.notes:
-                _card("wrong", html.escape(note))
+                _card("wrong", "{}", note)
             if found is None:
                 ui.label(
                     "Diagnose tries every effect of the catalogue, fits each on a part of the logs "
@@ -87,7 +85,9 @@ class MissingPanel:
         stale = "" if found["of"] == tree.current.number else f" This was said of {of}."
         _card(
             "said",
-            f'<b>{html.escape(found["sentence"])}</b><div class="soft">{html.escape(stale)}</div>',
+            '<b>{}</b><div class="soft">{}</div>',
+            found["sentence"],
+            stale,
         )
 
     def _finding(self, finding: dict) -> None:
@@ -96,16 +96,16 @@ class MissingPanel:
         with ui.element("div").classes("note").props(f'data-testid="finding-{effect}"'):
             with ui.element("div").classes("head"):
                 name = REFIT_IN_WORDS if effect == REFIT else effect
-                ui.html(f"<b>{html.escape(name)}</b>", sanitize=False).style("flex: 1")
+                markup("<b>{}</b>", name).style("flex: 1")
                 ui.label(finding["certainty"]).classes(f"chip {'good' if sure else 'warn'}")
                 self._buttons(effect)
             if effect != REFIT:
                 _told(effect)
             words = "less than 1 %" if share < 0.005 else f"{100 * share:.0f} %"
-            ui.html(
-                f'<div class=share><i style="width:{100 * share:.1f}%"></i></div>'
-                f"takes away {words} of the error",
-                sanitize=False,
+            markup(
+                '<div class=share><i style="width:{}%"></i></div>takes away {} of the error',
+                f"{100 * share:.1f}",
+                words,
             )
             estimates = "; ".join(estimate(p) for p in finding["parameters"])
             ui.label(estimates).classes("soft")
@@ -167,11 +167,11 @@ class MissingPanel:
         if not sentence:
             return
         if effect is None or not moves(effect) or instance_of(effect) == "base":
-            _card("wrong", html.escape(sentence))
+            _card("wrong", "{}", sentence)
             return
         with ui.element("div").classes("note wrong").props(f'data-testid="off-{off["robot_id"]}"'):
             with ui.element("div").classes("head"):
-                ui.html(f"<b>{html.escape(sentence)}</b>", sanitize=False).style("flex: 1")
+                markup("<b>{}</b>", sentence).style("flex: 1")
                 own = effect if effect in catalogue() else OWN_GAINS
                 self._buttons(own, off["robot_id"])
             ui.label("; ".join(estimate(p) for p in off["parameters"])).classes("soft")
@@ -186,8 +186,8 @@ class MissingPanel:
                 (f"R{r['robot_id']:02d}", *map(_share, (r["speed"], r["turn"]))) for r in robots
             ]
             for k, row in enumerate(rows):
-                cells = "".join(f"<div>{cell}</div>" for cell in row)
-                ui.html(cells, sanitize=False).classes("model head" if k == 0 else "model still")
+                cells = markup("<div>{}</div>" * len(row), *row)
+                cells.classes("model head" if k == 0 else "model still")
             ui.label("The smallest difference from the model beyond doubt.").classes("soft")
 
     def _others(self, found: dict) -> None:
@@ -211,12 +211,12 @@ def _told(effect: str) -> None:
     entry = catalogue().get(effect)
     if entry:
         ui.label(entry["summary"])
-        ui.html(typeset(entry["equation"]), sanitize=False).classes("eq")
+        markup("{}", typeset(entry["equation"])).classes("eq")
 
 
 def _share(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.1f} %"
 
 
-def _card(kind: str, words: str) -> None:
-    ui.html(words, sanitize=False).classes(f"note {kind}")
+def _card(kind: str, form: str, *values: str) -> None:
+    markup(form, *values).classes(f"note {kind}")

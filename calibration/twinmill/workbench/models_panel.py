@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The panel of models tried: a tree with scores, the command that makes each, and saving."""
 
-import html
 from pathlib import Path
 
 from nicegui import ui
 
-from twinmill.workbench.panel import PageActions, check_free, commands_html, scored, tone
+from twinmill.workbench.panel import PageActions, check_free, commands_html, markup, scored, tone
 from twinmill.workbench.tree import Tried
 
 INDENT_PX = 14
@@ -32,9 +31,7 @@ class ModelsPanel:
         tree = self.bench.session.tree
         self.body.clear()
         with self.body:
-            ui.html("<div>model</div><div>fitted</div><div>held out</div>", sanitize=False).classes(
-                "model head"
-            )
+            markup("<div>model</div><div>fitted</div><div>held out</div>").classes("model head")
             for tried, depth in _ordered(tree.tried, tree.current.number):
                 self._row(tried, depth)
         self.button.set_enabled(tree.current.number != 0)
@@ -45,12 +42,13 @@ class ModelsPanel:
         score = tree.scores.get(tried.number)
         fitted, heldout = (score.fitted, score.heldout) if score else (None, None)
         about = "" if score is None or score.exact else "≈ "
-        words = (
-            f'<div style="padding-left:{INDENT_PX * depth}px">{html.escape(tried.label)}</div>'
-            f'<div class="{tone(fitted)}">{about}{scored(fitted)}</div>'
-            f'<div class="{tone(heldout)}">{scored(heldout)}</div>'
-        )
-        row = ui.html(words, sanitize=False).props(f'data-testid="model-{tried.number}"')
+        row = markup(
+            '<div style="padding-left:{}px">{}</div>'
+            '<div class="{}">{}</div><div class="{}">{}</div>',
+            *(INDENT_PX * depth, tried.label),
+            *(tone(fitted), f"{about}{scored(fitted)}"),
+            *(tone(heldout), scored(heldout)),
+        ).props(f'data-testid="model-{tried.number}"')
         row.classes("model now" if tried.number == tree.current.number else "model")
         row.props("role=button tabindex=0")
         for event in ("click", "keydown.enter"):
@@ -65,7 +63,7 @@ class ModelsPanel:
         commands, _ = tree.written(tree.current.number, out)
         with self.commands:
             ui.label("The same from a terminal:").classes("soft")
-            ui.html(commands_html(commands), sanitize=False).props('data-testid="commands"')
+            markup("{}", commands_html(commands)).props('data-testid="commands"')
             if self.bench.session.is_outdated:
                 ui.label(
                     f"{tree.name} was changed since it was opened: now these commands make "

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The panel of the next run: time and floor, the run that tells most, its script."""
 
-import html
 from pathlib import Path
 
 from nicegui import ui
 
 from twinmill.experiment.power import percent
 from twinmill.files import replacing
-from twinmill.workbench.panel import PageActions, check_free, commands_html
+from twinmill.workbench.panel import PageActions, check_free, commands_html, escaped, markup
 
 FLOOR_PX = 300  # the longer side of the floor, as drawn
 
@@ -68,10 +67,12 @@ class NextPanel:
             return
         with self.body:
             good = "good" if plan["predicted_power"] > 0.5 else "warn"
-            ui.html(
-                f"{html.escape(plan['why'])} <b class={good}>The right name comes with a chance of "
-                f"{percent(plan['predicted_power'])}</b>, in {plan['end_s']:.1f} s.",
-                sanitize=False,
+            markup(
+                "{} <b class={}>The right name comes with a chance of {}</b>, in {} s.",
+                plan["why"],
+                good,
+                percent(plan["predicted_power"]),
+                f"{plan['end_s']:.1f}",
             ).classes("note said")
             ui.echart(_floor(plan)).style(f"height: {_height_px(plan) + 56}px").props(
                 'data-testid="plan-floor"'
@@ -80,16 +81,21 @@ class NextPanel:
             self._save(plan)
 
     def _effects(self, plan: dict) -> None:
-        rows = ["<div>effect</div><div>so far</div><div>then</div>"]
+        rows = [escaped("<div>effect</div><div>so far</div><div>then</div>")]
         for effect in plan["effects"]:
             tone = "good" if effect["power"] > 0.5 else "warn"
             rows.append(
-                f"<div>{effect['effect']}</div><div>{percent(effect['power_before'])}</div>"
-                f'<div class="{tone}">{percent(effect["power"])}</div>'
+                escaped(
+                    '<div>{}</div><div>{}</div><div class="{}">{}</div>',
+                    effect["effect"],
+                    percent(effect["power_before"]),
+                    tone,
+                    percent(effect["power"]),
+                )
             )
         ui.label("Chance that each is named, if it is the one:").classes("soft")
         for k, row in enumerate(rows):
-            ui.html(row, sanitize=False).classes("model head" if k == 0 else "model still")
+            markup("{}", row).classes("model head" if k == 0 else "model still")
 
     def _save(self, plan: dict) -> None:
         with ui.element("div").classes("buttons"):
@@ -98,9 +104,7 @@ class NextPanel:
             button = ui.button("Save", on_click=lambda: _written(plan, path.value))
             button.props('dense unelevated no-caps padding="4px 16px" data-testid="save-script"')
         ui.label("The same from a terminal, and what to do then:").classes("soft")
-        ui.html(commands_html(plan["commands"]), sanitize=False).props(
-            'data-testid="next-commands"'
-        )
+        markup("{}", commands_html(plan["commands"])).props('data-testid="next-commands"')
 
 
 def _number(label: str, value: float, name: str) -> ui.number:

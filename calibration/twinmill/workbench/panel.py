@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What all panels use: what their page does for them; numbers, tones and refusals in words."""
 
-import html
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
+from markupsafe import Markup
+from nicegui import ui
+
 from twinmill.fitting.compare import GOOD, MISSING
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.report import tables
 from twinmill.workbench.bench import Bench
@@ -47,13 +50,29 @@ def check_free(path: Path) -> None:
         raise ValueError(f"{path}: exists; choose another name.")
 
 
-def commands_html(commands: Sequence[str]) -> str:
+def escaped(form: str, *values: object) -> Markup:
+    """HTML with texts in it: names of files, effects and behaviours may be anybody's.
+
+    Args:
+        form: HTML of ours, with {} where a text stands.
+        values: the texts, shown as they are; Markup stays markup.
+    """
+    shown = [v if isinstance(v, Markup) else plain_line(str(v), MESSAGE_MAX) for v in values]
+    return Markup(form).format(*shown)
+
+
+def markup(form: str, *values: object) -> ui.html:
+    """An element that shows what `escaped` makes; the only way to HTML in the workbench."""
+    return ui.html(escaped(form, *values), sanitize=False)
+
+
+def commands_html(commands: Sequence[str]) -> Markup:
     """Commands to be copied, a line each; lines break between words alone, not in `--n`."""
     lines = [
-        " ".join(f"<span>{html.escape(word)}</span>" for word in line.split(" "))
+        Markup(" ").join(escaped("<span>{}</span>", word) for word in line.split(" "))
         for line in commands
     ]
-    return '<pre class="command">' + "\n".join(lines) + "</pre>"
+    return escaped('<pre class="command">{}</pre>', Markup("\n").join(lines))
 
 
 def scored(score: float | None) -> str:

@@ -13,7 +13,7 @@ from twinmill.workbench.knobs_panel import KnobsPanel
 from twinmill.workbench.missing_panel import MissingPanel
 from twinmill.workbench.models_panel import ModelsPanel
 from twinmill.workbench.next_panel import NextPanel
-from twinmill.workbench.panel import scored, tone
+from twinmill.workbench.panel import markup, scored, tone
 from twinmill.workbench.swarm_panel import SwarmPanel
 
 REFRESH_S = 0.15
@@ -60,20 +60,25 @@ DRAWS = {  # what a panel shows
 }
 
 
+def _in_script(value: object) -> str:
+    """JSON that ends no script, whatever texts are in it."""
+    return json.dumps(value).replace("<", "\\u003c")
+
+
 class Screen:
     """One page in one browser."""
 
-    def __init__(self, bench: Bench) -> None:
-        self.bench = bench
+    def __init__(self, bench: Bench, token: str) -> None:
+        self.bench, self.token = bench, token
         self._seen: Counter[str] = Counter()
         self._stale: set[str] = set()
 
     async def build(self) -> None:
         """Makes all elements, then keeps them up to date."""
         place = self.bench.log_of(self.bench.picked)
-        options = {"token": self.bench.state.token, "view": self.bench.view, "log": place}
+        options = {"token": self.token, "view": self.bench.view, "log": place}
         ui.add_head_html(HEAD)
-        ui.add_body_html(stage_html() + SCRIPT.replace("OPTIONS", json.dumps(options)))
+        ui.add_body_html(stage_html() + SCRIPT.replace("OPTIONS", _in_script(options)))
         self._bar()
         with ui.element("div").props("id=side"):
             self._panels()
@@ -91,10 +96,7 @@ class Screen:
 
     def _bar(self) -> None:
         with ui.element("div").props("id=bar"):
-            ui.html(
-                '<span class="name"><img src="/look/icon.svg" alt="">Twinmill</span>',
-                sanitize=False,
-            )
+            markup('<span class="name"><img src="/look/icon.svg" alt="">Twinmill</span>')
             names = [path.name for path in self.bench.session.paths]
             self.log = ui.select(
                 dict(enumerate(names)), value=0, on_change=lambda e: self._pick_log(e.value)
@@ -106,7 +108,7 @@ class Screen:
             self.cancel = ui.button("Cancel", on_click=self.bench.cancel)
             self.cancel.props('dense outline no-caps padding="2px 12px" data-testid="cancel"')
             with ui.element("div").classes("score"):
-                ui.html("<small>score</small>", sanitize=False)
+                markup("<small>score</small>")
                 self.score = ui.label().props('data-testid="score"')
                 ui.tooltip(
                     "Error over the noise of the log, all robots: 1.0 is as good as the log can "

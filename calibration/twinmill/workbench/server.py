@@ -9,7 +9,7 @@ import socket
 import sys
 import webbrowser
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 from fastapi import Request
@@ -21,6 +21,7 @@ from starlette.responses import PlainTextResponse, Response
 
 from twinmill.charts.stage import STATIC as CHARTS
 from twinmill.model.model_file import ModelError
+from twinmill.workbench.address_file import address_file
 from twinmill.workbench.bench import Bench
 from twinmill.workbench.guard import REFUSED, Guard
 from twinmill.workbench.screen import Screen
@@ -45,11 +46,11 @@ class View(BaseModel):
 
 
 def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> None:
-    """Serves until Ctrl-C.
+    """Serves until Ctrl-C; another secret each time.
 
     Args:
         bench: what is shown.
-        port: 0 takes that of the session before, or any that is free.
+        port: 0 takes any that is free.
         show: opens the user's browser.
         say: told the address.
 
@@ -57,15 +58,15 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
         ValueError: the port is taken, or the logs cannot be judged.
     """
     sys.setswitchinterval(SWITCH_S)
-    port = bench.port = _port(port, bench.port)
-    url = f"http://{HOST}:{port}/?token={bench.state.token}"
-    app.add_middleware(Guard, token=bench.state.token, port=port)
+    port, token = _free_port(port), secrets.token_urlsafe(16)
+    url = f"http://{HOST}:{port}/?token={token}"
+    app.add_middleware(Guard, token=token, port=port)
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=[HOST, "localhost"])
     logging.getLogger("uvicorn.error").addFilter(_is_worth_reporting)
     app.add_static_files("/look", STATIC, max_cache_age=0)
     app.add_static_files("/charts", CHARTS, max_cache_age=0)
-    _add_data(bench)
-    _add_page(bench)
+    _add_data(bench, token)
+    _add_page(bench, token)
 
     async def begin() -> None:
         tasks.append(asyncio.create_task(announced()))
@@ -75,7 +76,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
         await _listening(port)
         say(url)
         if show:
-            webbrowser.open(url)
+            webbrowser.open(leading.as_uri())
 
     async def opened() -> None:
         try:
@@ -91,16 +92,21 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
 
     def end() -> None:
         bench.close()
+        on_end.close()
         if bench.threads and not failed:  # which would be waited for
             sys.stdout.flush()
             os._exit(0)
 
+    on_end = ExitStack()
+    if show:
+        beside = bench.state.path.with_suffix(".open.html").absolute()
+        leading = on_end.enter_context(address_file(beside, url))
     tasks: list[asyncio.Task] = []
     failed: list[Exception] = []
     app.on_startup(begin)
     app.timer(TICK_S, bench.tick)
     app.on_shutdown(end)
-    with suppress(KeyboardInterrupt):  # the way to end it
+    with on_end, suppress(KeyboardInterrupt):  # the way to end it
         ui.run(
             host=HOST,
             port=port,
@@ -115,14 +121,6 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
         )
     if failed:
         raise failed[0]
-
-
-def _port(asked: int, before: int) -> int:
-    """The port asked for; for 0 that of the session before, so that its pages find this one."""
-    if not asked and before:
-        with suppress(ValueError):  # others have it by now
-            return _free_port(before)
-    return _free_port(asked)
 
 
 def _free_port(port: int) -> int:
@@ -149,12 +147,12 @@ async def _listening(port: int) -> None:
         await asyncio.sleep(LISTEN_S)
 
 
-def _add_page(bench: Bench) -> None:
+def _add_page(bench: Bench, secret: str) -> None:
     @ui.page("/")
     async def page(token: str = "") -> Response | None:
-        if not _right(bench, token):
+        if not _same(token, secret):
             return _refused()
-        await Screen(bench).build()
+        await Screen(bench, secret).build()
         return None
 
     @app.exception_handler(404)
@@ -162,11 +160,11 @@ def _add_page(bench: Bench) -> None:
         return PlainTextResponse(NOTHING_HERE, status_code=404)
 
 
-def _add_data(bench: Bench) -> None:
+def _add_data(bench: Bench, secret: str) -> None:
     """Arrays for the browser, and what it tells of its view."""
 
     def answer(token: str, make: Callable[..., bytes], *arguments: int) -> Response:
-        if not _right(bench, token):
+        if not _same(token, secret):
             return _refused()
         try:
             content = make(*arguments)
@@ -186,7 +184,7 @@ def _add_data(bench: Bench) -> None:
     async def prediction(
         index: int, name: str = "", value: float = 0.0, token: str = ""
     ) -> Response:
-        if name and _right(bench, token):
+        if name and _same(token, secret):
             try:
                 bench.drag(name, value)
             except ModelError as error:
@@ -199,7 +197,7 @@ def _add_data(bench: Bench) -> None:
 
     @app.post("/data/view")
     async def view(request: Request, token: str = "") -> Response:
-        if not _right(bench, token):
+        if not _same(token, secret):
             return _refused()
         try:
             told = View.model_validate_json(await request.body())
@@ -209,8 +207,8 @@ def _add_data(bench: Bench) -> None:
         return Response(status_code=204)
 
 
-def _right(bench: Bench, token: str) -> bool:
-    return secrets.compare_digest(token.encode(), bench.state.token.encode())
+def _same(token: str, secret: str) -> bool:
+    return secrets.compare_digest(token.encode(), secret.encode())
 
 
 def _refused() -> Response:

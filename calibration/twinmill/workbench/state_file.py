@@ -4,7 +4,6 @@
 import fcntl
 import json
 import os
-import secrets
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -39,17 +38,12 @@ class StateFile:
             raise ValueError(
                 f"{path}: cannot be used ({error.strerror}); name another file with --state."
             ) from error
-        self._data = {"token": secrets.token_urlsafe(16)} if kept is None else _session(path, kept)
+        self._data = {} if kept is None else _session(path, kept)
         self.write(json.dumps(self._data))
 
     def close(self) -> None:
         """Another workbench may take it."""
         self._lock.close()
-
-    @property
-    def token(self) -> str:
-        """Secret of the session's address; the same after the server was stopped."""
-        return self._data["token"]
 
     def read(self, key: str, default: Any) -> Any:
         """One entry as it was when the file was opened."""
@@ -62,7 +56,7 @@ class StateFile:
             ValueError: it cannot be written.
         """
         with replacing(self.path, force=True, mode=0o600) as temporary:
-            temporary.write_text(json.dumps({**MARK, "token": self.token, **json.loads(text)}))
+            temporary.write_text(json.dumps({**MARK, **json.loads(text)}))
 
 
 def _session(path: Path, kept: bytes) -> dict[str, Any]:
@@ -71,7 +65,7 @@ def _session(path: Path, kept: bytes) -> dict[str, Any]:
         data = json.loads(kept)
     except ValueError:  # of letters that are none, too
         data = None
-    if not isinstance(data, dict) or not MARK.items() <= data.items() or "token" not in data:
+    if not isinstance(data, dict) or not MARK.items() <= data.items():
         raise ValueError(
             f"{path}: holds no session of the workbench, and is left as it is; name another file "
             "with --state."

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The panel of the swarm: the twin with the model as given and with the model now, side by side."""
 
-import html
-
 from nicegui import ui
 
 from twinmill.swarm.classes import COLORS
-from twinmill.workbench.panel import PageActions, commands_html, scored
+from twinmill.workbench.panel import PageActions, commands_html, markup, scored
 from twinmill.workbench.swarm import STARTS, has_poses
 
 AXIS = {
@@ -47,7 +45,7 @@ class SwarmPanel:
             self.progress = ui.label().classes("soft").style("flex: 1")
         self.failure = ui.label().classes("note wrong")
         self.waiting = ui.label(WAITING.format(STARTS)).classes("soft")
-        self.sheet = ui.html('<canvas id="swarm"></canvas>', sanitize=False)
+        self.sheet = markup('<canvas id="swarm"></canvas>')
         self.sheet.classes("sheet swarm")
         self.body = ui.element("div").classes("stack").props('data-testid="swarm-table"')
         self.draw_progress()
@@ -86,8 +84,7 @@ class SwarmPanel:
             return
         labels = list(swarm["swarms"])
         with self.body:
-            head = "".join(f"<div>{html.escape(label)}</div>" for label in labels)
-            ui.html(f"<div></div>{head}", sanitize=False).classes("model head")
+            markup("<div></div>" + "<div>{}</div>" * len(labels), *labels).classes("model head")
             kinds = sorted({k for s in swarm["swarms"].values() for k in s["classes"]})
             for kind in kinds:
                 counts = [s["classes"].get(kind, 0) for s in swarm["swarms"].values()]
@@ -103,14 +100,11 @@ class SwarmPanel:
             chart = ui.echart(_diagram(swarm)).props('data-testid="diagram"')
             chart.style("height: 290px; width: 100%")
             ui.label("The first start from a terminal:").classes("soft")
-            ui.html(commands_html(swarm["commands"]), sanitize=False).props(
-                'data-testid="swarm-commands"'
-            )
+            markup("{}", commands_html(swarm["commands"])).props('data-testid="swarm-commands"')
         self.page.javascript("twinmill.showSwarm()")
 
     def _row(self, name: str, values: list[str]) -> None:
-        cells = "".join(f"<div>{value}</div>" for value in values)
-        ui.html(f"<div>{name}</div>{cells}", sanitize=False).classes("model still")
+        markup("<div>{}</div>" * (1 + len(values)), name, *values).classes("model still")
 
 
 def _diagram(swarm: dict) -> dict:

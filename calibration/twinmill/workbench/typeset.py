@@ -4,6 +4,8 @@
 import html
 import re
 
+from markupsafe import Markup
+
 GREEK = {"tau": "τ", "omega": "ω", "theta": "θ", "phi": "φ", "pi": "π"}
 LETTERS = {"vx": "v_x", "vy": "v_y", "gx": "g_x", "gy": "g_y"}
 STEPS = {"dt", "du", "dv", "dh"}
@@ -22,12 +24,12 @@ TOKEN = re.compile(
 )
 
 
-def typeset(equation: str) -> str:
+def typeset(equation: str) -> Markup:
     """As HTML; units keep their stroke: `0.02 m/s`."""
     text = TOKEN.sub(lambda match: _token(match[0]), html.escape(_stacked(equation)))
     for sign, seen in {**SIGNS, **FRACTION}.items():
         text = text.replace(sign, seen)
-    return text
+    return Markup(text)
 
 
 def _stacked(equation: str) -> str:

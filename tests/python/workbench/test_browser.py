@@ -143,8 +143,9 @@ def test_the_whole_conversation(import_turbopi, page):
         expect(page.get_by_test_id("model-2")).to_have_class(re.compile("now"))
     expect(page.get_by_text("The same command goes on where you were")).to_be_visible()
     keep_a_group()
-    with workbench():
-        # The page that was left open finds the same session again.
+    with workbench() as url:
+        # The session is the same at its new address.
+        page.goto(url)
         expect(page.get_by_text("The same command goes on where you were")).not_to_be_visible()
         page.get_by_test_id("tab-models").click()
         expect(page.get_by_test_id("model-2")).to_have_class(re.compile("now"))

@@ -84,7 +84,7 @@ class Workbench extends Stage {
 
 const GONE = [
   "The workbench does not answer.",
-  "Was it stopped? The same command goes on where you were: nothing is lost.",
+  "Was it stopped? The same command goes on where you were, at another address: nothing is lost.",
 ];
 
 export function start({ token, view, log }) {

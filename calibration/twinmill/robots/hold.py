@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What becomes of robots that were started, by what they sign, until they stand."""
+
+import time
+from dataclasses import dataclass
+
+from twinmill.robots.fleet import MAY_MOVE, TELEMETRY, Fleet, Robot
+from twinmill.robots.tell import Start
+
+# A robot signs ten times a second; without a word for as long as it would wait for its operator,
+# nobody knows what it does.
+SILENT_S = 2.0
+SETTLE_S = 0.3  # a state that lasts is told; a camera that stutters would be a flood of words
+
+
+@dataclass(frozen=True)
+class State:
+    """What a robot does now.
+
+    Attributes:
+        words: to go on behind its name; of one that stands, why it does.
+        stands: it has signed so, and will not drive on by itself.
+        is_meant: somebody wished it so: it drives, or was stopped by a person or its script.
+    """
+
+    words: str
+    stands: bool = False
+    is_meant: bool = False
+
+    def told_of(self, name: str) -> str:
+        """A sentence without its full stop."""
+        return f"{name} stands: {self.words}" if self.stands else f"{name} {self.words}"
+
+
+DRIVES = State("drives", is_meant=True)
+WAITS = State("has accepted the start, and has not driven yet: is its clock behind?")
+DRIVES_ANEW = State("drives, though its program was started anew: it has autostart")
+SILENT = State("is not heard any more: nobody knows whether it stands")
+DOUBLE = State("is two robots of one number, or hears another: nobody knows which does what")
+UNCONFIRMED = State("says that it stands, but not that its motor board took zero")
+RESTARTED = State("its program was started anew", stands=True)
+LINK_LOST = State("it had lost its link to this command", stands=True)
+BY_COMMAND = State("stopped by another command", stands=True, is_meant=True)
+SCRIPT_OVER = State("its script is over, or its button was pressed", stands=True, is_meant=True)
+BY_BUTTON = State("its button was pressed", stands=True, is_meant=True)
+
+
+class Held:
+    """Robots that were started together."""
+
+    def __init__(self, fleet: Fleet, begun: Start):
+        """Takes all of them that have signed that they start, or drive all the same."""
+        known = [fleet.robots[a.robot_id] for a in begun.answers if a.robot_id in fleet.robots]
+        accepted = {a.robot_id for a in begun.answers if a.accepted and a.signed}
+        self.robots = [
+            r for r in known if r.link and (r.robot_id in accepted or r.mode != "stopped")
+        ]
+        self._sessions = {
+            r.robot_id: begun.sessions.get(r.robot_id, r.link.session) for r in self.robots
+        }
+        self._drove: dict[int, int] = {}  # mode in which a robot drove last
+        self._told = dict.fromkeys(self._sessions, DRIVES)
+        self._seen = dict.fromkeys(self._sessions, (DRIVES, 0.0))  # and since when
+        self._begin_s = time.monotonic()
+
+    def _state(self, robot: Robot) -> State:
+        """By its newest link, which what it says unsigned may only contradict."""
+        link = robot.link
+        if robot.is_double:
+            return DOUBLE
+        if time.monotonic() - robot.link_s > SILENT_S:
+            return SILENT
+        if robot.link_s < self._begin_s:
+            return self._told[robot.robot_id]
+        is_anew = link.session != self._sessions[robot.robot_id]
+        if link.mode == TELEMETRY.MODE_FAULT:
+            is_blind = link.status_flags & TELEMETRY.STATUS_FRAME_STALE
+            blind = "no new picture of its camera" if is_blind else "a part of it does not answer"
+            what = ", ".join(robot.alarms) or blind
+            return State(f"has a fault: {what}; it may drive again once that is over")
+        if link.mode != TELEMETRY.MODE_STOPPED:
+            self._drove[robot.robot_id] = link.mode
+            return DRIVES_ANEW if is_anew else DRIVES
+        if robot.mode in ("running", "script"):
+            return self._told[robot.robot_id]
+        if not (link.stands and robot.stands) or link.status_flags & MAY_MOVE:
+            return UNCONFIRMED
+        return RESTARTED if is_anew else self._why_it_stands(robot)
+
+    def _why_it_stands(self, robot: Robot) -> State:
+        flags = robot.link.status_flags
+        if flags & TELEMETRY.STATUS_LINK_LOST:
+            return LINK_LOST
+        if flags & TELEMETRY.STATUS_LATCHED:
+            return BY_COMMAND
+        if robot.robot_id not in self._drove:
+            return WAITS
+        was_script = self._drove[robot.robot_id] == TELEMETRY.MODE_SCRIPT
+        return SCRIPT_OVER if was_script else BY_BUTTON
+
+    def news(self) -> list[str]:
+        """A sentence of each robot that has for a while been in another state than was told."""
+        said, now_s = [], time.monotonic()
+        for robot in self.robots:
+            state, (before, since_s) = self._state(robot), self._seen[robot.robot_id]
+            if state != before:
+                self._seen[robot.robot_id] = state, now_s
+            elif state != self._told[robot.robot_id] and now_s - since_s >= SETTLE_S:
+                self._told[robot.robot_id] = state
+                said.append(f"{state.told_of(f'R{robot.robot_id:02d}')}.")
+        return said
+
+    @property
+    def states(self) -> dict[str, State]:
+        """What was told last, by the robots' names."""
+        return {f"R{i:02d}": state for i, state in self._told.items()}
+
+    @property
+    def is_over(self) -> bool:
+        """All stand."""
+        return all(state.stands for state in self._told.values())

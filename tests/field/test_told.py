@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the operator is told is what the wheels do: faults on his side, each with sentence and code.
+
+`make check` runs those that need the least time; with FAULTS=all, as in `make check-long`, all are
+run, and the table for firmware/README.md is written.
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from network import run_session_at
+
+ALL = os.environ.get("FAULTS") == "all"
+pytestmark = pytest.mark.skipif(
+    not os.environ.get("TURBOPI"), reason="TURBOPI does not name the program"
+)
+LIMIT_S, SLACK_S = 0.5, 0.5  # promised; for a machine that is busy with other tests
+LINK_LOST_S = 2.0  # link_timeout_ms
+TOOL_S = 2.5  # a command's own start, on a busy machine
+NEVER = None  # no wheel turned
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One row: the fault, and what is true of it.
+
+    Attributes:
+        words: for the table.
+        said: parts of what the tool says, in this order.
+        code: its exit code.
+        limit_s: within which the wheels stand; NEVER: they never turned.
+        is_brief: part of `make check`.
+    """
+
+    words: str
+    said: tuple[str, ...]
+    code: int
+    limit_s: float | None = LIMIT_S
+    is_brief: bool = False
+
+
+FAULTS = {
+    "ctrl_c": Fault("Ctrl-C", ("Started at", "All stand."), 0),
+    "ctrl_c_at_the_first_move": Fault(
+        "Ctrl-C as the first wheel turns", ("All stand",), 0, is_brief=True
+    ),
+    "ctrl_c_five_times": Fault("Ctrl-C, five times", ("All stand.",), 0),
+    "terminal_halted_and_ctrl_c": Fault("Ctrl-S for 2.5 s, then Ctrl-C", ("All stand.",), 0),
+    "terminal_halted_and_killed": Fault(
+        "Ctrl-S for 2.5 s, then SIGTERM", ("All stand.",), 0, is_brief=True
+    ),
+    "terminal_halted_at_the_start": Fault(
+        "Ctrl-S before the start, then SIGINT", ("All stand",), 0, is_brief=True
+    ),
+    "untethered_at_a_halted_terminal": Fault(
+        "the same with --untethered, whose words cannot be told", ("All stand",), 0
+    ),
+    "hung_up": Fault("terminal closed", (), 1),
+    "ctrl_z": Fault("Ctrl-Z", ("All stand.",), 0),
+    "killed": Fault("tool killed (SIGKILL)", (), -9, LINK_LOST_S),
+    "slept": Fault(
+        "laptop sleeps for 3 s", ("All stand: R01, R02: it had lost its link",), 1, LINK_LOST_S
+    ),
+    "output_full": Fault("disk below the tool's output full", ("no space is left",), 1),
+    "stopped_by_another": Fault(
+        "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 0
+    ),
+    "driver_dies": Fault(
+        "one robot's driver dies; then Ctrl-C",
+        ("R01 stands: its program was started anew.", "All stand, but R01: its program"),
+        1,
+        is_brief=True,
+    ),
+    "robot_falls_silent": Fault(
+        "one robot's program ends; then Ctrl-C",
+        ("R02 is not heard any more", "NOT ALL STAND: R02: no stop was confirmed."),
+        1,
+    ),
+    "camera_lost": Fault(
+        "one robot's camera is lost and comes back; then Ctrl-C",
+        ("R01 has a fault: camera lost", "R01 drives.", "All stand."),
+        0,
+    ),
+    "behaviour_unknown": Fault(
+        "no robot knows the behaviour",
+        ("Called off: R01, R02 refused", "All stand."),
+        1,
+        NEVER,
+    ),
+    "behaviour_unknown_partial": Fault(
+        "the same with --partial", ("NOBODY STARTED: R01, R02 refused",), 1, NEVER, is_brief=True
+    ),
+    "two_of_one_number": Fault(
+        "`swarm stop` where two robots have one number",
+        ("NOT ALL STAND: R01: two robots have this number, one may drive.",),
+        1,
+        NEVER,
+    ),
+    "never_heard": Fault(
+        "`swarm stop` to a robot that is not there",
+        ("NOT ALL STAND: R09: no stop was confirmed.", "R09: was never heard.", "--host"),
+        1,
+        NEVER,
+        is_brief=True,
+    ),
+    "stop_without_a_key": Fault(
+        "`swarm stop` on a machine without a key",
+        ("there is no key here", "NOT ALL STAND: R01, R02: no stop was confirmed."),
+        1,
+        TOOL_S,
+    ),
+    "markup_in_names": Fault(
+        "a stranger says names with unfinished markup and escape sequences; Ctrl-C",
+        ("Started at", "All stand."),
+        0,
+        is_brief=True,
+    ),
+    "flood_of_other_packets": Fault(
+        "packets of others without end, and `swarm stop --timeout-s 2` to who is not there",
+        ("NOT ALL STAND: R09: no stop was confirmed.",),
+        1,
+        NEVER,
+    ),
+}
+RUN = [name for name, fault in FAULTS.items() if ALL or fault.is_brief]
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    """What happened: see told_session.py."""
+    script = Path(__file__).with_name("told_session.py")
+    folder = tmp_path_factory.mktemp("told")
+    rows = run_session_at(script, folder, *RUN, timeout_s=30 * len(RUN))
+    if ALL:
+        write_table(Path(os.environ["BUILD"]) / "operator_faults.md", rows)
+    return rows
+
+
+def write_table(path: Path, rows: dict) -> None:
+    """As it stands in firmware/README.md."""
+    text = "| fault | said | exit code | wheels stand after |\n|---|---|---|---|\n"
+    for name, row in rows.items():
+        said = "; ".join(f'"{part.rstrip(".")}"' for part in FAULTS[name].said) or "nothing"
+        after = "never turned" if row["after_s"] is None else f"{row['after_s']:.2f} s"
+        text += f"| {FAULTS[name].words} | {said} | {row['code']} | {after} |\n"
+    path.write_text(text)
+
+
+@pytest.mark.parametrize("name", RUN)
+def test_wheels_stand_and_the_truth_is_told_with_its_code(session, name):
+    fault, row = FAULTS[name], session[name]
+    said = " ".join(" ".join(row["said"]).split())
+    at = 0
+    for part in fault.said:
+        assert part in said[at:], said
+        at = said.index(part, at)
+    assert row["code"] == fault.code, said
+    if fault.limit_s is NEVER:
+        assert row["after_s"] is None
+    else:
+        assert row["after_s"] < fault.limit_s + SLACK_S
+
+
+def test_a_halted_terminal_keeps_no_robot_without_its_operator(session):
+    """They drive on for longer than without one, and stand before the terminal goes on."""
+    halted = session["terminal_halted_and_killed"]
+    assert halted["drove"] and halted["stood_before_ctrl_q"]
+
+
+def test_one_robot_that_drops_out_does_not_end_the_others(session):
+    assert session["driver_dies"]["drove"]
+
+
+def test_names_of_strangers_are_shown_as_they_are(session):
+    row = session["markup_in_names"]
+    assert row["status_code"] == 0 and not row["got_through"]
+    assert "[/red] [bold" in row["status"] and "Traceback" not in row["status"]
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_a_stop_makes_no_key(session):
+    assert not session["stop_without_a_key"]["made_a_key"]

@@ -1,0 +1,428 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults on the operator's side: what the tool says, its exit code, and when the wheels stand.
+
+Usage: told_session.py FOLDER FAULT..., in a network of its own, with TURBOPI set. Two robots
+drive, held by `twinmill swarm start` at a terminal of its own, and then the fault happens. Prints a
+row for each as JSON.
+"""
+
+import fcntl
+import json
+import os
+import pty
+import re
+import select
+import shlex
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import turbopi
+from keyring import operator_key, robot_options
+from robot_process import ZERO, Robot, wait_until
+
+from twinmill.data.bus import UdpBus
+from twinmill.robots import tell
+from twinmill.robots.fleet import URL, Fleet
+
+IDS = (1, 2)
+COMMAND = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
+CTRL_C, CTRL_S, CTRL_Z = b"\x03", b"\x13", b"\x1a"
+LINK_TIMEOUT_S = 2.0
+TRIES = 3  # to start
+STAYS_S = 0.5  # a robot that was stopped
+HALTED_S = 0.5  # in which the held table wants to be drawn twice
+START = ("start", "--arm", "--robots", "1,2")
+
+
+class Operator:
+    """`twinmill swarm` as a process: at a terminal of its own, which can be halted, or on pipes."""
+
+    def __init__(self, key: Path, *words: str, terminal: bool = True, **options):
+        command = [sys.executable, "-c", COMMAND, "swarm", *words, "--key", str(key)]
+        self.said = ""
+        self.keyboard, self._closed = None, False
+        if terminal:
+            self.keyboard, far = pty.openpty()
+            fcntl.ioctl(far, termios.TIOCSWINSZ, struct.pack("HHHH", 40, 160, 0, 0))
+            options = {"stdin": far, "stdout": far, "stderr": far}
+            command = ["setsid", "--ctty", *command]
+        else:
+            options = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, **options}
+        self.process = subprocess.Popen(command, **options)
+        if terminal:
+            os.close(far)
+        self._ear = self.keyboard if terminal else self.process.stdout
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        if self._ear:
+            self._reader.start()
+
+    def _read(self):
+        fd = self._ear if isinstance(self._ear, int) else self._ear.fileno()
+        while not self._closed:
+            try:
+                if select.select([fd], [], [], 0.05)[0]:
+                    data = os.read(fd, 65536)
+                    if not data:
+                        return
+                    self.said += data.decode(errors="replace")
+            except OSError:  # the other end is closed
+                return
+
+    def type(self, keys: bytes) -> None:
+        os.write(self.keyboard, keys)
+
+    def hang_up(self) -> None:
+        """The terminal is gone."""
+        self._closed = True
+        self._reader.join()
+        os.close(self.keyboard)
+
+    def end(self, timeout_s: float = 20) -> int:
+        code = self.process.wait(timeout_s)
+        if self._ear and not self._closed:
+            self._reader.join(2)
+        return code
+
+    @property
+    def has_ended(self) -> bool:
+        """As where a start is called off: on a busy machine robots may acknowledge too late."""
+        return self.process.poll() is not None
+
+    @property
+    def plain(self) -> str:
+        """All that was said, without the codes that move a cursor."""
+        return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self.said)
+
+
+class Field:
+    """Two robots, their operator's key, and what each fault makes of them."""
+
+    def __init__(self, folder: Path, stack: ExitStack):
+        self.folder, self.stack = folder, stack
+        self.key_file, self.key = operator_key(folder)
+        self.robots = {i: self.robot(i, str(i)) for i in IDS}
+        self.operator: Operator | None = None
+
+    def robot(self, robot_id: int, name: str, *options: str) -> Robot:
+        (self.folder / name).mkdir()
+        words = ["--lcm-url", URL, *robot_options(self.folder, robot_id), *options]
+        # Frames are not missed for ten seconds: it is the fault alone that stops the wheels.
+        words += ["--set", "restart_ms=100", "--set", "frame_timeout_ms=10000"]
+        turbopi_program = shlex.split(os.environ["TURBOPI"])
+        return self.stack.enter_context(Robot(turbopi_program, self.folder / name, *words))
+
+    def start(self, *words: str, **options) -> Operator:
+        """Robots drive, held."""
+        for _ in range(TRIES):
+            self.operator = Operator(self.key_file, *START, *words, **options)
+            if self.begins(time.monotonic()):
+                return self.operator
+        raise RuntimeError(f"the robots did not start: {self.operator.plain}")
+
+    def begins(self, begin_s: float) -> bool:
+        """Waits until all have moved; False if the start was called off."""
+        wait_until(lambda: self.operator.has_ended or self.drive_since(begin_s), 30)
+        return not self.operator.has_ended
+
+    def drive_since(self, begin_s: float) -> bool:
+        """All have moved."""
+        return all(self.moved(i, begin_s) for i in IDS)
+
+    def held(self, **options) -> Operator:
+        """The same, and said so."""
+        operator = self.start(**options)
+        if not wait_until(lambda: "Ctrl-C stops them" in operator.plain, 10):
+            raise RuntimeError(operator.plain)
+        time.sleep(0.3)
+        return operator
+
+    def moved(self, robot_id: int, since_s: float) -> bool:
+        return any(t > since_s and d != ZERO for t, d in self.robots[robot_id].rows())
+
+    def stood_after(self, fault_s: float, robots=IDS) -> float:
+        """How long after the fault the last of them got the zero that stayed."""
+        last_s = fault_s
+        for i in robots:
+            rows = self.robots[i].rows()
+            moves_s = [t for t, duties in rows if duties != ZERO]
+            zeros_s = [t for t, duties in rows if t > moves_s[-1] and duties == ZERO]
+            last_s = max(last_s, zeros_s[0] if zeros_s else float("inf"))
+        return last_s - fault_s
+
+    def last_move_s(self, robot_id: int) -> float:
+        return max(t for t, duties in self.robots[robot_id].rows() if duties != ZERO)
+
+    def row(self, fault_s: float, code: int, robots=IDS) -> dict:
+        """Once the robots have stood for so long that they will not drive again."""
+        wait_until(lambda: all(self.last_move_s(i) < time.monotonic() - STAYS_S for i in robots))
+        said = [line.strip() for line in self.operator.plain.replace("\r", "\n").splitlines()]
+        return {
+            "said": [line for line in said if line],
+            "code": code,
+            "after_s": self.stood_after(fault_s, robots),
+        }
+
+    # -- the faults: each gives its row -----------------------------------------------------------
+
+    def ctrl_c(self) -> dict:
+        operator = self.held()
+        fault_s = time.monotonic()
+        operator.type(CTRL_C)
+        return self.row(fault_s, operator.end())
+
+    def ctrl_c_at_the_first_move(self) -> dict:
+        operator = self.start()
+        fault_s = time.monotonic()
+        operator.type(CTRL_C)
+        return self.row(fault_s, operator.end())
+
+    def ctrl_c_five_times(self) -> dict:
+        operator = self.held()
+        fault_s = time.monotonic()
+        for _ in range(5):
+            operator.type(CTRL_C)
+            time.sleep(0.005)
+        return self.row(fault_s, operator.end())
+
+    def terminal_halted_and_ctrl_c(self) -> dict:
+        return self._halted(lambda operator: operator.type(CTRL_C))
+
+    def terminal_halted_and_killed(self) -> dict:
+        """By SIGTERM: the terminal stays halted until the wheels stand."""
+        return self._halted(lambda operator: operator.process.terminate())
+
+    def _halted(self, act) -> dict:
+        operator = self.held()
+        operator.type(CTRL_S)
+        # Longer than robots drive without their operator: they hear it all the while.
+        time.sleep(LINK_TIMEOUT_S + HALTED_S)
+        drove = all(robot.duties() != ZERO for robot in self.robots.values())
+        fault_s = time.monotonic()
+        act(operator)
+        stood = wait_until(lambda: all(r.duties() == ZERO for r in self.robots.values()), 5)
+        operator.type(b"\x11")  # Ctrl-Q: the terminal goes on
+        return self.row(fault_s, operator.end()) | {"drove": drove, "stood_before_ctrl_q": stood}
+
+    def terminal_halted_at_the_start(self, *options: str) -> dict:
+        """Nothing of the start can be told, and the wheels turn already."""
+        begin_s = time.monotonic()
+        self.operator = operator = Operator(self.key_file, *START, *options)
+        operator.type(CTRL_S)
+        assert wait_until(lambda: self.drive_since(begin_s), 20)
+        time.sleep(0.2)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        wait_until(lambda: all(r.duties() == ZERO for r in self.robots.values()), 5)
+        operator.type(b"\x11")
+        return self.row(fault_s, operator.end())
+
+    def untethered_at_a_halted_terminal(self) -> dict:
+        return self.terminal_halted_at_the_start("--untethered")
+
+    def hung_up(self) -> dict:
+        operator = self.held()
+        fault_s = time.monotonic()
+        operator.hang_up()
+        return self.row(fault_s, operator.end())
+
+    def ctrl_z(self) -> dict:
+        operator = self.held()
+        fault_s = time.monotonic()
+        operator.type(CTRL_Z)
+        return self.row(fault_s, operator.end())
+
+    def killed(self) -> dict:
+        operator = self.held()
+        fault_s = time.monotonic()
+        operator.process.kill()
+        return self.row(fault_s, operator.end())
+
+    def slept(self) -> dict:
+        """As a laptop whose lid is shut."""
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGSTOP)
+        time.sleep(LINK_TIMEOUT_S + 1)
+        operator.process.send_signal(signal.SIGCONT)
+        return self.row(fault_s, operator.end())
+
+    def output_full(self) -> dict:
+        with open("/dev/full", "w") as full:
+            operator = self.start("--json", terminal=False, stdout=full, stderr=subprocess.PIPE)
+            fault_s = time.monotonic()
+            operator._ear = None
+            _, said = operator.process.communicate(timeout=20)
+        operator.said = said.decode()
+        return self.row(fault_s, operator.process.returncode)
+
+    def stopped_by_another(self) -> dict:
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        tell.stop(Fleet(URL, key=self.key), set())
+        return self.row(fault_s, operator.end())
+
+    def driver_dies(self) -> dict:
+        """One robot's program starts anew; the others are stopped by Ctrl-C later."""
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        os.kill(self.robots[1].children()[0], signal.SIGKILL)
+        wait_until(lambda: "started anew" in operator.plain, 10)
+        after_s = self.stood_after(fault_s, [1])
+        drove = self.robots[2].duties() != ZERO
+        operator.process.send_signal(signal.SIGINT)
+        return self.row(fault_s, operator.end()) | {"after_s": after_s, "drove": drove}
+
+    def robot_falls_silent(self) -> dict:
+        """Its program is ended, as by a battery switch; without a terminal it is said, too."""
+        other = self.robots[2]
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        other.process.terminate()
+        wait_until(lambda: "not heard" in operator.plain, 10)
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end()) | {"after_s": self.stood_after(fault_s, [2])}
+        self.robots[2] = self.robot(2, "2 again")
+        return row
+
+    def camera_lost(self) -> dict:
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        self.robots[1].camera.unplug()
+        wait_until(lambda: "has a fault" in operator.plain, 10)
+        after_s = self.stood_after(fault_s, [1])
+        self.robots[1].camera.plug()
+        wait_until(lambda: "R01 drives" in operator.plain, 10)
+        operator.process.send_signal(signal.SIGINT)
+        return self.row(fault_s, operator.end()) | {"after_s": after_s}
+
+    def behaviour_unknown(self) -> dict:
+        return self._refused("--behavior", "dance")
+
+    def behaviour_unknown_partial(self) -> dict:
+        return self._refused("--behavior", "dance", "--partial")
+
+    def _refused(self, *words: str) -> dict:
+        begin_s = time.monotonic()
+        self.operator = operator = Operator(self.key_file, *START, *words, terminal=False)
+        code = operator.end()
+        return self._unmoved(begin_s, code)
+
+    def _unmoved(self, begin_s: float, code: int) -> dict:
+        """A row of robots that never drove."""
+        time.sleep(0.3)
+        moved = any(self.moved(i, begin_s) for i in IDS)
+        said = [line.strip() for line in self.operator.plain.splitlines() if line.strip()]
+        return {"said": said, "code": code, "after_s": None if not moved else float("inf")}
+
+    def two_of_one_number(self) -> dict:
+        begin_s = time.monotonic()
+        twin = self.robot(1, "twin")
+        fleet = Fleet(URL, key=self.key)
+        fleet.listen(10, lambda: 1 in fleet.robots and fleet.robots[1].is_double)
+        self.operator = operator = Operator(
+            self.key_file, "stop", "--robots", "1,2", "--timeout-s", "1.5", terminal=False
+        )
+        code = operator.end()
+        twin.process.terminate()
+        twin.process.wait()
+        fleet.listen(10, lambda: not fleet.robots[1].is_double)
+        return self._unmoved(begin_s, code)
+
+    def never_heard(self) -> dict:
+        begin_s = time.monotonic()
+        self.operator = operator = Operator(
+            self.key_file, "stop", "--robots", "9", "--timeout-s", "1", terminal=False
+        )
+        return self._unmoved(begin_s, operator.end())
+
+    def stop_without_a_key(self) -> dict:
+        """On a machine that never commanded a robot."""
+        operator = self.held(terminal=False)
+        key = self.folder / "no" / "such.key"
+        fault_s = time.monotonic()
+        stopping = Operator(key, "stop", "--timeout-s", "2", terminal=False)
+        code = stopping.end()
+        operator.end()
+        self.operator = stopping
+        return self.row(fault_s, code) | {"made_a_key": key.exists()}
+
+    def markup_in_names(self) -> dict:
+        """Somebody says names with an unfinished tag and control characters."""
+        with self.saying(
+            behavior="[/red] [bold", version="\x1b]0;owned\x07\x1b[2J", source="a\nb" * 100
+        ):
+            operator = self.held()
+            time.sleep(0.6)
+            fault_s = time.monotonic()
+            operator.type(CTRL_C)
+            row = self.row(fault_s, operator.end())
+            status = Operator(self.key_file, "status", "--once")
+            row["status_code"] = status.end()
+        raw = operator.said + status.said
+        row["status"] = status.plain
+        row["got_through"] = [c for c in ("\x1b]0;", "\x07", "\x1b[2J\x1b") if c in raw]
+        return row
+
+    @contextmanager
+    def saying(self, **texts: str):
+        """A stranger who says what R01 and R02 are, thirty times a second."""
+        over, run = threading.Event(), turbopi.run_t()
+        for name, text in texts.items():
+            setattr(run, name, text)
+
+        def say():
+            bus = UdpBus(URL)
+            while not over.wait(0.03):
+                for i in IDS:
+                    run.robot_id = i
+                    bus.publish(f"R{i:02d}_RUN", run.encode())
+
+        thread = threading.Thread(target=say)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def flood_of_other_packets(self) -> dict:
+        """Of channels that nobody subscribed to: a stop that is not answered ends in its time."""
+        begin_s, over = time.monotonic(), threading.Event()
+
+        def flood():
+            bus = UdpBus(URL)
+            while not over.is_set():
+                bus.publish("CAMERA_3_PICTURE", b"x" * 1000)
+
+        threads = [threading.Thread(target=flood) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        self.operator = operator = Operator(
+            self.key_file, "stop", "--robots", "9", "--timeout-s", "2", terminal=False
+        )
+        code = operator.end(30)
+        over.set()
+        for thread in threads:
+            thread.join()
+        return self._unmoved(begin_s, code)
+
+
+def main(folder: Path, faults: list[str]) -> dict:
+    result = {}
+    with ExitStack() as stack:
+        field = Field(folder, stack)
+        time.sleep(1)
+        for fault in faults:
+            result[fault] = getattr(field, fault)()
+    return result
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(Path(sys.argv[1]), sys.argv[2:])))

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of robots that are held: by what they have signed, which all else may contradict."""
+
+import time
+
+import pytest
+import turbopi
+
+from twinmill.robots import hold
+from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
+from twinmill.robots.hold import Held
+from twinmill.robots.tell import Answer, Start
+
+SESSION = 7
+STOPPED, TABLE, SCRIPT, FAULT = 0, 1, 2, 3
+
+
+class Nowhere:
+    """A bus that is not listened to."""
+
+    def subscribe(self, *_):
+        pass
+
+
+@pytest.fixture
+def held(monkeypatch):
+    """One robot that was started, and a function that has it say how it is."""
+    monkeypatch.setattr(hold, "SETTLE_S", 0.0)
+    fleet = Fleet("", connect=lambda _: Nowhere())
+    robot = fleet.robots[3] = Robot(3)
+    answer = Answer(3, True, True, "", "running", False, False, [])
+
+    def say(mode, said_mode=None, *, stands=True, session=SESSION, flags=0):
+        link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
+        link.mode, link.stands, link.session, link.status_flags = mode, stands, session, flags
+        telemetry.mode = mode if said_mode is None else said_mode
+        robot.link, robot.telemetry, robot.link_s = link, telemetry, time.monotonic()
+
+    say(TABLE, stands=False)
+    robots = Held(fleet, Start(0, [answer], {3: SESSION}, []))
+
+    def words(*arguments, **options) -> str:
+        say(*arguments, **options)
+        said = [*robots.news(), *robots.news()]
+        return said[0] if said else ""
+
+    yield robots, robot, words
+
+
+def test_driving_is_no_news(held):
+    robots, _, words = held
+    assert words(TABLE, stands=False) == "" and not robots.is_over
+
+
+@pytest.mark.parametrize(
+    ("says", "reason"),
+    [
+        ({"flags": TELEMETRY.STATUS_LINK_LOST}, "lost its link"),
+        ({"flags": TELEMETRY.STATUS_LATCHED}, "stopped by another command"),
+        ({"session": SESSION + 1}, "started anew"),
+        ({}, "button"),
+    ],
+)
+def test_a_robot_that_stands_is_said_to_with_what_it_signs(held, says, reason):
+    robots, _, words = held
+    words(TABLE, stands=False)
+    assert reason in words(STOPPED, **says) and robots.is_over
+
+
+def test_a_script_that_is_over_is_told_apart_from_a_table(held):
+    _, _, words = held
+    words(SCRIPT, stands=False)
+    assert "its script is over" in words(STOPPED)
+
+
+@pytest.mark.parametrize(
+    "says",
+    [
+        {"stands": False},
+        {"flags": TELEMETRY.STATUS_STOP_UNCONFIRMED},
+        {"said_mode": FAULT},
+    ],
+)
+def test_nothing_is_over_while_anything_contradicts_it(held, says):
+    robots, _, words = held
+    words(TABLE, stands=False)
+    assert "not that its motor board took zero" in words(STOPPED, **says)
+    assert not robots.is_over
+
+
+def test_a_start_that_was_accepted_and_has_not_begun_is_held(held):
+    robots, _, words = held
+    assert "has not driven yet" in words(STOPPED) and not robots.is_over
+
+
+def test_a_fault_has_its_alarm(held):
+    robots, _, words = held
+    assert "camera lost" in words(FAULT, flags=TELEMETRY.STATUS_CAMERA_LOST)
+    assert not robots.is_over
+
+
+def test_two_of_one_number_are_said_once(held):
+    _, robot, words = held
+    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.1"):
+        robot.senders.add((host, 1))
+    assert "two robots" in words(TABLE) and words(STOPPED, session=SESSION + 1) == ""
+
+
+def test_silence_is_said(held, monkeypatch):
+    robots, _, words = held
+    monkeypatch.setattr(hold, "SILENT_S", -1.0)
+    assert "not heard any more" in words(TABLE) and not robots.is_over
+
+
+def test_a_camera_that_stutters_is_no_flood_of_words(held, monkeypatch):
+    _, _, words = held
+    monkeypatch.setattr(hold, "SETTLE_S", 0.3)
+    flicker = [words(FAULT if k % 2 else TABLE, stands=False) for k in range(20)]
+    assert flicker == [""] * 20

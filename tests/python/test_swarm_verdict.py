@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill swarm`: sentence, exit code and JSON say one thing, whatever robots answered."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from twinmill.robots.hold import BY_BUTTON, BY_COMMAND, DRIVES, LINK_LOST, RESTARTED, SILENT
+from twinmill.robots.tell import NEVER_HEARD, Answer, Start
+from twinmill_cli import swarm
+from twinmill_cli.swarm_verdict import Verdict, of_arm, of_end, of_select, of_start, of_stop
+
+WELL, ILL = Verdict(True, "well"), Verdict(False, "NOT ALL STAND: ill")
+
+
+def answer(robot_id: int, **fields) -> Answer:
+    """One that obeyed and drives."""
+    usual = {
+        "accepted": True,
+        "signed": True,
+        "reason": "",
+        "mode": "running",
+        "stands": False,
+        "is_double": False,
+        "alarms": [],
+    }
+    return Answer(robot_id=robot_id, **(usual | fields))
+
+
+GOOD, STANDS = answer(1), answer(2, mode="stopped", stands=True)
+REFUSED = answer(3, accepted=False, reason="no behaviour 'dance'", mode="stopped", stands=True)
+UNSIGNED = answer(4, signed=False, mode="stopped", stands=True)
+UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="")
+FAULTY = answer(6, mode="fault", alarms=["camera lost"])
+DOUBLE = answer(7, mode="stopped", stands=True, is_double=True)
+
+
+def begun(*answers: Answer, stopped=()) -> Start:
+    return Start(0, list(answers), {}, list(stopped))
+
+
+# What is said begins so, and the command ends with that code.
+SENTENCES = [
+    (of_stop([STANDS]), "All stand.", 0),
+    (of_stop([]), "No robot was heard in 10 s", 1),
+    (of_stop([STANDS, GOOD]), "NOT ALL STAND: R01: no stop was confirmed.", 1),
+    (of_stop([UNSIGNED, STANDS]), "NOT ALL STAND: R04: no stop was confirmed.", 1),
+    (of_stop([DOUBLE, STANDS]), "NOT ALL STAND: R07: two robots have this number", 1),
+    (of_stop([UNHEARD]), "NOT ALL STAND: R05: no stop was confirmed.", 1),
+    (of_arm([GOOD]), "All are armed.", 0),
+    (of_arm([REFUSED, GOOD]), "Not all are armed: R03", 1),
+    (of_select([GOOD], "milling"), "All chose milling.", 0),
+    (of_select([REFUSED, GOOD], "dance"), "Not all did: R03 did not obey", 1),
+    (of_start(begun(GOOD), untethered=False), "Started at", 0),
+    (of_start(begun(GOOD), untethered=True), "Started at", 0),
+    (of_start(begun(REFUSED, GOOD), untethered=False), "Started at", 1),
+    (of_start(begun(FAULTY, GOOD), untethered=False), "Started at", 1),
+    (of_start(begun(REFUSED), untethered=False), "NOBODY STARTED: R03 refused", 1),
+    (of_start(begun(REFUSED, stopped=[STANDS]), untethered=False), "Called off: R03 refused", 1),
+    (
+        of_start(begun(UNHEARD, GOOD, stopped=[STANDS]), untethered=False),
+        "Called off: R05 did not acknowledge in time",
+        1,
+    ),
+    (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
+    (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),
+    (of_end(ILL, {"R01": DRIVES}, WELL), "All stand, but not all had started.", 1),
+    (of_end(None, {}, WELL), "All stand, but the start was ended before", 1),
+    (of_end(WELL, {"R01": RESTARTED, "R02": DRIVES}, WELL), "All stand, but R01: its program", 1),
+    (of_end(WELL, {"R01": BY_BUTTON, "R02": DRIVES}, WELL), "All stand.", 0),
+    (of_end(WELL, {"R01": BY_COMMAND, "R02": BY_BUTTON}, None), "All stand: R01: stopped", 0),
+    (of_end(WELL, {"R01": BY_COMMAND, "R02": LINK_LOST}, None), "All stand: R01: stopped", 1),
+]
+
+
+@pytest.mark.parametrize(("verdict", "begins", "code"), SENTENCES)
+def test_each_sentence_has_its_code(verdict, begins, code):
+    assert verdict.sentence.startswith(begins)
+    assert verdict.code == code and verdict.ok == (code == 0)
+
+
+def test_a_fault_is_told_apart_from_driving():
+    said = of_start(begun(FAULTY, GOOD), untethered=False).sentence
+    assert "but not all: R06 with a fault" in said
+
+
+def test_what_is_called_off_says_whether_all_stand():
+    still, moving = (
+        of_start(begun(REFUSED, stopped=[a]), untethered=False) for a in (STANDS, GOOD)
+    )
+    assert "All stand." in still.sentence and "NOT ALL STAND: R01" in moving.sentence
+
+
+def test_a_robot_that_was_never_heard_is_said_so_with_what_to_do():
+    said = of_stop([UNHEARD, STANDS]).sentence
+    assert "R05: was never heard." in said and "--host" in said
+
+
+answers = st.builds(
+    answer,
+    st.integers(0, 99),
+    accepted=st.sampled_from([True, False, None]),
+    signed=st.booleans(),
+    reason=st.sampled_from(["", NEVER_HEARD, "no behaviour 'x'"]),
+    mode=st.sampled_from(["", "stopped", "running", "script", "fault"]),
+    stands=st.booleans(),
+    is_double=st.booleans(),
+)
+
+
+@given(st.lists(answers, max_size=4))
+def test_all_stand_is_said_with_code_0_and_only_of_robots_that_have_signed_it(given):
+    verdict = of_stop(given)
+    assert verdict.ok == (verdict.sentence == "All stand.")
+    sure = [a.accepted and a.signed and a.stands and not a.is_double for a in given]
+    assert verdict.ok == (bool(given) and all(sure))
+
+
+@given(st.lists(answers, min_size=1, max_size=4))
+def test_a_start_is_well_only_where_all_have_signed_it_and_drive(given):
+    verdict = of_start(begun(*given), untethered=False)
+    drive = [a.accepted and a.signed and a.mode in ("running", "script") for a in given]
+    assert (
+        verdict.ok
+        == all(drive)
+        == ("not all" not in verdict.sentence.lower() and "NOBODY" not in verdict.sentence)
+    )
+
+
+@pytest.mark.parametrize("verdict", [Verdict(True, "yes."), Verdict(False, "no.")])
+@pytest.mark.parametrize("last", [STANDS, REFUSED])
+def test_the_table_of_robots_changes_nothing_of_the_verdict(capsys, verdict, last):
+    """The last robot of the table had decided."""
+    given = [REFUSED, UNSIGNED, last]
+    assert swarm._finish("stop", given, verdict, {}, as_json=True) == verdict.code
+    data = json.loads(capsys.readouterr().out)
+    assert (data["ok"], data["sentence"]) == (verdict.ok, verdict.sentence)
+    assert swarm._finish("stop", given, verdict, {}, as_json=False) == verdict.code
+    assert verdict.sentence in capsys.readouterr().out
+
+
+def test_a_silent_robot_keeps_the_others_held():
+    assert not SILENT.stands and not SILENT.is_meant

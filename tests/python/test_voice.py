@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Words of a command that moves robots keep nobody waiting, and are missed when they fail."""
+
+import io
+import os
+import signal
+import time
+
+import pytest
+
+from twinmill.robots import tell
+from twinmill.robots.fleet import Fleet
+from twinmill.terminal import PlainConsole
+from twinmill_cli.swarm import ended_by_signals
+from twinmill_cli.voice import Voice
+
+BLOCKED_S = 0.3
+
+
+class SilentBus:
+    """Nobody speaks; what is said is counted."""
+
+    def __init__(self, _=""):
+        self.said = 0
+
+    def subscribe(self, *_):
+        pass
+
+    def publish(self, *_):
+        self.said += 1
+
+    def handle_timeout(self, timeout_ms):
+        time.sleep(timeout_ms / 1e3)
+        return False
+
+
+@pytest.fixture
+def voice():
+    voice = Voice()
+    yield voice
+    voice.end(0)
+
+
+def wait_until_idle(voice):
+    end_s = time.monotonic() + 10
+    while not voice.is_idle and time.monotonic() < end_s:
+        time.sleep(0.01)
+
+
+def test_who_gives_words_never_waits_until_they_are_written(voice):
+    """As at a halted terminal: the writer blocks in a pipe until somebody reads it."""
+    reads, writes = os.pipe()
+    begin_s = time.monotonic()
+    voice.tell(lambda: os.write(writes, b"x" * 1_000_000))
+    voice.say("another word")
+    assert time.monotonic() - begin_s < BLOCKED_S and not voice.is_idle
+    time.sleep(BLOCKED_S)
+    assert not voice.is_idle
+    while not voice.is_idle:
+        os.read(reads, 1_000_000)
+    os.close(reads)
+    os.close(writes)
+    voice.check()
+
+
+def test_words_that_fail_are_noticed_and_those_behind_them_are_told(voice):
+    told = []
+
+    def full():
+        raise OSError(28, "No space left on device")
+
+    voice.tell(full)
+    voice.tell(lambda: told.append("all stand"))
+    wait_until_idle(voice)
+    assert told == ["all stand"]
+    with pytest.raises(OSError, match="No space left"):
+        voice.check()
+
+
+def test_a_table_that_cannot_be_drawn_is_noticed(voice):
+    """It had gone on as a picture of the moment at which its thread ended."""
+
+    class Broken:
+        def __rich_console__(self, *_):
+            raise KeyError("broken")
+
+    voice._console = PlainConsole(file=io.StringIO(), force_terminal=True)
+    voice.show(Broken)
+    wait_until_idle(voice)
+    with pytest.raises(ValueError, match="broken"):
+        voice.check()
+
+
+def test_signals_end_waiting_and_no_stop():
+    """A second Ctrl-C, too, leaves the stop to be said to its end."""
+    fleet, rang = Fleet("", connect=SilentBus, key=bytes(32)), []
+
+    def ring():
+        rang.append(os.kill(os.getpid(), signal.SIGINT))
+
+    with ended_by_signals(fleet, lambda: None):
+        ring()
+        with pytest.raises(KeyboardInterrupt):
+            fleet.listen(5)
+        said = fleet.bus.said
+        begin_s = time.monotonic()
+        given = tell.stop(fleet, {1}, timeout_s=0.5, waiting=lambda _: ring())
+    assert time.monotonic() - begin_s >= 0.5 and len(rang) == 2
+    assert fleet.bus.said > said + 5 and not given[0].stands
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_name_that_is_looked_up_for_long_keeps_no_stop_waiting(monkeypatch):
+    monkeypatch.setattr("socket.gethostbyname", lambda _: time.sleep(2))
+    fleet = Fleet("", connect=SilentBus)
+    begin_s = time.monotonic()
+    tell.stop(fleet, {1}, timeout_s=0.5, hosts=["robot03.local"])
+    assert time.monotonic() - begin_s < 1.5 and fleet.bus.said > 5

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of robots: what each answered, and how each is."""
+
+from __future__ import annotations
+
+import time
+
+from rich import box
+from rich.table import Table
+from rich.text import Text
+
+from twinmill.robots.fleet import Robot
+from twinmill.robots.tell import Answer
+from twinmill.terminal import Fitting
+
+CLOCK_WARN_S = 0.05
+
+
+def answer_table(given: list[Answer]) -> Fitting:
+    """One row a robot: what it answered to a command."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for column in ("robot", "acknowledged", "now"):
+        table.add_column(column)
+    for answer in given:
+        obeyed = answer.accepted and answer.signed
+        said = Text("yes", "green") if obeyed else Text(f"no: {answer.reason}", "red")
+        now = Text("; ".join([answer.mode or "?", *answer.alarms]), "red" if answer.alarms else "")
+        table.add_row(f"R{answer.robot_id:02d}", said, now)
+    return Fitting(table)
+
+
+def status_table(robots: list[Robot]) -> Fitting | Text:
+    """One row a robot: how it is."""
+    if not robots:
+        return Text("No robot is heard.")
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    for column in ("robot", "source", "version", "behaviour", "mode", "battery", "camera"):
+        table.add_column(column, no_wrap=True)
+    for column in ("sees", "clock", "silent"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("link", no_wrap=True)
+    table.add_column("alarms")
+    for robot in robots:
+        run = robot.run
+        silent_s = time.monotonic() - robot.heard_s
+        table.add_row(
+            f"R{robot.robot_id:02d}",
+            *map(Text, (run.source, run.version, run.behavior) if run else ("?", "?", "?")),
+            Text(robot.mode or "?", {"fault": "red", "running": "green"}.get(robot.mode, "")),
+            _battery(robot.telemetry),
+            Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
+            _sees(robot),
+            Text(
+                f"{round(robot.clock_s, 2) + 0:+.2f} s",
+                "red" if abs(robot.clock_s) > CLOCK_WARN_S else "",
+            ),
+            Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
+            _link(robot),
+            Text("; ".join(robot.alarms), "bold red"),
+        )
+    return Fitting(table)
+
+
+def _link(robot: Robot) -> Text:
+    """What it has signed of how it may be commanded."""
+    if not robot.link:
+        return Text("not signed", "red")
+    if not robot.is_armed:
+        return Text("stopped: arm it", "yellow")
+    return Text({None: "armed", True: "held", False: "untethered"}[robot.is_tethered])
+
+
+def _battery(telemetry) -> Text:
+    if telemetry is None or telemetry.battery_V != telemetry.battery_V:
+        return Text("?")
+    low = telemetry.status_flags & telemetry.STATUS_BATTERY_LOW
+    return Text(f"{telemetry.battery_V:.2f} V{' LOW' if low else ''}", "red" if low else "")
+
+
+def _sees(robot: Robot) -> Text:
+    if not robot.recent:
+        return Text("?")
+    mark = "● " if robot.telemetry.detected else "○ "
+    return Text(f"{mark}{100 * robot.detected_frac:.0f} %")

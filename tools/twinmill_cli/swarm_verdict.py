@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What came of a command to a swarm, once: sentence, exit code and `ok` follow from one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from twinmill.robots.hold import State
+from twinmill.robots.tell import NEVER_HEARD, Answer, Start
+
+DRIVING = ("running", "script")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Did it go as it was meant?
+
+    Attributes:
+        ok: it did, and exit code and JSON say so.
+        sentence: what a person reads of it.
+    """
+
+    ok: bool
+    sentence: str
+
+    @property
+    def code(self) -> int:
+        """The command's exit code."""
+        return 0 if self.ok else 1
+
+
+def of_stop(given: list[Answer], timeout_s: float = 10.0) -> Verdict:
+    """All stand, or which robots must be stopped by hand."""
+    hint = "Where the network carries no multicast, give a robot's address: swarm stop --host."
+    if not given:
+        words = f"No robot was heard in {timeout_s:g} s; stop was said all the time. {hint}"
+        return Verdict(False, words)
+    double = [a for a in given if a.is_double]
+    unconfirmed = [a for a in given if not ((a.accepted and a.signed and a.stands) or a.is_double)]
+    if not double and not unconfirmed:
+        return Verdict(True, "All stand.")
+    told = [f"{_names(unconfirmed)}: no stop was confirmed"] if unconfirmed else []
+    told += [f"{_names(double)}: two robots have this number, one may drive"] if double else []
+    words = f"NOT ALL STAND: {'; '.join(told)}. SWITCH OFF BY HAND what still drives."
+    unheard = [a for a in unconfirmed if a.reason == NEVER_HEARD]
+    return Verdict(False, f"{words} {_names(unheard)}: {NEVER_HEARD}. {hint}" if unheard else words)
+
+
+def of_arm(given: list[Answer]) -> Verdict:
+    """Who may be started."""
+    wrong = _disobeyed(given)
+    if wrong:
+        return Verdict(False, f"Not all are armed: {_names(wrong)} did not obey, see above.")
+    return Verdict(True, "All are armed.")
+
+
+def of_select(given: list[Answer], behavior: str) -> Verdict:
+    """Who does what was chosen."""
+    wrong = _disobeyed(given)
+    if wrong:
+        words = f"Not all did: {_names(wrong)} did not obey, see above{_hint(given)}."
+        return Verdict(False, words)
+    return Verdict(True, f"All chose {behavior}.")
+
+
+def of_start(begun: Start, untethered: bool) -> Verdict:
+    """Who drives."""
+    given = begun.answers
+    if begun.called_off:
+        return Verdict(
+            False,
+            f"Called off: {_why(given)}. All were told to stop: {of_stop(begun.stopped).sentence} "
+            "They must be armed before they start (--arm); --partial starts some.",
+        )
+    going_on = "They drive on by themselves." if untethered else "Ctrl-C stops them."
+    at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
+    faulty = [a for a in given if a.mode == "fault"]
+    idle = [a for a in given if a.mode not in (*DRIVING, "fault")]
+    if len(idle) == len(_disobeyed(given)) == len(given):
+        return Verdict(False, f"NOBODY STARTED: {_why(given)}.")
+    unsure = [a for a in _disobeyed(given) if a.mode in DRIVING]
+    told = [
+        f"{_names(faulty)} with a fault, and will drive once it is over" if faulty else "",
+        f"{_names(idle)} did not" if idle else "",
+        f"{_names(unsure)} drive without having confirmed it" if unsure else "",
+    ]
+    if not any(told):
+        return Verdict(True, f"Started at {at}. {going_on}")
+    missing = "; ".join(filter(None, told))
+    return Verdict(False, f"Started at {at}, but not all: {missing}, see above. {going_on}")
+
+
+def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | None) -> Verdict:
+    """What came of robots that were held.
+
+    Args:
+        begun: what came of their start; None: nobody knows, it was ended before.
+        states: what was seen of each last, before they were stopped.
+        stopped: what came of the stop; None: all stood by themselves before.
+    """
+    if stopped and not stopped.ok:
+        return stopped
+    early: dict[State, list[str]] = {}
+    for name, state in states.items():
+        if state.stands and not (stopped and state.is_meant):
+            early.setdefault(state, []).append(name)
+    told = [f"{', '.join(names)}: {state.words}" for state, names in early.items()]
+    if begun is None:
+        told.append("the start was ended before all had confirmed it")
+    elif not begun.ok:
+        told.append("not all had started")
+    ok = begun is not None and begun.ok and all(state.is_meant for state in early)
+    if not told:
+        return Verdict(ok, "All stand.")
+    return Verdict(ok, f"All stand{', but' if stopped else ':'} {'; '.join(told)}.")
+
+
+def _disobeyed(given: list[Answer]) -> list[Answer]:
+    return [a for a in given if not (a.accepted and a.signed)]
+
+
+def _names(given: list[Answer]) -> str:
+    return ", ".join(f"R{a.robot_id:02d}" for a in given)
+
+
+def _why(given: list[Answer]) -> str:
+    """Why not all start."""
+    refused = [a for a in given if a.accepted is False]
+    if refused:
+        return f"{_names(refused)} refused, see above{_hint(given)}"
+    return f"{_names(_disobeyed(given))} did not acknowledge in time"
+
+
+def _hint(given: list[Answer]) -> str:
+    unknown = any(a.reason.startswith("no behaviour") for a in given)
+    return "; `twinmill flash --behaviors FILE` brings tables to robots" if unknown else ""

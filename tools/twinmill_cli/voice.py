@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Words and tables of a command that moves robots, written by a thread that it never waits for.
+
+A terminal that is halted (Ctrl-S), a full pipe or a slow disk keep only that thread waiting: the
+robots hear their operator, and his stop, all the same.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from queue import Queue
+from typing import TYPE_CHECKING
+
+from rich.live import Live
+from rich.text import Text
+
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill.terminal import PlainConsole
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+SHOW_PERIOD_S = 0.25
+
+
+class Voice:
+    """A thread that writes, in order, what it is given.
+
+    Attributes:
+        failure: why something could not be written, as a disk that is full; None: all was.
+    """
+
+    def __init__(self) -> None:
+        self.failure: Exception | None = None
+        self._waiting: Queue[Callable[[], None] | None] = Queue()
+        self._console = PlainConsole(stderr=True)
+        self._live: Live | None = None
+        self._newest: RenderableType = ""
+        self._shown_s = 0.0
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def tell(self, write: Callable[[], None]) -> None:
+        """Has a function called that writes."""
+        self._waiting.put(write)
+
+    def say(self, sentence: str) -> None:
+        """A sentence on stderr, above what is shown there."""
+        words = Text(f"twinmill: {plain_line(sentence, MESSAGE_MAX)}")
+        self.tell(lambda: self._console.print(words, soft_wrap=True))
+
+    def show(self, make: Callable[[], RenderableType]) -> None:
+        """Draws at the end of a terminal, in the place of what was drawn before; nowhere else.
+
+        Args:
+            make: called at once, and only where it is time for another picture.
+        """
+        now_s = time.monotonic()
+        if not self._console.is_terminal or now_s < self._shown_s + SHOW_PERIOD_S:
+            return
+        self._newest, self._shown_s = make(), now_s
+        if self.is_idle:
+            self.tell(self._draw)
+
+    def _draw(self) -> None:
+        if self._live is None:
+            self._live = Live(
+                console=self._console,
+                auto_refresh=False,
+                transient=True,
+                redirect_stdout=False,
+                redirect_stderr=False,
+            )
+            self._live.start()
+        self._live.update(self._newest, refresh=True)
+
+    def clear(self) -> None:
+        """Takes away what is shown: it is no longer so."""
+        self.tell(self._clear)
+
+    def _clear(self) -> None:
+        if self._live:
+            self._live.stop()
+            self._live = None
+
+    def _run(self) -> None:
+        while write := self._waiting.get():
+            try:
+                write()
+            except Exception as error:  # what follows may be of another stream
+                self.failure = self.failure or error
+            self._waiting.task_done()
+
+    @property
+    def is_idle(self) -> bool:
+        """All is written."""
+        return self._waiting.unfinished_tasks == 0
+
+    def check(self) -> None:
+        """Raises OSError or ValueError if anything could not be written."""
+        if isinstance(self.failure, OSError):
+            raise self.failure
+        if self.failure:
+            raise ValueError(f"what is to be told cannot be: {self.failure}") from self.failure
+
+    def end(self, code: int) -> None:
+        """Waits until all is written. Who does not want to wait any more (Ctrl-C) need not.
+
+        Args:
+            code: with which the program then ends at once.
+        """
+        self._waiting.put(None)
+        try:
+            self._thread.join()
+        except KeyboardInterrupt:
+            os._exit(code)  # the thread may hold what the interpreter would wait for
