@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests of firmware/radio/lcm_packet.c. The format is LCM's own: "LC02", four bytes of count, the
 // channel and its 0, the message (lcm-proj.github.io, "UDP multicast protocol description"). All
-// packets here are read or refused by liblcm 1.3.1 and 1.5.3, too; what else may come is left to the
-// fuzzers, which make it up as they run.
+// packets here are read or refused by liblcm 1.3.1 and 1.5.3, too; what else may come is left to
+// the fuzzers, which make it up as they run.
 #include "radio/lcm_packet.h"
 
 #include <stdlib.h>
@@ -61,8 +61,7 @@ static void test_channel_too_long_is_no_message(void)
 // A whole message as LC03: count 1, size 4, offset 0, fragment 0 of 1.
 static void test_fragment_is_no_message(void)
 {
-    TEST_ASSERT_FALSE(
-        read_block("LC03\0\0\0\1\0\0\0\4\0\0\0\0\0\0\0\1SWARM_COMMAND\0data", 38));
+    TEST_ASSERT_FALSE(read_block("LC03\0\0\0\1\0\0\0\4\0\0\0\0\0\0\0\1SWARM_COMMAND\0data", 38));
 }
 
 int main(void)
