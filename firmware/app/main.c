@@ -98,9 +98,8 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     const struct seal_key key = load_key(&options->config);
     if (reporter_start(&reporter, &options->config, &key, &link) != FW_OK)
     {
-        say("io_tsv: '%s': telemetry or log cannot be opened: %s", options->config.io_tsv,
-            strerror(errno));
-        return EXIT_USAGE;
+        say("the radio cannot be opened: %s", strerror(errno));
+        return 1;
     }
     int code = prepare(options, &loop, &devices, &link);
     if (code < 0)

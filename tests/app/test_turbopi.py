@@ -256,8 +256,12 @@ def test_io_tsv_is_read_by_the_importer(played):
 
 @pytest.mark.parametrize(
     "log",
-    [("--io-tsv", "/dev/full"), ("--lcm-url", "file:///nowhere/a.lcmlog?mode=w")],
-    ids=["full disk", "no folder"],
+    [
+        ("--io-tsv", "/dev/full"),
+        ("--io-tsv", "/nowhere/io.tsv"),
+        ("--lcm-url", "file:///nowhere/a.lcmlog?mode=w"),
+    ],
+    ids=["full disk", "no folder", "no folder for LCM"],
 )
 def test_log_that_cannot_be_written_is_told(tmp_path, log):
     frames = tmp_path / "frames.yuyv"
@@ -269,6 +273,20 @@ def test_log_that_cannot_be_written_is_told(tmp_path, log):
     )
     assert done.returncode == 4
     assert "rows of a log are lost" in done.stderr
+
+
+def test_robot_without_its_log_is_on_the_network_and_says_so(tmp_path):
+    """Its card is read-only, or has no such folder: it obeys, drives and tells all the same."""
+    log, lost = tmp_path / "a.lcmlog", turbopi.telemetry_t.STATUS_LOG_LOST
+    options = ("--lcm-url", f"file://{log}?mode=w", "--io-tsv", "/proc/io.tsv")
+    with Robot(TURBOPI, tmp_path, "--start", *options) as robot:
+        assert robot.wait_for(LEFT)
+        robot.process.terminate()
+        code, said = robot.end()
+    events = [e for e in lcm.EventLog(str(log), "r") if e.channel == "R00_TELEMETRY"]
+    flags = [turbopi.telemetry_t.decode(event.data).status_flags for event in events]
+    assert code == 4 and "io_tsv: /proc/io.tsv" in said
+    assert flags[-1] & lost
 
 
 LOGS = [("--io-tsv", "{}"), ("--lcm-url", "file://{}?mode=w")]
