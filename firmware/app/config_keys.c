@@ -30,7 +30,10 @@ const struct config_key config_keys[] = {
     TEXT(behaviors,
          "file of such tables, lines name = \"100,-0.5,100,0.5\", which commands can name; empty: "
          "none"),
-    YES_NO(autostart, "true: drive as soon as frames come; false: wait for button or command"),
+    YES_NO(
+        autostart,
+        "true: drive as soon as frames come, if run_dir can be written; false: wait for button or "
+        "command"),
     INTEGER(y_min, 0, 255, "target's colour, YUV of BT.601, both ends included"),
     INTEGER(y_max, 0, 255, "as above"),
     INTEGER(u_min, 0, 255, "as above"),

@@ -26,6 +26,7 @@ enum link_status
     LINK_STATUS_UNTETHERED = 1024,
     LINK_STATUS_LATCHED = 2048,
     LINK_STATUS_DOUBLE = 4096,
+    LINK_STATUS_LATCH_LOST = 8192,
 };
 
 // One control step: what telemetry says, and the counters that explain it.
@@ -69,6 +70,7 @@ struct link_ack
     bool accepted;
     // The motor board has taken zero for all wheels since.
     bool stands;
+    // Why it is not accepted, or what whoever sent it should know besides.
     char reason[LINK_REASON_MAX];
 };
 

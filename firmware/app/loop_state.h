@@ -11,6 +11,7 @@
 #include "hal/clock.h"
 #include "hal/motors.h"
 #include "hal/panel.h"
+#include "latch.h"
 #include "link.h"
 #include "own_tables.h"
 #include "watch.h"
@@ -71,9 +72,7 @@ struct loop_link
     // Answers of this step, which are told when the motor board has been.
     struct link_ack acks[LOOP_LINK_ACKS_MAX];
     int ack_count;
-    // File that says, to the next run of the program too, that the robot was stopped; empty: none.
-    char stopped_file[CONFIG_TEXT_MAX + 16];
-    bool stopped_file_is_there;
+    struct latch latch;
 };
 
 struct loop

@@ -82,6 +82,13 @@ static struct seal_key load_key(const struct app_config *config)
     return key;
 }
 
+// Without a person: only where a stop would have outlived the last run, and did not.
+static bool is_started(const struct options *options, const struct loop *loop)
+{
+    const bool keeps_stops = latch_works(&loop->operator_link.latch);
+    return !loop->filter.latched && (options->starts || (options->config.autostart && keeps_stops));
+}
+
 static int drive(const struct options *options, struct watch *watch, int stop_fd)
 {
     static struct loop loop;
@@ -108,7 +115,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         loop.watch = watch;
         loop.may_move = watch->may_move;
         loop.filter.latched = loop.filter.latched || watch->latched;
-        if (options->config.autostart && !loop.filter.latched)
+        if (is_started(options, &loop))
         {
             loop_start(&loop);
         }

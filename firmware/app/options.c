@@ -131,7 +131,7 @@ static bool apply(int code, struct options *options, enum options_action *action
         case OPTION_IO_TSV: return config_set(config, "io_tsv", optarg, error);
         case OPTION_LCM_URL: return config_set(config, "lcm_url", optarg, error);
         case OPTION_SET: return set_pair(config, optarg, error);
-        case OPTION_START: config->autostart = true; break;
+        case OPTION_START: options->starts = true; break;
         case 'n': options->dry_run = true; break;
         case OPTION_STOP: *action = OPTIONS_STOP; break;
         case OPTION_PRINT_CONFIG: *action = OPTIONS_PRINT_CONFIG; break;
@@ -230,7 +230,7 @@ enum options_action parse_options(int argc, char **argv, struct options *options
 {
     char error[CONFIG_ERROR_MAX] = "";
     enum options_action action = OPTIONS_RUN;
-    options->dry_run = false;
+    options->dry_run = options->starts = false;
     options->own.count = 0;
     options->is_whole = true;
     config_default(&options->config);

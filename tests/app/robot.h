@@ -229,7 +229,7 @@ static inline bool robot_tell_as_of(int64_t age_us, enum fw_verb verb, int64_t s
     robot_steps(1);
     TEST_ASSERT_EQUAL(acks + 1, robot.ack_count);
     TEST_ASSERT_EQUAL(seq, robot.ack.seq);
-    TEST_ASSERT_EQUAL(robot.ack.accepted, robot.ack.reason[0] == '\0');
+    TEST_ASSERT_TRUE(robot.ack.accepted || robot.ack.reason[0] != '\0');
     return robot.ack.accepted;
 }
 

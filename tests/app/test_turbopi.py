@@ -125,6 +125,23 @@ def test_dead_program_is_started_again(tmp_path):
         assert robot.children() not in ([], [first])
 
 
+def test_no_autostart_where_a_stop_could_not_be_kept_in_mind(tmp_path):
+    """What stopped it may have been forgotten: the robot waits, and says why."""
+    options = ("--set", "autostart=true", "--set")
+    with Robot(TURBOPI, tmp_path, *options, f"run_dir={tmp_path}") as robot:
+        assert robot.wait_for(LEFT)
+        robot.process.terminate()
+        robot.end()
+    robot.record.unlink()
+    with Robot(TURBOPI, tmp_path, *options, "run_dir=/proc") as robot:
+        assert robot.wait_for(ZERO) and wait_until(robot.rows)
+        time.sleep(1)
+        robot.process.terminate()
+        _, said = robot.end()
+    assert {duties for _, duties in robot.rows()} == {ZERO}
+    assert "run_dir: /proc" in said and "no autostart" in said
+
+
 def test_frozen_picture_stops_the_wheels_after_200_ms(driving):
     driving.camera.view = b""
     frozen_s = time.monotonic()
