@@ -55,6 +55,13 @@ void lcm_log_keep(char *url)
     }
 }
 
+bool lcm_log_is_same(const char *url, const char *other)
+{
+    const char *mode = lcm_log_is_meant(url) ? find_mode(url) : NULL;
+    return mode != NULL && strlen(url) == strlen(other) &&
+           strncmp(url, other, (size_t)(mode - url)) == 0;
+}
+
 void lcm_log_add(struct lcm_log *log, int64_t utime_us, const char *channel, const uint8_t *bytes,
                  uint32_t length)
 {

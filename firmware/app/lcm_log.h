@@ -22,6 +22,9 @@ bool lcm_log_open(struct lcm_log *log, const char *url);
 // Whoever opens it next goes on in it.
 void lcm_log_keep(char *url);
 
+// Tells whether two addresses are those of one log, whatever is to become of it.
+bool lcm_log_is_same(const char *url, const char *other);
+
 // Of one message.
 #define LCM_LOG_MAX_BYTES 8192
 // Writes one event. @param utime_us when its message was made.

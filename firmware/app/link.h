@@ -9,6 +9,7 @@
 #include "fw/command.h"
 #include "fw/step.h"
 #include "hal/camera.h"
+#include "radio/seal.h"
 
 #define LINK_NAME_MAX 48
 #define LINK_REASON_MAX 96
@@ -87,6 +88,8 @@ struct link
     int fd;
     // Of this run of the program: a random number that signed commands must name; 0: obeys none.
     int64_t session;
+    // Of this robot's key: see seal_name().
+    char key_name[SEAL_NAME_MAX];
 };
 
 #endif

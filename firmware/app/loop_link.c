@@ -81,13 +81,18 @@ static void keep_latch(struct loop *loop)
     latch_keep(&loop->operator_link.latch, loop->filter.latched, loop_now_us(loop));
 }
 
-// What is obeyed, and yet less than was asked for.
+// What whoever is obeyed should know besides.
 static void remark(const struct loop *loop, struct link_ack *ack)
 {
     if (ack->verb == FW_VERB_STOP && loop->operator_link.latch.is_lost)
     {
         (void)snprintf(ack->reason, sizeof ack->reason,
                        "obeyed, but forgotten when it is started anew: run_dir cannot be written");
+    }
+    else if (ack->verb == FW_VERB_ARM && ack->accepted)
+    {
+        (void)snprintf(ack->reason, sizeof ack->reason, "armed; the robot's key is %s",
+                       loop->link.key_name);
     }
 }
 

@@ -86,7 +86,8 @@ static struct seal_key load_key(const struct app_config *config)
 static bool is_started(const struct options *options, const struct loop *loop)
 {
     const bool keeps_stops = latch_works(&loop->operator_link.latch);
-    return !loop->filter.latched && (options->starts || (options->config.autostart && keeps_stops));
+    return !loop->filter.latched && !loop->watch->reloaded &&
+           (options->starts || (options->config.autostart && keeps_stops));
 }
 
 static int drive(const struct options *options, struct watch *watch, int stop_fd)
@@ -155,8 +156,6 @@ int main(int argc, char **argv)
 {
     static struct options options;
     take_standard_files();
-    options.command_line = argv[0];
-    options.command_line_bytes = (size_t)(argv[argc - 1] + strlen(argv[argc - 1]) - argv[0]);
     switch (parse_options(argc, argv, &options))
     {
         case OPTIONS_DONE: return 0;

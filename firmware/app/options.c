@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "fw/behavior.h"
+#include "say.h"
 
 #define DEFAULT_FILE "/etc/turbopi/turbopi.conf"
 
@@ -197,6 +198,7 @@ static bool wants_stop(int argc, char **argv)
 {
     bool stop = false;
     opterr = 0;
+    optind = 1;
     for (int code; (code = getopt_long(argc, argv, short_options, long_options, NULL)) != -1;)
     {
         stop = stop || code == OPTION_STOP;
@@ -230,6 +232,8 @@ enum options_action parse_options(int argc, char **argv, struct options *options
 {
     char error[CONFIG_ERROR_MAX] = "";
     enum options_action action = OPTIONS_RUN;
+    options->argc = argc;
+    options->argv = argv;
     options->dry_run = options->starts = false;
     options->own.count = 0;
     options->is_whole = true;
@@ -252,7 +256,7 @@ enum options_action parse_options(int argc, char **argv, struct options *options
     }
     if (!ok)
     {
-        (void)fprintf(stderr, "turbopi: %s\n", error);
+        say("%s", error);
         return OPTIONS_BAD;
     }
     return action;

@@ -29,9 +29,9 @@ struct options
     bool starts;
     // Nothing was left out because it could not be understood, as --stop does.
     bool is_whole;
-    // The command line's own memory, for a process that goes by another name.
-    char *command_line;
-    size_t command_line_bytes;
+    // The command line, to be read again.
+    int argc;
+    char **argv;
 };
 
 // Reads the command line over the configuration file over the defaults. A mistake is told on

@@ -169,7 +169,13 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
         release(reporter);
         return FW_ERR_IO;
     }
-    *link = (struct link){reporter, send_report, send_ack, receive, reporter->loop_fd, session};
+    *link = (struct link){.context = reporter,
+                          .send_report = send_report,
+                          .send_ack = send_ack,
+                          .receive = receive,
+                          .fd = reporter->loop_fd,
+                          .session = session};
+    seal_name(key, link->key_name);
     return FW_OK;
 }
 

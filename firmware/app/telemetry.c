@@ -120,6 +120,9 @@ static void publish_run(struct telemetry *telemetry, const struct link_report *r
                      " unsent; panel %s; commands ignored: %" PRIu32 "\n",
                      report->lost_report_count, telemetry->unsent_count,
                      report->panel_lost ? "lost" : "ok", report->ignored_count);
+    char key_name[SEAL_NAME_MAX];
+    seal_name(&telemetry->key, key_name);
+    used += snprintf(text + used, sizeof text - (size_t)used, "# key: %s\n", key_name);
     (void)config_print(telemetry->config, false, text + used, sizeof text - (size_t)used);
     char behavior[LINK_NAME_MAX];
     memcpy(behavior, report->behavior, sizeof behavior);

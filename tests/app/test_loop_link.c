@@ -43,6 +43,18 @@ static void test_stop_holds_until_armed(void)
     ASSERT_DUTIES(left_pct);
 }
 
+// Whose key is another is told which one counts, and who arms a robot which one did.
+static void test_answers_name_the_robots_key(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, ROBOT_KEY_NAME));
+    robot.command.order.seal = FW_SEAL_WRONG;
+    robot.has_command = true;
+    robot_steps(1);
+    TEST_ASSERT_FALSE(robot.ack.accepted);
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, ROBOT_KEY_NAME));
+}
+
 // Starts every 10 ms against one stop.
 static void test_flood_of_starts_does_not_undo_a_stop(void)
 {
@@ -217,6 +229,7 @@ int main(void)
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     UNITY_BEGIN();
     RUN_TEST(test_stop_holds_until_armed);
+    RUN_TEST(test_answers_name_the_robots_key);
     RUN_TEST(test_flood_of_starts_does_not_undo_a_stop);
     RUN_TEST(test_stop_from_the_future_locks_nobody_out);
     RUN_TEST(test_button_starts_a_robot_that_was_stopped);

@@ -106,7 +106,7 @@ def test_stop_option_stops_what_a_threefold_kill_left(driving):
     assert driving.duties() == ZERO
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
 def test_signal_stops_the_wheels_and_ends_well(driving, number):
     killed_s = time.monotonic()
     driving.process.send_signal(number)
@@ -403,6 +403,14 @@ def test_bus_commands_are_obeyed_and_acknowledged(bus_session):
     # To the instant: the first moving duties come at most one frame and some load later.
     assert 0 <= bus_session["start_delay_s"] < 0.033 + SLACK_S
     assert bus_session["stopped"]
+
+
+def test_key_that_was_changed_on_the_card_counts_after_sighup(bus_session):
+    """Who signs with the old one is told the new one's name; who has the new one arms."""
+    old, new = bus_session["armed"]["old key"], bus_session["armed"]["new key"]
+    assert old[0] is False and "signed with another key" in old[2]
+    assert new[:2] == [True, True]
+    assert bus_session["key_name"] in old[2] and bus_session["key_name"] in new[2]
 
 
 def test_network_that_goes_away_does_not_delay_the_loop(bus_session):
