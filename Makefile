@@ -64,6 +64,7 @@ rivals: build
 format: build
 	@scripts/lint --fix
 	@$(PYTHON) docs/site_hooks.py
+	@$(PYTHON) tests/app/test_states.py
 
 lint: build
 	@scripts/lint

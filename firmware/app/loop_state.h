@@ -14,6 +14,7 @@
 #include "latch.h"
 #include "link.h"
 #include "own_tables.h"
+#include "robot_state.h"
 #include "watch.h"
 
 #define LOOP_SCRIPT_MAX_ROWS 4096
@@ -86,6 +87,8 @@ struct loop
     const char *script_dir;
     // That commands can name.
     const struct own_tables *own;
+
+    enum robot_state state;
 
     // Lost parts, with what, and when they are tried again (monotonic).
     enum fw_err lost[LOOP_PART_COUNT];

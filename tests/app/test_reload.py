@@ -65,10 +65,9 @@ def hang_up(robot):
     """Returns how long the wheels turned on."""
     driver, begin_s = robot.children()[0], time.monotonic()
     robot.process.send_signal(signal.SIGHUP)
-    assert robot.wait_for(ZERO)
-    after_s = next(t for t, d in robot.rows() if d == ZERO and t > begin_s) - begin_s
     assert wait_until(lambda: robot.children() not in ([], [driver]))
-    return after_s
+    assert wait_until(lambda: robot.rows()[-1][0] > begin_s) and robot.wait_for(ZERO)
+    return next(t for t, d in robot.rows() if d == ZERO and t > begin_s) - begin_s
 
 
 def test_configuration_is_read_anew_while_the_robot_stands(driving, card):
