@@ -34,8 +34,8 @@ def check_size(packed: int, unpacked: int) -> None:
     """Raises UnpackError if so many packed bytes say that they are too many."""
     if unpacked > limit_of(packed):
         raise UnpackError(
-            f"{packed} bytes of it unpack to {unpacked} or more, over {MOST_RATIO} times as many and "
-            f"over {FREE_BYTES >> 20} MB; if that is right, write it without compression"
+            f"{packed} bytes of it unpack to {unpacked} or more, over {MOST_RATIO} times as many "
+            f"and over {FREE_BYTES >> 20} MB; if that is right, write it without compression"
         )
 
 
