@@ -44,9 +44,9 @@ demo:
 
 # Ourselves against named alternatives, which are installed into .deps, not .venv.
 bench: build
-	@cmp -s benchmarks/requirements.txt .deps/bench/requirements.txt || { rm -rf .deps/bench && \
-	    $(PYTHON) -m pip install --quiet --no-deps --target .deps/bench \
-	    --requirement benchmarks/requirements.txt && cp benchmarks/requirements.txt .deps/bench; }
+	@cmp -s benchmarks/requirements.lock .deps/bench/requirements.lock || { rm -rf .deps/bench && \
+	    $(PYTHON) -m pip install --quiet --no-deps --require-hashes --target .deps/bench \
+	    --requirement benchmarks/requirements.lock && cp benchmarks/requirements.lock .deps/bench; }
 	@cmake --build build --target bench bench_plant bench_sweep >/dev/null
 	@status=0; OPENBLAS_NUM_THREADS=1 PYTHONPATH=.deps/bench $(PYTHON) benchmarks/run.py || status=1; \
 	    build/bin/bench_sweep || status=1; build/bin/bench_plant || status=1; exit $$status
@@ -54,25 +54,27 @@ bench: build
 # Twinmill's diagnosis beside other ways to find what a model lacks, on the same sealed cases; about a
 # minute a case. It goes on where it was. RIVALS="--n 20 --json" and the like.
 rivals: build
-	@cmp -s benchmarks/rivals/requirements.txt .deps/rivals/requirements.txt || { \
-	    rm -rf .deps/rivals && $(PYTHON) -m pip install --quiet --no-deps --target .deps/rivals \
-	    --requirement benchmarks/rivals/requirements.txt && \
-	    cp benchmarks/rivals/requirements.txt .deps/rivals; }
+	@cmp -s benchmarks/rivals/requirements.lock .deps/rivals/requirements.lock || { \
+	    rm -rf .deps/rivals && $(PYTHON) -m pip install --quiet --no-deps --require-hashes \
+	    --target .deps/rivals --requirement benchmarks/rivals/requirements.lock && \
+	    cp benchmarks/rivals/requirements.lock .deps/rivals; }
 	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONPATH=benchmarks:.deps/rivals $(PYTHON) -m rivals \
 	    $(RIVALS)
 
 format: build
 	@scripts/lint --fix
 	@$(PYTHON) docs/site_hooks.py
+	@$(PYTHON) tests/app/test_states.py
+	@$(PYTHON) tests/python/test_packages.py
 
 lint: build
 	@scripts/lint
 
 # The documentation site in build/site; what it shows is run. Its generator goes into .deps.
 docs: build
-	@cmp -s docs/requirements.txt .deps/docs/requirements.txt || { rm -rf .deps/docs && \
-	    $(PYTHON) -m pip install --quiet --no-deps --target .deps/docs \
-	    --requirement docs/requirements.txt && cp docs/requirements.txt .deps/docs; }
+	@cmp -s docs/requirements.lock .deps/docs/requirements.lock || { rm -rf .deps/docs && \
+	    $(PYTHON) -m pip install --quiet --no-deps --require-hashes --target .deps/docs \
+	    --requirement docs/requirements.lock && cp docs/requirements.lock .deps/docs; }
 	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
 # One file to install with pip where there is no compiler: dist/twinmill-*.whl.

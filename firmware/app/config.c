@@ -130,7 +130,7 @@ bool config_set(struct app_config *config, const char *key, const char *value,
         return false;
     }
     char *field = (char *)config + found->offset;
-    switch (found->kind)
+    switch ((enum key_kind)found->kind)
     {
         case KEY_INTEGER: return set_integer(found, value, (int32_t *)(void *)field, error);
         case KEY_BOOL: return set_bool(found, value, (bool *)field, error);
@@ -182,7 +182,7 @@ static int print_value(const struct app_config *config, const struct config_key 
                        size_t size)
 {
     const char *field = (const char *)config + key->offset;
-    switch (key->kind)
+    switch ((enum key_kind)key->kind)
     {
         case KEY_INTEGER:
             return snprintf(text, size, "%s = %" PRId32 "\n", key->key,
@@ -201,7 +201,8 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
     for (size_t i = 0; i < config_key_count; ++i)
     {
         char entry[CONFIG_ERROR_MAX];
-        int length = with_docs ? snprintf(entry, sizeof entry, "# %s\n", config_keys[i].doc) : 0;
+        const char *doc = config_keys[i].key + strlen(config_keys[i].key) + 1;
+        int length = with_docs ? snprintf(entry, sizeof entry, "# %s\n", doc) : 0;
         length +=
             print_value(config, &config_keys[i], entry + length, sizeof entry - (size_t)length);
         if (used + (size_t)length >= size)

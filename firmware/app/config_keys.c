@@ -5,21 +5,19 @@
 
 #define FIELD(member) offsetof(struct app_config, member)
 #define INTEGER(name, lowest, highest, unit_and_doc) \
-    {.key = #name,                                   \
+    {.key = #name "\0" unit_and_doc,                 \
      .kind = KEY_INTEGER,                            \
      .offset = FIELD(name),                          \
      .min = lowest,                                  \
-     .max = highest,                                 \
-     .doc = unit_and_doc}
-#define TEXT(name, words) {.key = #name, .kind = KEY_TEXT, .offset = FIELD(name), .doc = words}
-#define YES_NO(name, words) {.key = #name, .kind = KEY_BOOL, .offset = FIELD(name), .doc = words}
+     .max = highest}
+#define TEXT(name, words) {.key = #name "\0" words, .kind = KEY_TEXT, .offset = FIELD(name)}
+#define YES_NO(name, words) {.key = #name "\0" words, .kind = KEY_BOOL, .offset = FIELD(name)}
 #define SIGN(name, wheel, words)                        \
-    {.key = name,                                       \
+    {.key = name "\0" words,                            \
      .kind = KEY_INTEGER,                               \
      .offset = FIELD(sign) + sizeof(int32_t) * (wheel), \
      .min = -1,                                         \
-     .max = 1,                                          \
-     .doc = words}
+     .max = 1}
 
 const struct config_key config_keys[] = {
     INTEGER(robot_id, 0, 99, "number of this robot, in the names of its channels"),
@@ -32,7 +30,10 @@ const struct config_key config_keys[] = {
     TEXT(behaviors,
          "file of such tables, lines name = \"100,-0.5,100,0.5\", which commands can name; empty: "
          "none"),
-    YES_NO(autostart, "true: drive as soon as frames come; false: wait for button or command"),
+    YES_NO(
+        autostart,
+        "true: drive as soon as frames come, if run_dir can be written; false: wait for button or "
+        "command"),
     INTEGER(y_min, 0, 255, "target's colour, YUV of BT.601, both ends included"),
     INTEGER(y_max, 0, 255, "as above"),
     INTEGER(u_min, 0, 255, "as above"),

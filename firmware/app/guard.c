@@ -34,9 +34,11 @@ static void change_name(const struct options *options)
 {
     static const char name[] = "wheelguard";
     (void)prctl(PR_SET_NAME, name);
-    memset(options->command_line, 0, options->command_line_bytes);
-    const size_t length = sizeof name < options->command_line_bytes ? sizeof name - 1 : 0;
-    memcpy(options->command_line, name, length);
+    char *line = options->argv[0];
+    const char *last = options->argv[options->argc - 1];
+    const size_t bytes = (size_t)(last + strlen(last) - line);
+    memset(line, 0, bytes);
+    memcpy(line, name, sizeof name < bytes ? sizeof name - 1 : 0);
 }
 
 static int64_t orphan_ms(struct guard *guard)

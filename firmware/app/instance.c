@@ -59,7 +59,7 @@ pid_t instance_holder(const char *path)
     return holder;
 }
 
-bool instance_take(const char *path, pid_t *holder)
+int instance_take(const char *path, pid_t *holder)
 {
     struct sockaddr_un address;
     const socklen_t length = address_of(path, &address);
@@ -71,7 +71,7 @@ bool instance_take(const char *path, pid_t *holder)
     {
         (void)close(fd);
     }
-    return taken;
+    return taken ? fd : -1;
 }
 
 // Reads the beginning of a small file of /proc. @return bytes read.

@@ -10,8 +10,9 @@
 #define INSTANCE_WHO_MAX 160
 
 // Takes a board, by its device's path, for this process and its children, until the last of them
-// has ended. @return false if another program has it, whose pid is then in holder (0: unknown).
-bool instance_take(const char *path, pid_t *holder);
+// has ended or closed the descriptor. @return the descriptor; -1 if another program has it, whose
+// pid is then in holder (0: unknown).
+int instance_take(const char *path, pid_t *holder);
 
 // @return pid of the program that has the board, 0 if there is none, -1 if it is not known.
 pid_t instance_holder(const char *path);

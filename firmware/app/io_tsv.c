@@ -10,7 +10,7 @@
 
 bool io_tsv_open(struct whole_file *log, const char *path, int32_t vote_frames)
 {
-    const bool ok = whole_file_open(log, "io_tsv", path, false);
+    bool ok = whole_file_open(log, "io_tsv", path, false);
     if (ok && lseek(log->fd, 0, SEEK_END) <= 0)
     {
         char row[ROW_MAX];
@@ -18,7 +18,12 @@ bool io_tsv_open(struct whole_file *log, const char *path, int32_t vote_frames)
                                     "time_ns\tdetected [0, 1]\tsmoothed_detected [0, 1] (%" PRId32
                                     ")\tmoves [(v, d, w), ...]\n",
                                     vote_frames);
-        whole_file_add(log, row, (size_t)length);
+        // Rows without their heading are no log.
+        ok = whole_file_add(log, row, (size_t)length);
+    }
+    if (!ok)
+    {
+        whole_file_close(log);
     }
     return ok;
 }
@@ -33,5 +38,5 @@ void io_tsv_add(struct whole_file *log, const struct link_report *report)
                  report->utime_us * 1000, out->detected_raw, out->detected,
                  (int32_t)labs(out->speed_input_pct), direction_deg,
                  out->turn_input_milli == 0 ? 0.0 : -out->turn_input_milli / 1000.0);
-    whole_file_add(log, row, (size_t)length);
+    (void)whole_file_add(log, row, (size_t)length);
 }

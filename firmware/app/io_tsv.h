@@ -7,7 +7,7 @@
 #include "whole_file.h"
 
 // Goes on in a log that is there, or begins one. @param vote_frames of the smoothed column.
-// @return false and errno on failure.
+// @return false on failure, which is told once: then it is not open, and may be tried again.
 bool io_tsv_open(struct whole_file *log, const char *path, int32_t vote_frames);
 
 // Writes one row: Unix time in ns, the frame's bit, the vote's bit, and the move as the vendor says

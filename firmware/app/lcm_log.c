@@ -2,7 +2,6 @@
 #include "lcm_log.h"
 
 #include <endian.h>
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -37,14 +36,14 @@ bool lcm_log_open(struct lcm_log *log, const char *url)
     const char *mode = find_mode(url);
     if (mode == NULL)
     {
-        errno = EINVAL;
         return false;
     }
     char path[512];
     const char *begin = url + strlen(SCHEME);
     (void)snprintf(path, sizeof path, "%.*s", (int)(mode - strlen(MODE) - begin), begin);
     log->event_count = 0;
-    return whole_file_open(&log->file, "lcm_url", path, *mode == 'w');
+    (void)whole_file_open(&log->file, "lcm_url", path, *mode == 'w');
+    return true;
 }
 
 void lcm_log_keep(char *url)
@@ -54,6 +53,13 @@ void lcm_log_keep(char *url)
     {
         url[mode - url] = 'a';
     }
+}
+
+bool lcm_log_is_same(const char *url, const char *other)
+{
+    const char *mode = lcm_log_is_meant(url) ? find_mode(url) : NULL;
+    return mode != NULL && strlen(url) == strlen(other) &&
+           strncmp(url, other, (size_t)(mode - url)) == 0;
 }
 
 void lcm_log_add(struct lcm_log *log, int64_t utime_us, const char *channel, const uint8_t *bytes,
@@ -71,5 +77,5 @@ void lcm_log_add(struct lcm_log *log, int64_t utime_us, const char *channel, con
     memcpy(event, &head, sizeof head);
     memcpy(event + sizeof head, channel, channel_length);
     memcpy(event + sizeof head + channel_length, bytes, length);
-    whole_file_add(&log->file, event, sizeof head + channel_length + length);
+    (void)whole_file_add(&log->file, event, sizeof head + channel_length + length);
 }

@@ -16,11 +16,14 @@ struct lcm_log
 bool lcm_log_is_meant(const char *url);
 
 // @param url file://PATH?mode=w begins a log, mode=a goes on in one.
-// @return false and errno on failure: EINVAL for another address.
+// @return false if it is another address. A file that cannot be opened is told, and tried again.
 bool lcm_log_open(struct lcm_log *log, const char *url);
 
 // Whoever opens it next goes on in it.
 void lcm_log_keep(char *url);
+
+// Tells whether two addresses are those of one log, whatever is to become of it.
+bool lcm_log_is_same(const char *url, const char *other);
 
 // Of one message.
 #define LCM_LOG_MAX_BYTES 8192

@@ -9,6 +9,7 @@
 #include "fw/command.h"
 #include "fw/step.h"
 #include "hal/camera.h"
+#include "radio/seal.h"
 
 #define LINK_NAME_MAX 48
 #define LINK_REASON_MAX 96
@@ -26,6 +27,7 @@ enum link_status
     LINK_STATUS_UNTETHERED = 1024,
     LINK_STATUS_LATCHED = 2048,
     LINK_STATUS_DOUBLE = 4096,
+    LINK_STATUS_LATCH_LOST = 8192,
 };
 
 // One control step: what telemetry says, and the counters that explain it.
@@ -69,6 +71,7 @@ struct link_ack
     bool accepted;
     // The motor board has taken zero for all wheels since.
     bool stands;
+    // Why it is not accepted, or what whoever sent it should know besides.
     char reason[LINK_REASON_MAX];
 };
 
@@ -85,6 +88,8 @@ struct link
     int fd;
     // Of this run of the program: a random number that signed commands must name; 0: obeys none.
     int64_t session;
+    // Of this robot's key: see seal_name().
+    char key_name[SEAL_NAME_MAX];
 };
 
 #endif

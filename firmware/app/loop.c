@@ -174,14 +174,31 @@ static bool is_guarded(const struct loop *loop)
             watch_silent_ms(loop->watch, WATCH_GUARD) <= loop->watchdog_ms);
 }
 
-static bool must_stand_still(const struct loop *loop)
+// All that hold; whether the newest frame is fresh the core knows.
+static uint8_t conditions(const struct loop *loop, bool is_fresh)
 {
-    bool still = loop->battery_low || !is_guarded(loop);
-    for (int part = 0; part < LOOP_PART_COUNT; ++part)
+    const enum fw_err *lost = loop->lost;
+    const bool holds[] = {
+        [ROBOT_BOARD_CONFIRMS] = lost[LOOP_BOARD] == FW_OK,
+        [ROBOT_CAMERA_WORKS] = lost[LOOP_CAMERA] == FW_OK,
+        [ROBOT_FRAME_FRESH] = is_fresh,
+        [ROBOT_BATTERY_OK] = !loop->battery_low,
+        [ROBOT_PARTS_ANSWER] = lost[LOOP_BATTERY] == FW_OK && lost[LOOP_PANEL] == FW_OK,
+        [ROBOT_GUARDED] = is_guarded(loop),
+        [ROBOT_WISHED] = loop->running,
+    };
+    _Static_assert(sizeof holds / sizeof holds[0] == ROBOT_CONDITION_COUNT, "each is looked at");
+    uint8_t set = 0;
+    for (int i = 0; i < ROBOT_CONDITION_COUNT; ++i)
     {
-        still = still || loop->lost[part] != FW_OK;
+        set |= holds[i] ? ROBOT_BIT(i) : 0;
     }
-    return still;
+    return set;
+}
+
+static bool may_drive(const struct loop *loop)
+{
+    return robot_next(loop->state, conditions(loop, true)) == ROBOT_DRIVING;
 }
 
 static void decide_by_script(struct loop *loop, int64_t t_us, struct fw_output *out)
@@ -208,7 +225,7 @@ static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_ou
         loop_stop(loop);
         loop->script_over = true;
     }
-    fw_set_running(&loop->core, loop->running && !must_stand_still(loop));
+    fw_set_running(&loop->core, may_drive(loop));
     if (loop->running && loop->plays_script)
     {
         decide_by_script(loop, t_us, out);
@@ -217,13 +234,20 @@ static void decide(struct loop *loop, const struct fw_frame *frame, struct fw_ou
     {
         fw_step(&loop->core, frame, now, out);
     }
-    if (loop->running && must_stand_still(loop))
+}
+
+// What telemetry calls it, now that the board was told.
+static void settle_state(struct loop *loop, struct fw_output *out)
+{
+    const bool needs_frames = !(loop->running && loop->plays_script);
+    const bool is_fresh = !needs_frames || (out->status_flags & FW_STATUS_FRAME_STALE) == 0;
+    loop->state = robot_next(loop->state, conditions(loop, is_fresh));
+    if (loop->state != ROBOT_DRIVING)
     {
-        out->mode = FW_MODE_FAULT;
+        out->mode = loop->state == ROBOT_STANDING ? FW_MODE_STOPPED : FW_MODE_FAULT;
     }
 }
 
-// A board that was lost stands still in decide(), so that it is stopped once before it moves again.
 static void drive(struct loop *loop, struct fw_output *out)
 {
     const enum fw_err err = loop_drive(loop, out->wheel_duty_pct);
@@ -233,7 +257,6 @@ static void drive(struct loop *loop, struct fw_output *out)
         return;
     }
     loop_lose(loop, LOOP_BOARD, err);
-    out->mode = loop->running || loop->may_move ? FW_MODE_FAULT : FW_MODE_STOPPED;
     memcpy(out->wheel_duty_pct, loop->wheel_duty_pct, sizeof out->wheel_duty_pct);
 }
 
@@ -281,7 +304,7 @@ static void beat(const struct loop *loop)
 // Before anything that may take its time, such as opening a camera.
 static void stand_first(struct loop *loop)
 {
-    const enum fw_err err = loop->may_move && must_stand_still(loop) ? loop_halt(loop) : FW_OK;
+    const enum fw_err err = loop->may_move && !may_drive(loop) ? loop_halt(loop) : FW_OK;
     if (err != FW_OK && loop->lost[LOOP_BOARD] == FW_OK)
     {
         loop->lost[LOOP_BOARD] = err;
@@ -300,6 +323,7 @@ void loop_step(struct loop *loop)
     const bool has_frame = take_frame(loop, &frame);
     decide(loop, has_frame ? &frame : NULL, &out);
     drive(loop, &out);
+    settle_state(loop, &out);
     loop_link_tell(loop);
     report(loop, &out, begin_us);
     loop_update_panel(loop, out.detected);

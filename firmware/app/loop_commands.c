@@ -170,7 +170,9 @@ static void answer(struct loop *loop, const struct link_command *command)
     const enum fw_verdict verdict =
         fw_command_judge(&loop->filter, order, hal_clock_unix_us(&loop->devices.clock),
                          loop_link_session_us(loop), loop->running);
-    (void)snprintf(ack.reason, sizeof ack.reason, "%s", fw_verdict_str(verdict));
+    const bool is_forged = verdict == FW_VERDICT_FORGED;
+    (void)snprintf(ack.reason, sizeof ack.reason, is_forged ? "%s this robot's is %s" : "%s",
+                   fw_verdict_str(verdict), loop->link.key_name);
     const bool obeyed = verdict == FW_VERDICT_OBEY && obey(loop, command, ack.reason);
     if (obeyed)
     {

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "loop_link.h"
 
-#include <fcntl.h>
 #include <stdio.h>
-#include <unistd.h>
 
 void loop_link_init(struct loop *loop, const struct app_config *config)
 {
@@ -13,14 +11,7 @@ void loop_link_init(struct loop *loop, const struct app_config *config)
         .configured_timeout_ms = config->link_timeout_ms,
     };
     loop->filter.session = loop->link.session;
-    if (config->run_dir[0] != '\0')
-    {
-        (void)snprintf(state->stopped_file, sizeof state->stopped_file, "%s/stopped",
-                       config->run_dir);
-    }
-    state->stopped_file_is_there =
-        state->stopped_file[0] != '\0' && access(state->stopped_file, F_OK) == 0;
-    loop->filter.latched = state->stopped_file_is_there;
+    loop->filter.latched = latch_open(&state->latch, config->run_dir, loop_now_us(loop));
 }
 
 int64_t loop_link_session_us(const struct loop *loop)
@@ -83,43 +74,42 @@ static bool stands(const struct loop *loop)
 // where the program is run by hand, only its own processes know of the stop.
 static void keep_latch(struct loop *loop)
 {
-    struct loop_link *state = &loop->operator_link;
     if (loop->watch != NULL)
     {
         loop->watch->latched = loop->filter.latched;
     }
-    if (state->stopped_file[0] == '\0' || state->stopped_file_is_there == loop->filter.latched)
+    latch_keep(&loop->operator_link.latch, loop->filter.latched, loop_now_us(loop));
+}
+
+// What whoever is obeyed should know besides.
+static void remark(const struct loop *loop, struct link_ack *ack)
+{
+    if (ack->verb == FW_VERB_STOP && loop->operator_link.latch.is_lost)
     {
-        return;
+        (void)snprintf(ack->reason, sizeof ack->reason,
+                       "obeyed, but forgotten when it is started anew: run_dir cannot be written");
     }
-    if (!loop->filter.latched)
+    else if (ack->verb == FW_VERB_ARM && ack->accepted)
     {
-        state->stopped_file_is_there = false;
-        (void)unlink(state->stopped_file);
-        return;
-    }
-    // In every step until there is room for it.
-    const int fd = open(state->stopped_file, O_WRONLY | O_CREAT | O_CLOEXEC, 0644);
-    state->stopped_file_is_there = fd >= 0;
-    if (fd >= 0)
-    {
-        (void)close(fd);
+        (void)snprintf(ack->reason, sizeof ack->reason, "armed; the robot's key is %s",
+                       loop->link.key_name);
     }
 }
 
 void loop_link_tell(struct loop *loop)
 {
     struct loop_link *state = &loop->operator_link;
+    keep_latch(loop);
     for (int i = 0; i < state->ack_count; ++i)
     {
         struct link_ack *ack = &state->acks[i];
+        remark(loop, ack);
         ack->stands = stands(loop);
         ack->utime_us = hal_clock_unix_us(&loop->devices.clock);
         ack->session_us = loop_link_session_us(loop);
         loop->link.send_ack(loop->link.context, ack);
     }
     state->ack_count = 0;
-    keep_latch(loop);
 }
 
 void loop_link_report(const struct loop *loop, struct link_report *report)
@@ -132,5 +122,6 @@ void loop_link_report(const struct loop *loop, struct link_report *report)
     report->link_timeout_ms = state->timeout_ms;
     report->status_flags |= (state->lost ? LINK_STATUS_LINK_LOST : 0) |
                             (untethered ? LINK_STATUS_UNTETHERED : 0) |
+                            (state->latch.is_lost ? LINK_STATUS_LATCH_LOST : 0) |
                             (loop->filter.latched ? LINK_STATUS_LATCHED : 0);
 }

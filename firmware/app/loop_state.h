@@ -11,8 +11,10 @@
 #include "hal/clock.h"
 #include "hal/motors.h"
 #include "hal/panel.h"
+#include "latch.h"
 #include "link.h"
 #include "own_tables.h"
+#include "robot_state.h"
 #include "watch.h"
 
 #define LOOP_SCRIPT_MAX_ROWS 4096
@@ -71,9 +73,7 @@ struct loop_link
     // Answers of this step, which are told when the motor board has been.
     struct link_ack acks[LOOP_LINK_ACKS_MAX];
     int ack_count;
-    // File that says, to the next run of the program too, that the robot was stopped; empty: none.
-    char stopped_file[CONFIG_TEXT_MAX + 16];
-    bool stopped_file_is_there;
+    struct latch latch;
 };
 
 struct loop
@@ -87,6 +87,8 @@ struct loop
     const char *script_dir;
     // That commands can name.
     const struct own_tables *own;
+
+    enum robot_state state;
 
     // Lost parts, with what, and when they are tried again (monotonic).
     enum fw_err lost[LOOP_PART_COUNT];

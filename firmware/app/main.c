@@ -82,6 +82,14 @@ static struct seal_key load_key(const struct app_config *config)
     return key;
 }
 
+// Without a person: only where a stop would have outlived the last run, and did not.
+static bool is_started(const struct options *options, const struct loop *loop)
+{
+    const bool keeps_stops = latch_works(&loop->operator_link.latch);
+    return !loop->filter.latched && !loop->watch->reloaded &&
+           (options->starts || (options->config.autostart && keeps_stops));
+}
+
 static int drive(const struct options *options, struct watch *watch, int stop_fd)
 {
     static struct loop loop;
@@ -98,9 +106,8 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     const struct seal_key key = load_key(&options->config);
     if (reporter_start(&reporter, &options->config, &key, &link) != FW_OK)
     {
-        say("io_tsv: '%s': telemetry or log cannot be opened: %s", options->config.io_tsv,
-            strerror(errno));
-        return EXIT_USAGE;
+        say("the radio cannot be opened: %s", strerror(errno));
+        return 1;
     }
     int code = prepare(options, &loop, &devices, &link);
     if (code < 0)
@@ -109,7 +116,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
         loop.watch = watch;
         loop.may_move = watch->may_move;
         loop.filter.latched = loop.filter.latched || watch->latched;
-        if (options->config.autostart && !loop.filter.latched)
+        if (is_started(options, &loop))
         {
             loop_start(&loop);
         }
@@ -149,8 +156,6 @@ int main(int argc, char **argv)
 {
     static struct options options;
     take_standard_files();
-    options.command_line = argv[0];
-    options.command_line_bytes = (size_t)(argv[argc - 1] + strlen(argv[argc - 1]) - argv[0]);
     switch (parse_options(argc, argv, &options))
     {
         case OPTIONS_DONE: return 0;

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "fw/behavior.h"
+#include "say.h"
 
 #define DEFAULT_FILE "/etc/turbopi/turbopi.conf"
 
@@ -131,7 +132,7 @@ static bool apply(int code, struct options *options, enum options_action *action
         case OPTION_IO_TSV: return config_set(config, "io_tsv", optarg, error);
         case OPTION_LCM_URL: return config_set(config, "lcm_url", optarg, error);
         case OPTION_SET: return set_pair(config, optarg, error);
-        case OPTION_START: config->autostart = true; break;
+        case OPTION_START: options->starts = true; break;
         case 'n': options->dry_run = true; break;
         case OPTION_STOP: *action = OPTIONS_STOP; break;
         case OPTION_PRINT_CONFIG: *action = OPTIONS_PRINT_CONFIG; break;
@@ -197,6 +198,7 @@ static bool wants_stop(int argc, char **argv)
 {
     bool stop = false;
     opterr = 0;
+    optind = 1;
     for (int code; (code = getopt_long(argc, argv, short_options, long_options, NULL)) != -1;)
     {
         stop = stop || code == OPTION_STOP;
@@ -230,7 +232,9 @@ enum options_action parse_options(int argc, char **argv, struct options *options
 {
     char error[CONFIG_ERROR_MAX] = "";
     enum options_action action = OPTIONS_RUN;
-    options->dry_run = false;
+    options->argc = argc;
+    options->argv = argv;
+    options->dry_run = options->starts = false;
     options->own.count = 0;
     options->is_whole = true;
     config_default(&options->config);
@@ -252,7 +256,7 @@ enum options_action parse_options(int argc, char **argv, struct options *options
     }
     if (!ok)
     {
-        (void)fprintf(stderr, "turbopi: %s\n", error);
+        say("%s", error);
         return OPTIONS_BAD;
     }
     return action;

@@ -24,11 +24,14 @@ struct options
     // Of the file that the configuration names, and its own table under its behaviour's name.
     struct own_tables own;
     bool dry_run;
+    // Who runs the program starts the robot by that, and sees it; autostart in the configuration
+    // asks for a stop that outlives the program.
+    bool starts;
     // Nothing was left out because it could not be understood, as --stop does.
     bool is_whole;
-    // The command line's own memory, for a process that goes by another name.
-    char *command_line;
-    size_t command_line_bytes;
+    // The command line, to be read again.
+    int argc;
+    char **argv;
 };
 
 // Reads the command line over the configuration file over the defaults. A mistake is told on

@@ -10,6 +10,7 @@
 
 #define STACK_BYTES (256 * 1024)
 #define LONGEST_WAIT_MS 500
+#define LOG_PERIOD_US 2000000
 
 // From the loop to the thread.
 struct message
@@ -58,6 +59,19 @@ static int64_t monotonic_us(void)
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
+// A log that cannot be opened, as on a card that is full or read-only, is tried again: the robot
+// stays on the network all the same.
+static void keep_io_tsv(struct reporter *reporter)
+{
+    const struct app_config *config = reporter->config;
+    const int64_t now_us = monotonic_us();
+    if (config->io_tsv[0] != '\0' && reporter->io_tsv.fd < 0 && now_us >= reporter->io_tsv_us)
+    {
+        (void)io_tsv_open(&reporter->io_tsv, config->io_tsv, config->vote_frames);
+        reporter->io_tsv_us = now_us + LOG_PERIOD_US;
+    }
+}
+
 static bool has_lost_rows(const struct reporter *reporter)
 {
     return reporter->io_tsv.lost_count > 0 || telemetry_has_lost_log(&reporter->telemetry);
@@ -81,7 +95,7 @@ static void pass_on(struct reporter *reporter, const struct message *message)
     report.ignored_count = atomic_load(&reporter->radio.ignored_count);
     report.status_flags |= has_lost_rows(reporter) ? LINK_STATUS_LOG_LOST : 0;
     telemetry_publish(&reporter->telemetry, &report);
-    if (reporter->io_tsv.fd >= 0)
+    if (reporter->config->io_tsv[0] != '\0')
     {
         io_tsv_add(&reporter->io_tsv, &report);
     }
@@ -95,6 +109,7 @@ static void *run(void *context)
     while (got != 0)
     {
         telemetry_connect(&reporter->telemetry, monotonic_us());
+        keep_io_tsv(reporter);
         struct pollfd report = {.fd = reporter->thread_fd, .events = POLLIN};
         (void)poll(&report, 1, LONGEST_WAIT_MS);
         struct message message;
@@ -139,14 +154,11 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
     }
     reporter->loop_fd = fds[0];
     reporter->thread_fd = fds[1];
+    reporter->config = config;
     reporter->io_tsv = (struct whole_file){.fd = -1};
+    reporter->io_tsv_us = 0;
     telemetry_init(&reporter->telemetry, config, key, session);
-    bool ok = true;
-    if (config->io_tsv[0] != '\0')
-    {
-        ok = io_tsv_open(&reporter->io_tsv, config->io_tsv, config->vote_frames);
-    }
-    ok = ok && radio_start(&reporter->radio, config, key, session, reporter->thread_fd);
+    bool ok = radio_start(&reporter->radio, config, key, session, reporter->thread_fd);
     if (ok && !start_thread(reporter))
     {
         radio_stop(&reporter->radio);
@@ -157,7 +169,13 @@ enum fw_err reporter_start(struct reporter *reporter, const struct app_config *c
         release(reporter);
         return FW_ERR_IO;
     }
-    *link = (struct link){reporter, send_report, send_ack, receive, reporter->loop_fd, session};
+    *link = (struct link){.context = reporter,
+                          .send_report = send_report,
+                          .send_ack = send_ack,
+                          .receive = receive,
+                          .fd = reporter->loop_fd,
+                          .session = session};
+    seal_name(key, link->key_name);
     return FW_OK;
 }
 

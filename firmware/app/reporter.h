@@ -21,8 +21,10 @@ struct reporter
     struct radio radio;
     // Another robot of this number was heard, and said.
     bool is_double;
-    // Its descriptor is -1 if there is no such log.
+    const struct app_config *config;
+    // Its descriptor is -1 while it is not open; when it is tried again (monotonic).
     struct whole_file io_tsv;
+    int64_t io_tsv_us;
 };
 
 // Starts the thread, and the radio's. @param config lives as long as the reporter.

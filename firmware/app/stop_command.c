@@ -160,11 +160,11 @@ static bool wait_for_holder(const char *path, pid_t holder)
 {
     const int64_t end_us = watch_now_us() + PATIENCE_MS * 1000;
     pid_t now = 0;
-    bool is_free = instance_take(path, &now);
+    bool is_free = instance_take(path, &now) >= 0;
     while (!is_free && watch_now_us() < end_us)
     {
         (void)poll(NULL, 0, PAUSE_MS);
-        is_free = instance_take(path, &now);
+        is_free = instance_take(path, &now) >= 0;
     }
     if (!is_free)
     {

@@ -2,6 +2,7 @@
 #include "supervisor.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
@@ -45,9 +46,16 @@ struct crew
     // 0: none.
     pid_t driver, guard;
     int driver_status;
-    // The signal that asked to end, and when; 0: none did.
+    // Of the board that is this program's own; -1: none.
+    int board_fd;
+    // A program with a terminal ends with it; without one SIGHUP reads the configuration anew.
+    bool has_terminal;
+    // The signal that asked to end; 0: none did. And whether one asked to read the configuration.
     int asked_by;
-    int64_t asked_us, notified_us, guard_tried_us, help_us;
+    bool reloads;
+    // When either came; 0: neither did.
+    int64_t asked_us;
+    int64_t notified_us, guard_tried_us, help_us;
 };
 
 // Signals that end or suspend a program, as something to wait for: a suspended one could not stop
@@ -69,8 +77,7 @@ static int block_signals(void)
 
 static bool asks_to_end(uint32_t number)
 {
-    return number == SIGTERM || number == SIGINT || number == SIGHUP || number == SIGQUIT ||
-           number == SIGTSTP;
+    return number == SIGTERM || number == SIGINT || number == SIGQUIT || number == SIGTSTP;
 }
 
 int supervisor_asked_to_end(int stop_fd)
@@ -135,6 +142,22 @@ static void keep_guard(struct crew *crew)
     }
 }
 
+// One that hangs is waited for no longer than a hundred ticks: it dies as soon as it can.
+static void end_guard(struct crew *crew)
+{
+    if (crew->guard > 0)
+    {
+        (void)kill(crew->guard, SIGKILL);
+        for (int i = 0; i < 100 && waitpid(crew->guard, NULL, WNOHANG) == 0; ++i)
+        {
+            (void)poll(NULL, 0, 1);
+        }
+    }
+    crew->guard = 0;
+    crew->guard_tried_us = 0;
+    crew->watch->beat_us[WATCH_GUARD] = 0;
+}
+
 static void reap_driver(struct crew *crew)
 {
     if (crew->driver > 0 && waitpid(crew->driver, &crew->driver_status, WNOHANG) == crew->driver)
@@ -146,11 +169,17 @@ static void reap_driver(struct crew *crew)
 
 static void note_signals(struct crew *crew)
 {
-    const int number = supervisor_asked_to_end(crew->signal_fd);
-    if (number != 0 && crew->asked_by == 0)
+    struct signalfd_siginfo info;
+    while (read(crew->signal_fd, &info, sizeof info) == sizeof info)
     {
-        crew->asked_by = number;
-        crew->asked_us = watch_now_us();
+        const bool hangs_up = info.ssi_signo == SIGHUP;
+        const bool ends = asks_to_end(info.ssi_signo) || (hangs_up && crew->has_terminal);
+        crew->reloads = crew->reloads || (hangs_up && !ends);
+        crew->asked_by = ends && crew->asked_by == 0 ? (int)info.ssi_signo : crew->asked_by;
+        if ((ends || hangs_up) && crew->asked_us == 0)
+        {
+            crew->asked_us = watch_now_us();
+        }
     }
 }
 
@@ -176,7 +205,7 @@ static void tick(struct crew *crew)
 
 static int64_t asked_ms(const struct crew *crew)
 {
-    return crew->asked_by != 0 ? (watch_now_us() - crew->asked_us) / 1000 : -1;
+    return crew->asked_us != 0 ? (watch_now_us() - crew->asked_us) / 1000 : -1;
 }
 
 // @return why the driver has to be killed, or NULL.
@@ -210,7 +239,7 @@ static const char *watch_driver(struct crew *crew)
     {
         tick(crew);
         // Number 0 would be everybody in this process group.
-        if (crew->asked_by != 0 && !told && crew->driver > 0)
+        if (crew->asked_us != 0 && !told && crew->driver > 0)
         {
             (void)kill(crew->driver, SIGTERM);
             told = true;
@@ -272,7 +301,7 @@ static int tell_end(const struct crew *crew, const char *why)
 static void pause_for(struct crew *crew, int32_t duration_ms)
 {
     const int64_t end_us = watch_now_us() + (int64_t)duration_ms * 1000;
-    while (crew->asked_by == 0 && watch_now_us() < end_us)
+    while (crew->asked_us == 0 && watch_now_us() < end_us)
     {
         tick(crew);
     }
@@ -289,18 +318,30 @@ static void wait_for_guard(struct crew *crew)
     }
 }
 
+// The board that this program had before is given back for another.
+static bool try_board(struct crew *crew, const char *path, pid_t *holder)
+{
+    const int fd = instance_take(path, holder);
+    if (fd >= 0 && crew->board_fd >= 0)
+    {
+        (void)close(crew->board_fd);
+    }
+    crew->board_fd = fd >= 0 ? fd : crew->board_fd;
+    return fd >= 0 || *holder == getpid();
+}
+
 // Waits for a program that is ending to let go of the board. @return false if another keeps it.
 static bool take_board(struct crew *crew)
 {
     const char *path = devices_board_path(&crew->options->config, crew->options->dry_run);
     const int64_t end_us = watch_now_us() + HELD_PATIENCE_MS * 1000;
     pid_t holder = 0;
-    bool taken = path == NULL || instance_take(path, &holder);
+    bool taken = path == NULL || try_board(crew, path, &holder);
     while (!taken && crew->asked_by == 0 && watch_now_us() < end_us)
     {
         (void)poll(NULL, 0, TICK_MS);
         note_signals(crew);
-        taken = instance_take(path, &holder);
+        taken = try_board(crew, path, &holder);
     }
     if (!taken)
     {
@@ -324,15 +365,43 @@ static void warn_of_vendor(const struct options *options)
     }
 }
 
+// The configuration as it is now, or, if that is wrong, as it was.
+static void reload(struct crew *crew)
+{
+    static struct options fresh;
+    struct options *options = crew->options;
+    crew->reloads = false;
+    crew->asked_us = 0;
+    if (parse_options(options->argc, options->argv, &fresh) != OPTIONS_RUN)
+    {
+        say("the configuration stays as it was");
+        return;
+    }
+    if (lcm_log_is_same(fresh.config.lcm_url, options->config.lcm_url))
+    {
+        lcm_log_keep(fresh.config.lcm_url);
+    }
+    *options = fresh;
+    say("the configuration was read anew");
+}
+
 // Finds the board and makes it this program's own. @return false to end, with the exit code.
 static bool settle(struct crew *crew, int *code)
 {
     char error[CONFIG_ERROR_MAX], told[CONFIG_ERROR_MAX] = "";
     bool found = false;
     *code = 1;
-    while (crew->asked_by == 0 &&
-           !(found = devices_settle_board(&crew->options->config, crew->options->dry_run, error)))
+    while (crew->asked_by == 0 && !found)
     {
+        if (crew->reloads)
+        {
+            reload(crew);
+        }
+        found = devices_settle_board(&crew->options->config, crew->options->dry_run, error);
+        if (found)
+        {
+            break;
+        }
         if (strcmp(told, error) != 0)
         {
             say("%s", error);
@@ -374,6 +443,10 @@ static bool drive_once(struct crew *crew, int *code)
         *code = !stopped ? 1 : *code == SUPERVISOR_EXIT_LOG_LOST ? *code : 0;
         return false;
     }
+    if (crew->reloads)
+    {
+        return true;
+    }
     if (*code != 1 || crew->options->config.restart_ms < 0)
     {
         return false;
@@ -391,11 +464,52 @@ static void tell_signal(const struct crew *crew)
     }
 }
 
+// All that a driver needs. @return false to end, with the exit code.
+static bool prepare(struct crew *crew, int *code)
+{
+    if (!settle(crew, code))
+    {
+        return false;
+    }
+    (void)put_to_rest(crew);
+    wait_for_guard(crew);
+    warn_of_vendor(crew->options);
+    return true;
+}
+
+// After the driver has ended. While wheels may turn, those who know the board go on.
+static bool prepare_anew(struct crew *crew, int *code)
+{
+    crew->watch->reloaded = true;
+    if (crew->watch->may_move)
+    {
+        say("no stop is confirmed: the configuration stays as it was");
+        crew->reloads = false;
+        crew->asked_us = 0;
+        return true;
+    }
+    end_guard(crew);
+    stopper_close(&crew->stopper);
+    return prepare(crew, code);
+}
+
+static bool has_terminal(void)
+{
+    const int fd = open("/dev/tty", O_RDONLY | O_NOCTTY | O_CLOEXEC);
+    if (fd >= 0)
+    {
+        (void)close(fd);
+    }
+    return fd >= 0;
+}
+
 int supervise(struct options *options, driver_fn *drive)
 {
     struct crew crew = {
         .options = options,
         .drive = drive,
+        .board_fd = -1,
+        .has_terminal = has_terminal(),
         .stopper = {.config = &options->config, .dry_run = options->dry_run},
     };
     crew.signal_fd = block_signals();
@@ -409,20 +523,16 @@ int supervise(struct options *options, driver_fn *drive)
     }
     notify("READY=1");
     notify("WATCHDOG=1");
-    if (settle(&crew, &code))
+    bool goes_on = prepare(&crew, &code);
+    while (goes_on && crew.asked_by == 0)
     {
-        (void)put_to_rest(&crew);
-        wait_for_guard(&crew);
-        warn_of_vendor(options);
-        while (crew.asked_by == 0 && drive_once(&crew, &code))
-        {
-        }
-        tell_signal(&crew);
+        goes_on = drive_once(&crew, &code) && (!crew.reloads || prepare_anew(&crew, &code));
     }
+    tell_signal(&crew);
     // While wheels may turn the guard goes on; else nobody needs it, hanging or not.
-    if (crew.guard > 0 && !crew.watch->may_move)
+    if (!crew.watch->may_move)
     {
-        (void)kill(crew.guard, SIGKILL);
+        end_guard(&crew);
     }
     notify("STOPPING=1");
     return code;

@@ -11,7 +11,8 @@
 // @return its exit code.
 typedef int driver_fn(const struct options *options, struct watch *watch, int stop_fd);
 
-// Takes the signals that have come. @return one that asks to end, or 0.
+// Takes the signals that have come, but for SIGHUP of the driver's: the supervisor's alone counts.
+// @return one that asks to end, or 0.
 int supervisor_asked_to_end(int stop_fd);
 
 // Exit code if another program has the motor board.
@@ -20,9 +21,11 @@ int supervisor_asked_to_end(int stop_fd);
 #define SUPERVISOR_EXIT_LOG_LOST 4
 
 // Starts the driver in a child process and again whenever it dies, until a signal asks to end or
-// the driver ends by itself with code 0 or 2. Whatever ended it, the board is told zero, before
-// anything else is done or said. A board that was to be found is written into the options.
-// Signals that end or suspend programs stay blocked for the rest of the process.
+// the driver ends by itself with code 0 or 2. SIGHUP ends a program that has a terminal; of another
+// it stops the wheels, and what drives next has the configuration as it is then. Whatever ended it,
+// the board is told zero, before anything else is done or said. A board that was to be found is
+// written into the options. Signals that end or suspend programs stay blocked for the rest of the
+// process.
 // @return the exit code.
 int supervise(struct options *options, driver_fn *drive);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "telemetry.h"
 
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -42,8 +41,7 @@ void telemetry_init(struct telemetry *telemetry, const struct app_config *config
 
 bool telemetry_has_lost_log(const struct telemetry *telemetry)
 {
-    return lcm_log_is_meant(telemetry->config->lcm_url) &&
-           telemetry->unsent_count + telemetry->log.file.lost_count > 0;
+    return lcm_log_is_meant(telemetry->config->lcm_url) && telemetry->log.file.lost_count > 0;
 }
 
 static bool is_connected(const struct telemetry *telemetry)
@@ -54,11 +52,18 @@ static bool is_connected(const struct telemetry *telemetry)
 static void begin_log(struct telemetry *telemetry)
 {
     const char *url = telemetry->config->lcm_url;
-    if (!lcm_log_open(&telemetry->log, url) && telemetry->next_create_us == 0)
+    const bool is_known = lcm_log_open(&telemetry->log, url);
+    if (!is_known && telemetry->next_create_us == 0)
     {
-        say("lcm_url: '%s': %s: rows are lost; a log is file://PATH?mode=w, or mode=a to go on",
-            url, strerror(errno));
+        say("lcm_url: '%s': rows are lost: a log is file://PATH?mode=w, or mode=a to go on", url);
     }
+}
+
+// Where what is not taken is counted.
+static uint32_t *losses(struct telemetry *telemetry)
+{
+    return lcm_log_is_meant(telemetry->config->lcm_url) ? &telemetry->log.file.lost_count
+                                                        : &telemetry->unsent_count;
 }
 
 void telemetry_connect(struct telemetry *telemetry, int64_t now_us)
@@ -91,7 +96,7 @@ static void send_bytes(struct telemetry *telemetry, int64_t utime_us, const char
     {
         const bool taken = size > 0 && telemetry->lcm != NULL &&
                            lcm_publish(telemetry->lcm, channel.name, bytes, (unsigned)size) == 0;
-        telemetry->unsent_count += !taken;
+        *losses(telemetry) += !taken;
     }
 }
 
@@ -115,6 +120,9 @@ static void publish_run(struct telemetry *telemetry, const struct link_report *r
                      " unsent; panel %s; commands ignored: %" PRIu32 "\n",
                      report->lost_report_count, telemetry->unsent_count,
                      report->panel_lost ? "lost" : "ok", report->ignored_count);
+    char key_name[SEAL_NAME_MAX];
+    seal_name(&telemetry->key, key_name);
+    used += snprintf(text + used, sizeof text - (size_t)used, "# key: %s\n", key_name);
     (void)config_print(telemetry->config, false, text + used, sizeof text - (size_t)used);
     char behavior[LINK_NAME_MAX];
     memcpy(behavior, report->behavior, sizeof behavior);
@@ -210,7 +218,7 @@ void telemetry_publish(struct telemetry *telemetry, const struct link_report *re
 {
     if (!is_connected(telemetry))
     {
-        ++telemetry->unsent_count;
+        ++*losses(telemetry);
         return;
     }
     if (report->utime_us >= telemetry->next_run_us ||

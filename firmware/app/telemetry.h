@@ -20,7 +20,7 @@ struct telemetry
     lcm_t *lcm;
     struct lcm_log log;
     int64_t next_create_us, next_run_us, next_link_us;
-    // Messages that neither took.
+    // Messages that no network took; the log counts its own.
     uint32_t unsent_count;
 };
 

@@ -29,6 +29,8 @@ struct watch
     _Atomic bool needs_help;
     // A command has stopped the robot: who drives next waits to be armed.
     _Atomic bool latched;
+    // The configuration was read anew: who drives next waits for the button or a command.
+    _Atomic bool reloaded;
 };
 
 // @return memory that children share, or NULL.

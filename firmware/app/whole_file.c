@@ -9,11 +9,27 @@
 
 #include "say.h"
 
+// Once, until it works again. @param path of a file that cannot be opened.
+static void tell_failure(struct whole_file *file, const char *path)
+{
+    if (!file->is_failing)
+    {
+        say("%s: %s%s%s: rows are lost from here on", file->name, path, path[0] != '\0' ? ": " : "",
+            strerror(errno));
+    }
+    file->is_failing = true;
+}
+
 bool whole_file_open(struct whole_file *file, const char *name, const char *path, bool anew)
 {
     // Of a pipe: it waits neither for a reader nor for room.
     const int flags = O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | (anew ? O_TRUNC : 0);
-    *file = (struct whole_file){.name = name, .fd = open(path, flags, 0644)};
+    file->name = name;
+    file->fd = open(path, flags, 0644);
+    if (file->fd < 0)
+    {
+        tell_failure(file, path);
+    }
     return file->fd >= 0;
 }
 
@@ -35,19 +51,20 @@ static bool add_whole(int fd, const void *bytes, size_t length)
     return false;
 }
 
-void whole_file_add(struct whole_file *file, const void *bytes, size_t length)
+bool whole_file_add(struct whole_file *file, const void *bytes, size_t length)
 {
-    const bool taken = add_whole(file->fd, bytes, length);
-    if (!taken && !file->is_failing)
+    const bool taken = file->fd >= 0 && add_whole(file->fd, bytes, length);
+    if (!taken)
     {
-        say("%s: %s: rows are lost from here on", file->name, strerror(errno));
+        ++file->lost_count;
+        tell_failure(file, "");
     }
-    if (taken && file->is_failing)
+    else if (file->is_failing)
     {
         say("%s: works again; %" PRIu32 " rows are lost", file->name, file->lost_count);
+        file->is_failing = false;
     }
-    file->lost_count += !taken;
-    file->is_failing = !taken;
+    return taken;
 }
 
 void whole_file_close(struct whole_file *file)

@@ -19,11 +19,12 @@ struct whole_file
     bool is_failing;
 };
 
-// Goes on in a file that is there, or begins one. @param anew what is there is dropped.
-// @return false and errno on failure.
+// Goes on in a file that is there, or begins one; what was lost before stays counted.
+// @param anew what is there is dropped. @return false on failure, which is told once.
 bool whole_file_open(struct whole_file *file, const char *name, const char *path, bool anew);
 
-void whole_file_add(struct whole_file *file, const void *bytes, size_t length);
+// Adds one piece, or counts it as lost, as where the file is not open. @return false if it is lost.
+bool whole_file_add(struct whole_file *file, const void *bytes, size_t length);
 void whole_file_close(struct whole_file *file);
 
 #endif

@@ -138,6 +138,15 @@ bool seal_verify(const struct seal_key *key, const uint8_t *message, size_t size
     return is_same(tag, message + size - SEAL_TAG_BYTES, sizeof tag);
 }
 
+void seal_name(const struct seal_key *key, char name[SEAL_NAME_MAX])
+{
+    static const char words[] = "twinmill key name";
+    uint8_t bytes[SEAL_NAME_MAX / 2] = {0};
+    hash(key, words, sizeof words - 1, bytes, sizeof bytes);
+    (void)snprintf(name, SEAL_NAME_MAX, key->present ? "%02x%02x%02x%02x" : "none", bytes[0],
+                   bytes[1], bytes[2], bytes[3]);
+}
+
 int64_t seal_random(void)
 {
     int64_t number = 0;

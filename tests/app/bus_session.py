@@ -6,6 +6,7 @@ Usage: bus_session.py FOLDER PROGRAM..., as root of the namespace. Prints what h
 
 import itertools
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -16,7 +17,7 @@ from robot_process import LEFT, ZERO, Robot
 
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
-from twinmill.robots.key import load_or_make, of_robot
+from twinmill.robots.key import load_or_make, name, of_robot
 
 ID = 3
 URL = "udpm://239.255.76.67:7667?ttl=0"
@@ -41,6 +42,20 @@ def heard_again(fleet: Fleet) -> bool:
     seq = newest()
     fleet.listen(10, lambda: newest() > seq + 10)
     return newest() > seq + 10
+
+
+def armed(fleet: Fleet, listener: Fleet | None = None) -> list:
+    """What the robot answers to an arm that is signed with the fleet's key.
+
+    One with an old key hears no new session: a listener does, and the signature alone is wrong.
+    """
+    fleet.listen(5, lambda: fleet.robots[ID].link if ID in fleet.robots else None)
+    if listener:
+        listener.listen(0.2)
+        fleet.robots[ID].link = listener.robots[ID].link
+        fleet.robots[ID].link_s = listener.robots[ID].link_s
+    (answer,) = tell.arm(fleet, {ID}, timeout_s=5)
+    return [answer.accepted, answer.signed, answer.reason]
 
 
 def main(folder: Path, program: list[str]) -> dict:
@@ -76,6 +91,11 @@ def main(folder: Path, program: list[str]) -> dict:
         (stopped,) = tell.stop(fleet, {ID})
         result["stopped"] = stopped.stands and robot.wait_for(ZERO)
         answers = (*begun.answers, refused, stopped)
+        other = Fleet(URL, key=load_or_make(folder / "other.key"))
+        own_key.write_text(of_robot(load_or_make(folder / "other.key"), ID).hex())
+        robot.process.send_signal(signal.SIGHUP)
+        result["key_name"] = name(of_robot(load_or_make(folder / "other.key"), ID))
+        result["armed"] = {"new key": armed(other), "old key": armed(fleet, other)}
         result["answers"] = [[a.accepted, a.signed, a.reason] for a in answers]
     return result
 

@@ -21,6 +21,7 @@
 #define ROBOT_PERIOD_US 33333
 #define ROBOT_UNIX_OFFSET_US 1700000000000000
 #define ROBOT_SESSION 77
+#define ROBOT_KEY_NAME "01234567"
 
 // What the camera shows at the next take.
 enum robot_view
@@ -187,8 +188,12 @@ static inline void robot_make(void)
 
 static inline void robot_boot(void)
 {
-    const struct link link = {NULL, robot_send_report, robot_send_ack, robot_receive,
-                              -1,   ROBOT_SESSION};
+    const struct link link = {.send_report = robot_send_report,
+                              .send_ack = robot_send_ack,
+                              .receive = robot_receive,
+                              .fd = -1,
+                              .session = ROBOT_SESSION,
+                              .key_name = ROBOT_KEY_NAME};
     TEST_ASSERT_EQUAL(FW_OK,
                       loop_init(&robot.loop, &robot.config, &robot.own, &robot.devices, &link));
 }
@@ -229,7 +234,7 @@ static inline bool robot_tell_as_of(int64_t age_us, enum fw_verb verb, int64_t s
     robot_steps(1);
     TEST_ASSERT_EQUAL(acks + 1, robot.ack_count);
     TEST_ASSERT_EQUAL(seq, robot.ack.seq);
-    TEST_ASSERT_EQUAL(robot.ack.accepted, robot.ack.reason[0] == '\0');
+    TEST_ASSERT_TRUE(robot.ack.accepted || robot.ack.reason[0] != '\0');
     return robot.ack.accepted;
 }
 

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's program as a process: its camera is a socket, its motor board a file."""
 
+import contextlib
 import fcntl
 import os
+import pty
 import signal
 import socket
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -39,6 +42,17 @@ def full_pipe():
     except BlockingIOError:
         fcntl.fcntl(write_end, fcntl.F_SETFL, 0)
     return read_end, write_end
+
+
+@contextlib.contextmanager
+def terminal():
+    """What runs a command at a terminal of its own, and that terminal's other end."""
+    master, line = pty.openpty()
+    begin = "import os, sys; os.open(sys.argv[1], os.O_RDWR); os.execvp(sys.argv[2], sys.argv[2:])"
+    yield [sys.executable, "-c", begin, os.ttyname(line)], master
+    os.close(line)
+    with contextlib.suppress(OSError):  # hung up by the test
+        os.close(master)
 
 
 class Camera:
@@ -81,7 +95,11 @@ class Camera:
 
 
 class Robot:
-    """The running program. As a context it is killed at the end, if it still lives."""
+    """The running program. As a context it is killed at the end, if it still lives.
+
+    A configuration of the test's own takes the place of all options but the arguments; it must
+    name this camera and board.
+    """
 
     def __init__(
         self,
@@ -90,18 +108,22 @@ class Robot:
         *arguments: str,
         env: dict | None = None,
         stderr: int = subprocess.PIPE,
+        config: Path | None = None,
     ):
         self.record = folder / "board.csv"
         self.camera = Camera(folder / "camera")
-        command = [
-            *program,
+        options = [
             *("--config", "/dev/null", "--camera", f"stub:unix:{folder}/camera"),
             *("--board", f"stub:{self.record}", "--lcm-url", "", "--set", "panel=none"),
             *("--set", f"width_px={WIDTH_PX}", "--set", f"height_px={HEIGHT_PX}"),
-            *arguments,
         ]
+        command = [*program, *(["--config", config] if config else options), *arguments]
         self.process = subprocess.Popen(
-            command, stderr=stderr, text=True, env={**os.environ, **(env or {})}
+            command,
+            stderr=stderr,
+            text=True,
+            env={**os.environ, **(env or {})},
+            start_new_session=True,  # without a terminal, as a service
         )
 
     def __enter__(self):

@@ -176,7 +176,7 @@ static const char *close_log(struct whole_file *log)
 static void test_io_tsv_speaks_the_authors_language(void)
 {
     struct link_report report = {.utime_us = 1700000000123456};
-    struct whole_file log;
+    struct whole_file log = {.fd = -1};
     report.out.detected_raw = 1;
     report.out.speed_input_pct = 100;
     report.out.turn_input_milli = 500;
@@ -197,7 +197,7 @@ static void test_io_tsv_speaks_the_authors_language(void)
 static void test_io_tsv_loses_whole_rows_and_counts_them(void)
 {
     struct link_report report = {.utime_us = 1700000000123456};
-    struct whole_file log;
+    struct whole_file log = {.fd = -1};
     struct rlimit limit, none;
     signal(SIGXFSZ, SIG_IGN);
     TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &none));

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -40,6 +41,18 @@ static void test_stop_holds_until_armed(void)
     TEST_ASSERT_BITS_LOW(LINK_STATUS_LATCHED, robot.report.status_flags);
     TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
     ASSERT_DUTIES(left_pct);
+}
+
+// Whose key is another is told which one counts, and who arms a robot which one did.
+static void test_answers_name_the_robots_key(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, ROBOT_KEY_NAME));
+    robot.command.order.seal = FW_SEAL_WRONG;
+    robot.has_command = true;
+    robot_steps(1);
+    TEST_ASSERT_FALSE(robot.ack.accepted);
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, ROBOT_KEY_NAME));
 }
 
 // Starts every 10 ms against one stop.
@@ -94,19 +107,54 @@ static void test_stop_outlives_the_program(void)
     TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, 0, ""));
 }
 
-// As on a full disk: a folder that is not there yet.
-static void test_stop_that_cannot_be_kept_in_mind_is_kept_later(void)
+// No file can be made, as on a full disk: the stop renames one that is there.
+static void test_stop_is_kept_where_there_is_no_room(void)
+{
+    char path[128];
+    struct rlimit none, limit;
+    snprintf(path, sizeof path, "%s/stopped", folder);
+    snprintf(robot.config.run_dir, sizeof robot.config.run_dir, "%s", folder);
+    robot_boot();
+    TEST_ASSERT_TRUE(latch_works(&robot.loop.operator_link.latch));
+    TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_NOFILE, &none));
+    limit = none;
+    limit.rlim_cur = 0;
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_NOFILE, &limit));
+    const bool stopped = robot_tell(FW_VERB_STOP, 0, "");
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_NOFILE, &none));
+    TEST_ASSERT_TRUE(stopped);
+    TEST_ASSERT_EQUAL_STRING("", robot.ack.reason);
+    TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    robot_steps(1);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
+}
+
+// A folder that is not there yet.
+static void test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later(void)
 {
     char path[128];
     snprintf(robot.config.run_dir, sizeof robot.config.run_dir, "%s/later", folder);
     snprintf(path, sizeof path, "%s/stopped", robot.config.run_dir);
     robot_boot();
-    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
-    robot_steps(3);
-    TEST_ASSERT_EQUAL(0, mkdir(robot.config.run_dir, 0700));
+    TEST_ASSERT_FALSE(latch_works(&robot.loop.operator_link.latch));
     robot_steps(1);
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_LATCH_LOST, robot.report.status_flags);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, "run_dir"));
+    TEST_ASSERT_EQUAL(0, mkdir(robot.config.run_dir, 0700));
+    // Not in every step: once a second.
+    robot_steps(3);
+    TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
+    robot_steps(1000000 / ROBOT_PERIOD_US + 1);
     TEST_ASSERT_EQUAL(0, access(path, F_OK));
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_LATCH_LOST, robot.report.status_flags);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_EQUAL_STRING("", robot.ack.reason);
+    robot_steps(1);
     TEST_ASSERT_TRUE(robot_tell(FW_VERB_ARM, 0, ""));
+    snprintf(path, sizeof path, "%s/not_stopped", robot.config.run_dir);
+    TEST_ASSERT_EQUAL(0, unlink(path));
     TEST_ASSERT_EQUAL(0, rmdir(robot.config.run_dir));
 }
 
@@ -181,17 +229,22 @@ int main(void)
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     UNITY_BEGIN();
     RUN_TEST(test_stop_holds_until_armed);
+    RUN_TEST(test_answers_name_the_robots_key);
     RUN_TEST(test_flood_of_starts_does_not_undo_a_stop);
     RUN_TEST(test_stop_from_the_future_locks_nobody_out);
     RUN_TEST(test_button_starts_a_robot_that_was_stopped);
     RUN_TEST(test_stop_outlives_the_program);
-    RUN_TEST(test_stop_that_cannot_be_kept_in_mind_is_kept_later);
+    RUN_TEST(test_stop_is_kept_where_there_is_no_room);
+    RUN_TEST(test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later);
     RUN_TEST(test_robot_that_loses_its_operator_stops);
     RUN_TEST(test_robot_that_hears_its_operator_goes_on);
     RUN_TEST(test_robot_that_lost_its_operator_does_not_start_later);
     RUN_TEST(test_start_without_a_word_on_it_has_the_configured_time_out);
     RUN_TEST(test_answer_to_a_stop_says_if_the_board_took_it);
     const int failures = UNITY_END();
+    char path[128];
+    snprintf(path, sizeof path, "%s/not_stopped", folder);
+    unlink(path);
     rmdir(folder);
     return failures;
 }

@@ -106,7 +106,7 @@ def test_stop_option_stops_what_a_threefold_kill_left(driving):
     assert driving.duties() == ZERO
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGQUIT])
 def test_signal_stops_the_wheels_and_ends_well(driving, number):
     killed_s = time.monotonic()
     driving.process.send_signal(number)
@@ -123,6 +123,23 @@ def test_dead_program_is_started_again(tmp_path):
         assert robot.wait_for(ZERO)
         assert robot.wait_for(LEFT)
         assert robot.children() not in ([], [first])
+
+
+def test_no_autostart_where_a_stop_could_not_be_kept_in_mind(tmp_path):
+    """What stopped it may have been forgotten: the robot waits, and says why."""
+    options = ("--set", "autostart=true", "--set")
+    with Robot(TURBOPI, tmp_path, *options, f"run_dir={tmp_path}") as robot:
+        assert robot.wait_for(LEFT)
+        robot.process.terminate()
+        robot.end()
+    robot.record.unlink()
+    with Robot(TURBOPI, tmp_path, *options, "run_dir=/proc") as robot:
+        assert robot.wait_for(ZERO) and wait_until(robot.rows)
+        time.sleep(1)
+        robot.process.terminate()
+        _, said = robot.end()
+    assert {duties for _, duties in robot.rows()} == {ZERO}
+    assert "run_dir: /proc" in said and "no autostart" in said
 
 
 def test_frozen_picture_stops_the_wheels_after_200_ms(driving):
@@ -271,8 +288,12 @@ def test_io_tsv_is_read_by_the_importer(played):
 
 @pytest.mark.parametrize(
     "log",
-    [("--io-tsv", "/dev/full"), ("--lcm-url", "file:///nowhere/a.lcmlog?mode=w")],
-    ids=["full disk", "no folder"],
+    [
+        ("--io-tsv", "/dev/full"),
+        ("--io-tsv", "/nowhere/io.tsv"),
+        ("--lcm-url", "file:///nowhere/a.lcmlog?mode=w"),
+    ],
+    ids=["full disk", "no folder", "no folder for LCM"],
 )
 def test_log_that_cannot_be_written_is_told(tmp_path, log):
     frames = tmp_path / "frames.yuyv"
@@ -284,6 +305,20 @@ def test_log_that_cannot_be_written_is_told(tmp_path, log):
     )
     assert done.returncode == 4
     assert "rows of a log are lost" in done.stderr
+
+
+def test_robot_without_its_log_is_on_the_network_and_says_so(tmp_path):
+    """Its card is read-only, or has no such folder: it obeys, drives and tells all the same."""
+    log, lost = tmp_path / "a.lcmlog", turbopi.telemetry_t.STATUS_LOG_LOST
+    options = ("--lcm-url", f"file://{log}?mode=w", "--io-tsv", "/proc/io.tsv")
+    with Robot(TURBOPI, tmp_path, "--start", *options) as robot:
+        assert robot.wait_for(LEFT)
+        robot.process.terminate()
+        code, said = robot.end()
+    events = [e for e in lcm.EventLog(str(log), "r") if e.channel == "R00_TELEMETRY"]
+    flags = [turbopi.telemetry_t.decode(event.data).status_flags for event in events]
+    assert code == 4 and "io_tsv: /proc/io.tsv" in said
+    assert flags[-1] & lost
 
 
 LOGS = [("--io-tsv", "{}"), ("--lcm-url", "file://{}?mode=w")]
@@ -383,6 +418,14 @@ def test_bus_commands_are_obeyed_and_acknowledged(bus_session):
     # To the instant: the first moving duties come at most one frame and some load later.
     assert 0 <= bus_session["start_delay_s"] < 0.033 + SLACK_S
     assert bus_session["stopped"]
+
+
+def test_key_that_was_changed_on_the_card_counts_after_sighup(bus_session):
+    """Who signs with the old one is told the new one's name; who has the new one arms."""
+    old, new = bus_session["armed"]["old key"], bus_session["armed"]["new key"]
+    assert old[0] is False and "signed with another key" in old[2]
+    assert new[:2] == [True, True]
+    assert bus_session["key_name"] in old[2] and bus_session["key_name"] in new[2]
 
 
 def test_network_that_goes_away_does_not_delay_the_loop(bus_session):

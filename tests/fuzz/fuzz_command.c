@@ -65,7 +65,7 @@ static void send_ack(void *context, const struct link_ack *ack)
 {
     (void)context;
     CLAIM(memchr(ack->reason, '\0', sizeof ack->reason) != NULL);
-    CLAIM(ack->accepted == (ack->reason[0] == '\0'));
+    CLAIM(ack->accepted || ack->reason[0] != '\0');
     last_ack = *ack;
     ++ack_count;
 }
@@ -121,7 +121,11 @@ static void boot(void)
                                          .battery = stub_board_battery(&board),
                                          .panel = stub_panel_make(&panel),
                                          .clock = clock};
-    const struct link link = {NULL, send_report, send_ack, receive, -1, SESSION};
+    const struct link link = {.send_report = send_report,
+                              .send_ack = send_ack,
+                              .receive = receive,
+                              .fd = -1,
+                              .session = SESSION};
     config_default(&config);
     config.run_dir[0] = '\0';
     config.robot_id = ROBOT_ID;

@@ -2,6 +2,7 @@
 """The package in a Debian with systemd: what a user installs, starts, kills and removes."""
 
 import pytest
+import turbopi
 from rig import SYSTEM_LIMIT_S, ZERO
 from robot import CONFIG, HEIGHT_PX, LEFT, SERVICE, WIDTH_PX, Watched
 
@@ -59,6 +60,18 @@ def test_stopping_the_service_stops_the_motors(driving):
     begin_s = driving.since(0)[-1].t_s
     driving.rig.systemctl("stop", SERVICE)
     assert wait_for_zero(driving, begin_s) < STOP_LIMIT_S
+
+
+def test_reloading_the_service_stops_the_motors_and_keeps_it(driving):
+    """The same main process; its button starts the robot again."""
+    begin_s = driving.since(0)[-1].t_s
+    run(driving.rig, "/bin/sh", "-c", f"systemctl show -P MainPID {SERVICE} > /before")
+    driving.rig.systemctl("reload", SERVICE)
+    assert wait_for_zero(driving, begin_s) < STOP_LIMIT_S
+    run(driving.rig, "/bin/sh", "-c", f"systemctl show -P MainPID {SERVICE} | cmp - /before")
+    driving.show_until(lambda: driving.telemetry()[-1].mode == turbopi.telemetry_t.MODE_STOPPED)
+    driving.press()
+    driving.drive_until(LEFT)
 
 
 def test_killing_all_of_the_service_stops_the_motors_and_starts_it_again(driving):

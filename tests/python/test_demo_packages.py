@@ -51,9 +51,8 @@ def installed_with(names: list[str]) -> set[str]:
 @pytest.fixture(scope="module")
 def program() -> str:
     """The command line program as `make demo` leaves it."""
-    setup = (ROOT / "scripts/setup").read_text()
-    (listed,) = re.findall(r"demo_python=\(([^)]*)\)", setup)
-    there = installed_with(listed.split()) | {"twinmill"}
+    listed = (ROOT / "scripts/demo-packages.txt").read_text().splitlines()
+    there = installed_with([name for name in listed if name[0] != "#"]) | {"twinmill"}
     absent = {
         module
         for module, owners in metadata.packages_distributions().items()

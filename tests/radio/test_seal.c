@@ -118,6 +118,17 @@ static void test_key_files_that_are_none_are_refused_in_words(void)
     TEST_ASSERT_TRUE(load(text, 0600));
 }
 
+static void test_name_of_a_key_is_that_of_another_implementation(void)
+{
+    char name[SEAL_NAME_MAX];
+    TEST_ASSERT_TRUE(load(counting, 0600));
+    seal_name(&key, name);
+    TEST_ASSERT_EQUAL_STRING("0b9d35f9", name);
+    key.present = false;
+    seal_name(&key, name);
+    TEST_ASSERT_EQUAL_STRING("none", name);
+}
+
 static void test_key_is_made_once_and_for_its_owner_alone(void)
 {
     struct stat about;
@@ -140,6 +151,7 @@ int main(void)
     RUN_TEST(test_any_changed_bit_and_any_other_key_is_seen);
     RUN_TEST(test_without_a_key_nothing_is_signed_or_believed);
     RUN_TEST(test_key_files_that_are_none_are_refused_in_words);
+    RUN_TEST(test_name_of_a_key_is_that_of_another_implementation);
     RUN_TEST(test_key_is_made_once_and_for_its_owner_alone);
     (void)rmdir(folder);
     return UNITY_END();

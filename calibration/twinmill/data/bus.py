@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """LCM's bus on UDP, read by code that any packet may come to.
 
-The C library reads past its buffers where a packet says so, and the program that it is part of
-dies. Here a packet that is not as it should be is dropped.
+The receiver of LCM's C library does not check all that a packet claims (programs with 1.3.1 and
+1.5.3 ended). Here a packet that is not as it should be is dropped.
 """
 
 import re

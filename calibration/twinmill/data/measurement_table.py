@@ -18,6 +18,7 @@ import numpy as np
 
 from twinmill.data.log import LogError
 from twinmill.data.units import UNITS, split_unit
+from twinmill.data.unpacking import BoundedText
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*")
@@ -42,7 +43,8 @@ def open_text(path: Path) -> Iterator[TextIO]:
     """Opens a text file, `.gz` too; on a terminal with a progress bar.
 
     Raises:
-        LogError: it cannot be read, is no text, or ends in `.gz` and is not gzip.
+        LogError: it cannot be read, is no text, ends in `.gz` and is not gzip, unpacks to too much,
+            or has a line without an end.
     """
     from twinmill.terminal import progress_bar  # slow to import, and logs need none
 
@@ -51,8 +53,10 @@ def open_text(path: Path) -> Iterator[TextIO]:
             progress_bar(counted=False) as progress,
             progress.open(path, "rb", description=path.name) as raw,
         ):
-            binary = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
-            buffered = io.BufferedReader(binary, BEGINNING_BYTES)
+            is_packed = path.suffix == ".gz"
+            binary = gzip.GzipFile(fileobj=raw) if is_packed else raw
+            bounded = BoundedText(path, binary, path.stat().st_size if is_packed else None)
+            buffered = io.BufferedReader(bounded, BEGINNING_BYTES)
             yield io.TextIOWrapper(buffered, _encoding(buffered), newline="")
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error

@@ -33,6 +33,7 @@ ALARMS = (
     (TELEMETRY.STATUS_CAMERA_LOST, "camera lost"),
     (TELEMETRY.STATUS_BATTERY_LOW, "battery low"),
     (TELEMETRY.STATUS_LOG_LOST, "rows of a log lost"),
+    (TELEMETRY.STATUS_LATCH_LOST, "cannot keep in mind whether it was stopped"),
 )
 # A robot with one of these may be moving, whatever it was told.
 MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED

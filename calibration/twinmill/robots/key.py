@@ -73,6 +73,11 @@ def of_robot(key: bytes, robot_id: int) -> bytes:
     return blake2b(f"twinmill robot {robot_id}".encode(), key=key, digest_size=KEY_BYTES).digest()
 
 
+def name(key: bytes) -> str:
+    """Eight digits by which a key is told from another; robots say theirs."""
+    return blake2b(b"twinmill key name", key=key, digest_size=4).hexdigest()
+
+
 def sign(key: bytes, message: bytes) -> bytes:
     """The message, which ends in its tag, with the right one."""
     body = message[:-TAG_BYTES]

@@ -21,7 +21,7 @@ import numpy as np
 import turbopi
 
 from twinmill.data.importers.beat import at_even_beat
-from twinmill.data.importers.ros_cut import is_cut, write_whole
+from twinmill.data.importers.ros_cut import check_chunks, is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames, on_floor
 from twinmill.data.importers.ros_messages import (
     COMMANDS,
@@ -45,6 +45,7 @@ from twinmill.data.importers.ros_messages import (
 )
 from twinmill.data.importers.series import CommandSeries, PoseSeries
 from twinmill.data.log import LogError
+from twinmill.data.unpacking import UnpackError, bound_bag_readers
 from twinmill.terminal import progress_bar
 
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
@@ -281,9 +282,11 @@ def _open(path: Path):
     store = get_typestore(Stores.ROS2_HUMBLE)
     for kind, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, kind))
+    bound_bag_readers()
     try:
         with TemporaryDirectory() as folder:
             storage = _storage(path)
+            check_chunks(storage)
             if is_cut(storage):
                 write_whole(storage, Path(folder) / "whole.mcap")
                 storage = Path(folder) / "whole.mcap"
@@ -297,6 +300,8 @@ def _open(path: Path):
                 yield reader
     except LogError:
         raise
+    except UnpackError as error:
+        raise LogError(f"{path}: is refused: {error}.") from error
     except (  # whatever the library says of bytes that make no sense
         *(AnyReaderError, Error1, Error2, SerdeError, SqliteError, OSError, LookupError),
         *(AssertionError, AttributeError, ValueError, MemoryError, OverflowError, RuntimeError),

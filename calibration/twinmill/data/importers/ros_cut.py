@@ -8,10 +8,13 @@ import io
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from twinmill.data.log import LogError
+from twinmill.data.unpacking import UnpackError, check_size, decompressors, unpack
 
 MAGIC = b"\x89MCAP0\r\n"  # first and last in a whole file
+HEAD = struct.Struct("<BQ")  # opcode and length of a record
 CHUNK = 6  # opcode
 TIMES_SIZES = 28  # bytes of a chunk before the name of its compression
 
@@ -24,6 +27,33 @@ def is_cut(path: Path) -> bool:
         begins = stream.read(len(MAGIC)) == MAGIC
         stream.seek(max(0, path.stat().st_size - len(MAGIC)))
         return begins and stream.read() != MAGIC
+
+
+def check_chunks(path: Path) -> None:
+    """Looks, before any is unpacked, how large the chunks of an MCAP file say that they are.
+
+    Raises:
+        UnpackError: one of them, or all together, is more than so small a file may hold: those of
+            one time are in memory at once.
+    """
+    files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+    for file in files:
+        if file.suffix != ".mcap" or not file.is_file():
+            continue
+        total, size = 0, file.stat().st_size
+        with file.open("rb") as stream:
+            stream.seek(len(MAGIC))
+            while len(head := stream.read(HEAD.size)) == HEAD.size:
+                kind, length = HEAD.unpack(head)
+                at = stream.tell()
+                if kind == CHUNK and len(sizes := stream.read(24)) == 24:
+                    (unpacked,) = struct.unpack_from("<Q", sizes, 16)
+                    check_size(length, unpacked)
+                    total += unpacked
+                if length > size:
+                    break
+                stream.seek(at + length)
+        check_size(size, total)
 
 
 def write_whole(path: Path, out: Path) -> None:
@@ -68,19 +98,39 @@ def _records(path: Path) -> Iterator[object]:
 
 def _until_break(stream: io.BufferedIOBase, skip_magic: bool) -> Iterator[object]:
     from mcap.exceptions import McapError
+    from mcap.records import Chunk
     from mcap.stream_reader import StreamReader
 
     try:
-        yield from StreamReader(stream, skip_magic=skip_magic).records
-    except (McapError, struct.error):
+        for record in StreamReader(stream, skip_magic=skip_magic, emit_chunks=True).records:
+            if isinstance(record, Chunk):
+                inside = io.BytesIO(unpack_chunk(record))
+                yield from _until_break(inside, skip_magic=True)
+            else:
+                yield record
+    except UnpackError:
+        raise
+    except (McapError, struct.error, EOFError, ValueError):
         return
+
+
+def unpack_chunk(chunk: Any) -> bytes:
+    """The records of a chunk; what is packed in another way than MCAP's has none.
+
+    Raises:
+        UnpackError: it is too much.
+    """
+    if not chunk.compression:
+        return chunk.data
+    make = decompressors().get(chunk.compression)
+    return unpack(make, chunk.data) if make else b""
 
 
 def _cut_chunk(stream: io.BufferedIOBase, size: int) -> bytes:
     """The records in the chunk within which the file ends; empty if it ends elsewhere."""
     stream.seek(len(MAGIC))
-    while len(head := stream.read(9)) == 9:
-        kind, length = struct.unpack("<BQ", head)
+    while len(head := stream.read(HEAD.size)) == HEAD.size:
+        kind, length = HEAD.unpack(head)
         if stream.tell() + length > size:
             body = stream.read() if kind == CHUNK else b""
             return _unpacked(body) if len(body) > TIMES_SIZES + 4 else b""

