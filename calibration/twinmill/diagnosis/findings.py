@@ -23,7 +23,15 @@ from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME
-from twinmill.diagnosis.trials import REFIT, State, Trial, estimates_of, fitted, with_effects
+from twinmill.diagnosis.trials import (
+    REFIT,
+    State,
+    Trial,
+    estimates_of,
+    fitted,
+    fitted_from,
+    with_effects,
+)
 from twinmill.fitting.compare import MISSING
 from twinmill.model.parameters import (
     CLOCK,
@@ -130,7 +138,7 @@ def steps_of(
     state, steps = first, []
     for finding, names in zip(found, order, strict=True):
         state = with_effects(state, names)
-        steps.append((finding.effect, _from_final(state, last).held_score))
+        steps.append((finding.effect, fitted_from(state, last).held_score))
     return steps
 
 
@@ -281,21 +289,9 @@ class _Chains:
             upto = (*upto, name)
             if upto not in self._known:
                 state = with_effects(state, [name])
-                self._known[upto] = state, _from_final(state, self._last)
+                self._known[upto] = state, fitted_from(state, self._last)
             chain.append(self._known[upto][1])
         return chain
-
-
-def _from_final(state: State, last: Trial) -> Trial:
-    """A fit of the state that begins at the final model's values."""
-    values = {p.name: last.state.model.get(p.name) for p in last.state.free}
-    models = []
-    for model in state.models:
-        model = model.copy()
-        for p in state.free:
-            model.set(p.name, values.get(p.name, p.value))
-        models.append(model)
-    return fitted(replace(state, models=models))
 
 
 def _loss(last: Trial, less: Trial | None) -> float:

@@ -139,6 +139,18 @@ def fitted(state: State) -> Trial:
     return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
 
 
+def fitted_from(state: State, last: Trial) -> Trial:
+    """The state's free parameters fitted, begun where another trial has them."""
+    values = {p.name: last.state.model.get(p.name) for p in last.state.free}
+    models = []
+    for model in state.models:
+        model = model.copy()
+        for p in state.free:
+            model.set(p.name, values.get(p.name, p.value))
+        models.append(model)
+    return fitted(replace(state, models=models))
+
+
 def nearer(state: State) -> State:
     """The state with gains of the base that are far off nearer, where a fit of it finds the rest.
 
