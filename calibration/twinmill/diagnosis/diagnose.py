@@ -32,6 +32,7 @@ from twinmill.diagnosis.findings import (
     steps_of,
     with_stale_numbers,
 )
+from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.notes import (
     answers_notes,
     disturbed_notes,
@@ -64,7 +65,7 @@ from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.stopped import Course
-from twinmill.diagnosis.taking import needless, tuned
+from twinmill.diagnosis.taking import doubtful_moments, needless, taken, tuned
 from twinmill.diagnosis.ties import instead_of_drift
 from twinmill.diagnosis.trials import (
     REFIT,
@@ -72,6 +73,7 @@ from twinmill.diagnosis.trials import (
     Trial,
     begun_nearer,
     cross_validate,
+    with_base,
     without_effect,
 )
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
@@ -87,6 +89,7 @@ from twinmill.fitting.opening import (
     with_own_gains,
     with_own_lags,
 )
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     BASE_GAINS,
@@ -410,11 +413,14 @@ def _concluded(
         instead = None if rest.proven.instead_of else _lacking(late, less, known)
         better = (instead and instead.formula(last.fit)) or rest.proven
         rest = replace(rest, proven=tuned(last.fit, better))
+    base = tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes)))
     rest = rest.at_few_commands() if few else rest
     findings = _beside_formula(findings, last, rest, len(set(hashes)))
     cards = catalogue_of(last.state.model)
     findings = of_many(beside_more(of_another_form(findings, rest), rest, cards))
     findings = of_no_right_model(findings, rest, last.held_score)
+    if rest.proven and _gains_nothing(rest.proven, findings, with_base(last, base)[0], start.fit):
+        rest = replace(rest, proven=None)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, done.start, last)]
     rest = rest.with_findings(findings)
@@ -493,7 +499,7 @@ def _concluded(
         robots_off=tuple(off),
         runs_off=tuple(runs_off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
-        base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
+        base_names=base,
         apart=own,
     )
 
@@ -521,6 +527,28 @@ def _beside_formula(
     gone = needless(last.fit, rest.proven, local, runs) if rest.proven else []
     why = "the formula that was proven for the rest, fitted in its place, leaves no more than it"
     return [doubted(f, why) if f.effect in gone else f for f in findings]
+
+
+def _gains_nothing(
+    proven: Formula, findings: Sequence[Finding], whole: ScoreFit, first: ScoreFit
+) -> bool:
+    """Whether left-out data do not bear a formula out, once the base is refitted beside it.
+
+    Args:
+        proven: the formula.
+        findings: beside it.
+        whole: all that was found, fitted with the base.
+        first: of the model as given.
+    """
+    found = taken(
+        whole,
+        proven,
+        beside=(),
+        runs=len({d.measurement.log_sha256 for d in whole.datasets}),
+        passing=doubtful_moments(findings, proven),
+        given=first.held_square,
+    )
+    return bool(found.gains_nothing)
 
 
 def _doubted(

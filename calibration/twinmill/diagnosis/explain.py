@@ -253,7 +253,9 @@ def _made(
     after = comparison(child, [o.aligned(child.model) for o in diagnosis.opened])
     if of_runs(apart):  # none of these has in the file what it had in the fit
         child = child_of(model_file, replace(told, score_after=after.score), Path(out), command)
-    lacks = tuple(n for n in diagnosis.motion if n not in (*own.effects, *diagnosis.passing))
+    instead = kept.formula.instead_of if kept else ()
+    told_of = {*own.effects, *diagnosis.passing, *instead}
+    lacks = tuple(n for n in diagnosis.motion if n not in told_of)
     gained = bool(diagnosis.camera) or not own.as_given
     return child, Explanation(
         diagnosis, after, estimates, child.path, beyond, gained=gained, lacks=lacks

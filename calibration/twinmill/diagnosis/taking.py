@@ -12,6 +12,7 @@ from math import log
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, MOST_NUMBERS, Form, tunable
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
@@ -29,6 +30,7 @@ from twinmill.model.parameters import (
     is_local,
     newest_instance,
     phases,
+    with_role,
 )
 from twinmill.predict.datasets import ErrorDataset, Trajectory, total_score
 
@@ -84,6 +86,11 @@ class Taken:
         """What keeps it out of the model; empty if nothing does."""
         if self.formula.passing and self.runs < SEVERAL:
             return "it names the time of one run, and nothing shows that another run shares it"
+        return self.gains_nothing
+
+    @property
+    def gains_nothing(self) -> str:
+        """Why left-out data do not bear it out once all is refitted; empty if they do."""
         if self.outdone or self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"
         # The best of so many forms falls by 2 ln of their number more than one of them would; so
@@ -174,7 +181,25 @@ def taken(
         enough = SETTINGS.passing if is_local(name) else SETTINGS.tie
         if less.kept and found.fit.against(less.fit)[0] <= enough:
             found = less
+    return _without_nothing(fit, found, runs)
+
+
+def _without_nothing(fit: ScoreFit, found: Taken, runs: int) -> Taken:
+    """Without numbers that may be zero, as long as left-out data are predicted no worse."""
+    for k in reversed(range(len(found.numbers))):
+        number = found.numbers[k]
+        may_be_zero = number.name and number.low <= 0 <= number.high
+        formula = found.formula.without(k) if may_be_zero else None
+        less = _added(fit, formula, runs) if formula else None
+        if less and less.after <= found.after:
+            found = less
     return found
+
+
+def doubtful_moments(findings: Sequence[Finding], formula: Formula) -> list[str]:
+    """Doubtful findings of a moment of one run, but for those that a formula stands for."""
+    own = [f.effect for f in findings if f.certainty == "doubtful"]
+    return [n for n in own if with_role(n, "moment") and n not in formula.instead_of]
 
 
 def needless(fit: ScoreFit, formula: Formula, local: Sequence[str], runs: int) -> list[str]:

@@ -17,13 +17,14 @@ from twinmill.diagnosis.apart import without_own
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.screening import screen
-from twinmill.diagnosis.taking import Taken, taken
+from twinmill.diagnosis.taking import Taken, doubtful_moments, taken
 from twinmill.diagnosis.trials import (
     REFIT,
     State,
     Trial,
     cross_validate,
     fitted_from,
+    with_base,
     with_effects,
     without_effect,
 )
@@ -37,7 +38,7 @@ from twinmill.model.parameters import (
     take_alignment,
     with_role,
 )
-from twinmill.predict.datasets import Dataset, total_score
+from twinmill.predict.datasets import total_score
 
 
 @dataclass(frozen=True)
@@ -121,19 +122,8 @@ class Candidates:
 
         So that a later diagnosis knows what these logs told of the base, found stale or not.
         """
-        state = trial.state
-        known = {p.name for p in state.free}
-        held = {p.name for d in state.datasets for p in d.own}
-        held |= set() if base_lag_is_identifiable(state.model) else {LAG}
-        base = [n for n in self.diagnosis.base_names if n not in known | held]
-        free = [*state.begun(), *base_parameters(state.model, base)]
-        lasting = self._lasting(state.model)
-        whole = ScoreFit(state.datasets, state.models, free).fit()
-        if total_score(whole.held_scores) <= trial.held_score:
-            return self._candidate(whole, lasting, whole)
-        as_found = ScoreFit(_begun(state), state.models, free)
-        as_found.store()
-        return self._candidate(as_found, lasting, trial.fit)
+        fit, held = with_base(trial, self.diagnosis.base_names)
+        return self._candidate(fit, self._lasting(trial.state.model), held)
 
     def others_of_groups(self) -> Iterator[Candidate]:
         """All that was found, with another member of a group in the place of the one told first."""
@@ -158,7 +148,7 @@ class Candidates:
             proven,
             beside=[f.effect for f in beside if f.effect in doubtful or is_local(f.effect)],
             runs=len({o.measurement.log_sha256 for o in told.opened}),
-            passing=[name for name in doubtful if with_role(name, "moment")],
+            passing=doubtful_moments(told.findings, proven),
             given=told.search.rounds[0].before.fit.held_square,
         )
         kept = [n for n in own.effects if n not in found.formula.instead_of]
@@ -200,9 +190,3 @@ class Candidates:
 
 def _blocks(fit: ScoreFit) -> np.ndarray:
     return np.concatenate(fit.block_squares)
-
-
-def _begun(state: State) -> list[Dataset]:
-    """Its data sets with what each has of its own begun at what was found."""
-    pairs = zip(state.datasets, state.models, strict=True)
-    return [replace(d, own=tuple(p.at(m.get(p.name)) for p in d.own)) for d, m in pairs]
