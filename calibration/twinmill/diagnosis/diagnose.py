@@ -71,7 +71,6 @@ from twinmill.diagnosis.trials import (
     REFIT,
     State,
     Trial,
-    begun_nearer,
     cross_validate,
     with_base,
     without_effect,
@@ -454,7 +453,7 @@ def _concluded(
         random,
         () if rest.events.later else unsteady([o.measurement for o in known]),
         own,
-        begun_nearer(first, done.start),
+        _drift(given, first, start, last),
         random_in_words(scatters, [r.noise for r in modelled], model_file.model) if random else "",
     )
     if weighed.verdict == "outside_catalogue":
@@ -527,6 +526,23 @@ def _beside_formula(
     gone = needless(last.fit, rest.proven, local, runs) if rest.proven else []
     why = "the formula that was proven for the rest, fitted in its place, leaves no more than it"
     return [doubted(f, why) if f.effect in gone else f for f in findings]
+
+
+def _drift(given: float, first: State, start: Trial, last: Trial) -> Finding | None:
+    """Numbers of the base that were free when the search began, as they came out, and their share.
+
+    Args:
+        given: score of the model as given.
+        first: where the search started, and what was free there.
+        start: the first fit of it.
+        last: the final trial.
+    """
+    names = {p.name for p in first.free if p.name.startswith("base.")}
+    own = [e for e in last.fit.shared_estimates() if e.name in names]
+    own.sort(key=lambda e: -last.fit.moved[e.name])
+    excess = given**2 - min(last.held_score**2, 1.0)
+    share = (given**2 - start.held_score**2) / max(excess, 1e-9)
+    return Finding(REFIT, None, own, float(np.clip(share, 0.0, 1.0)), "sure") if own else None
 
 
 def _gains_nothing(

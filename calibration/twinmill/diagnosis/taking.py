@@ -185,13 +185,13 @@ def taken(
 
 
 def _without_nothing(fit: ScoreFit, found: Taken, runs: int) -> Taken:
-    """Without numbers that may be zero, as long as left-out data are predicted no worse."""
+    """Without numbers that may be zero, and are worth less on left-out data than a number costs."""
     for k in reversed(range(len(found.numbers))):
         number = found.numbers[k]
         may_be_zero = number.name and number.low <= 0 <= number.high
         formula = found.formula.without(k) if may_be_zero else None
         less = _added(fit, formula, runs) if formula else None
-        if less and less.after <= found.after:
+        if less and found.fit.against(less.fit)[0] <= SETTINGS.each:
             found = less
     return found
 

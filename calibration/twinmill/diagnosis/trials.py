@@ -186,13 +186,6 @@ def nearer(state: State) -> State:
     return replace(state, models=models, free=tuple(begun_about(state.free, near)))
 
 
-def begun_nearer(given: State, start: State) -> bool:
-    """Whether gains of the base were far off, so that a search started elsewhere than given."""
-    names = [p.name for p in given.free]
-    pairs = zip(given.models, start.models, strict=True)
-    return any(a.get(name) != b.get(name) for a, b in pairs for name in names)
-
-
 def with_effects(
     state: State, names: Sequence[str], start: dict[str, float] | None = None
 ) -> State:

@@ -4,12 +4,15 @@
 The robots are no twin: each hides something of its own, written here in NumPy over whole motions.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from twinmill.challenge.cases import Case, draw, draw_robots, make_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import Explanation, explain
+from twinmill.diagnosis.formula import Number
 from twinmill.diagnosis.taking import taken
 from twinmill.fitting.compare import compare
 from twinmill.fitting.score_fit import ScoreFit
@@ -188,6 +191,20 @@ def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
     assert "floor_tilt" in effect_names(whole.fit.models[0])
     assert "floor_tilt" not in effect_names(less.fit.models[0])
     assert less.formula.instead_of == (*formula.instead_of, "floor_tilt") and less.kept
+
+
+def test_a_number_that_is_nothing_is_no_number_of_the_formula(explained):
+    """A second term that is zero all the time had been written, with -5e-26 before it."""
+    result = explained(resonant, 101)
+    formula, state = result.formula.formula, result.diagnosis.search.last.state
+    fit = ScoreFit(state.datasets, state.models, [*state.begun()]).fit()
+    idle = replace(formula.forms[0], shapes=("0*vx",), state=None, constant=0.0, sizes=(1.0,))
+    first, *others = formula.numbers
+    numbers = (first, Number("p1", -5e-26, -1.0, 1.0, "1"), *others)
+    more = replace(formula, forms=(*formula.forms, idle), numbers=numbers)
+    found = taken(fit, more, beside=(), runs=1)
+    assert len(found.numbers) == len(formula.numbers)
+    assert [f.shapes for f in found.formula.forms] == [f.shapes for f in formula.forms]
 
 
 def test_no_formula_is_credited_with_what_a_refit_of_the_base_takes(explained):
