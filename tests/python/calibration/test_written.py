@@ -4,13 +4,16 @@
 The robot shares no code with the twin; what is written is judged on another log of it.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
-from twinmill.diagnosis.written import Candidate, best_of
+from twinmill.diagnosis.trials import cross_validate, without_effect
+from twinmill.diagnosis.written import Candidate, Candidates, best_of
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 
@@ -56,6 +59,34 @@ def test_a_fit_with_lag_and_offset_is_judged_on_the_offset_that_suits_it(
     assert told.after.score < 1.3
     assert compare([run], written).score == pytest.approx(told.after.score, rel=0.01)
     assert compare(other, written).score < 1.3 < compare(other, model_file()).score
+
+
+def test_of_a_group_the_member_that_left_out_data_know_best_is_written(
+    tanh_robot, measure, one_clock_base
+):
+    """A marker 15 mm ahead and 10 mm to the side; a slip of the body was named before it."""
+
+    def aside(pose, valid):
+        c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+        ahead_m, left_m = 0.015, 0.010
+        moved = np.column_stack([c * ahead_m - s * left_m, s * ahead_m + c * left_m])
+        return np.column_stack([pose[:, :2] + moved, pose[:, 2]]), valid
+
+    told = diagnose([measure(tanh_robot(), 421, 40.0, spoil=aside)], one_clock_base)
+    (own,) = told.findings
+    assert own.effect == "marker_offset"
+    less = without_effect(told.search.last, own.effect)
+    slip = cross_validate(less, ("lateral_slip",))
+    group = ("lateral_slip", "marker_offset")
+    named = replace(
+        told,
+        findings=[replace(own, effect=group[0], group=group, certainty="group")],
+        search=replace(told.search, last=slip),
+    )
+    every = Candidates(named, one_clock_base)
+    candidates = [every.given, every.refitted(), every.of(slip), *every.others_of_groups()]
+    assert [c.effects for c in candidates] == [(), (), ("lateral_slip",), ("marker_offset",)]
+    assert best_of(candidates).effects == ("marker_offset",)
 
 
 @pytest.mark.parametrize(
