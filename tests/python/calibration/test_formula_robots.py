@@ -14,6 +14,7 @@ from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import Explanation, explain
 from twinmill.diagnosis.formula import Number
 from twinmill.diagnosis.taking import taken
+from twinmill.diagnosis.trials import with_base
 from twinmill.fitting.compare import compare
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
@@ -205,6 +206,19 @@ def test_a_number_that_is_nothing_is_no_number_of_the_formula(explained):
     found = taken(fit, more, beside=(), runs=1)
     assert len(found.numbers) == len(formula.numbers)
     assert [f.shapes for f in found.formula.forms] == [f.shapes for f in formula.forms]
+
+
+def test_a_formula_that_is_a_gain_of_the_base_gains_nothing_beside_it(explained):
+    """Where the base had been held, such a formula had been proven."""
+    result = explained(resonant, 101)
+    formula, last = result.formula.formula, result.diagnosis.search.last
+    whole, _ = with_base(last, result.diagnosis.base_names)
+    turning = replace(
+        formula.forms[0],
+        **{"adds_to": "omega_radps", "shapes": ("omega",), "constant": 0.0, "sizes": (1.0,)},
+    )
+    gain = replace(formula, forms=(turning,), numbers=formula.numbers[:1], instead_of=())
+    assert taken(whole, gain, beside=(), runs=1).gains_nothing
 
 
 def test_no_formula_is_credited_with_what_a_refit_of_the_base_takes(explained):
