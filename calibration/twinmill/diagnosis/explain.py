@@ -228,7 +228,8 @@ def _made(
     middle = middles(fit, apart) if apart else []
     gone = {m.name for m in middle} | {e.name for e in shared if _passes(e, diagnosis)}
     others = [e for e in shared if e.name not in gone]
-    estimates = [*others, *middle, *fit.first_phases, *diagnosis.detection_estimates]
+    phases = [] if own.as_given else fit.first_phases
+    estimates = [*others, *middle, *phases, *diagnosis.detection_estimates]
     covariance = kept.covariance if kept else fit.shared_covariance()
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
