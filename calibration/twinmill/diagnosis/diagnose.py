@@ -71,7 +71,9 @@ from twinmill.diagnosis.trials import (
     REFIT,
     State,
     Trial,
+    begun_nearer,
     cross_validate,
+    on_base_of,
     with_base,
     without_effect,
 )
@@ -453,7 +455,7 @@ def _concluded(
         random,
         () if rest.events.later else unsteady([o.measurement for o in known]),
         own,
-        _drift(given, first, start, last),
+        _drift(given, first, done.start, last),
         random_in_words(scatters, [r.noise for r in modelled], model_file.model) if random else "",
     )
     if weighed.verdict == "outside_catalogue":
@@ -528,21 +530,23 @@ def _beside_formula(
     return [doubted(f, why) if f.effect in gone else f for f in findings]
 
 
-def _drift(given: float, first: State, start: Trial, last: Trial) -> Finding | None:
-    """Numbers of the base that were free when the search began, as they came out, and their share.
+def _drift(given: float, first: State, start: State, last: Trial) -> Finding | None:
+    """Gains of the base that were far off, with what they take beside all that was found.
 
     Args:
         given: score of the model as given.
         first: where the search started, and what was free there.
-        start: the first fit of it.
+        start: the same with gains nearer.
         last: the final trial.
     """
     names = {p.name for p in first.free if p.name.startswith("base.")}
     own = [e for e in last.fit.shared_estimates() if e.name in names]
+    if not own or not begun_nearer(first, start):
+        return None
     own.sort(key=lambda e: -last.fit.moved[e.name])
-    excess = given**2 - min(last.held_score**2, 1.0)
-    share = (given**2 - start.held_score**2) / max(excess, 1e-9)
-    return Finding(REFIT, None, own, float(np.clip(share, 0.0, 1.0)), "sure") if own else None
+    rise = on_base_of(first, last, names).held_score ** 2 - last.held_score**2
+    share = rise / max(given**2 - min(last.held_score**2, 1.0), 1e-9)
+    return Finding(REFIT, None, own, float(np.clip(share, 0.0, 1.0)), "sure")
 
 
 def _gains_nothing(

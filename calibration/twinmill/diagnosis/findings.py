@@ -28,8 +28,8 @@ from twinmill.diagnosis.trials import (
     State,
     Trial,
     estimates_of,
-    fitted,
     fitted_from,
+    on_base_of,
     with_effects,
 )
 from twinmill.fitting.compare import MISSING
@@ -72,7 +72,7 @@ def findings_of(
         less: the final state refitted without each effect.
     """
     names = list(dict.fromkeys(done.found))
-    given = _as_given(done.last, done.start) if REFIT in names else None
+    given = on_base_of(done.start, done.last, done.last.state.base) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
     chains = _Chains(done.start, done.rounds[0].before, done.last)
@@ -297,18 +297,6 @@ class _Chains:
 def _loss(last: Trial, less: Trial | None) -> float:
     """Rise of the squared held-out score without one effect, or with the base as it was given."""
     return 0.0 if less is None else less.held_score**2 - last.held_score**2
-
-
-def _as_given(last: Trial, first: State) -> Trial:
-    """The trial's effects refitted on the base of the model as given."""
-    models = []
-    for model, given in zip(last.state.models, first.models, strict=True):
-        model = model.copy()
-        for name in last.state.base:
-            model.set(name, given.get(name))
-        models.append(model)
-    free = tuple(p for p in last.state.begun() if p.name not in last.state.base)
-    return fitted(replace(last.state, models=models, free=free))
 
 
 def _squared(trial: Trial) -> float:

@@ -153,6 +153,18 @@ def fitted_from(state: State, last: Trial) -> Trial:
     return fitted(replace(state, models=models))
 
 
+def on_base_of(first: State, last: Trial, names: Collection[str]) -> Trial:
+    """A trial's effects refitted with these numbers of the base as another state has them."""
+    models = []
+    for model, given in zip(last.state.models, first.models, strict=True):
+        model = model.copy()
+        for name in names:
+            model.set(name, given.get(name))
+        models.append(model)
+    free = tuple(p for p in last.state.begun() if p.name not in names)
+    return fitted(replace(last.state, models=models, free=free))
+
+
 def with_base(trial: Trial, names: Sequence[str]) -> tuple[ScoreFit, ScoreFit]:
     """All that a trial has fitted with these numbers of the base, and the fit that was held out.
 
@@ -184,6 +196,13 @@ def nearer(state: State) -> State:
     for model, (name, value) in product(models, near.items()):
         model.set(name, value)
     return replace(state, models=models, free=tuple(begun_about(state.free, near)))
+
+
+def begun_nearer(given: State, start: State) -> bool:
+    """Whether gains of the base were far off, so that a search started elsewhere than given."""
+    names = [p.name for p in given.free]
+    pairs = zip(given.models, start.models, strict=True)
+    return any(a.get(name) != b.get(name) for a, b in pairs for name in names)
 
 
 def with_effects(

@@ -32,8 +32,8 @@ class VerdictInputs:
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
         random: the motion is so much less regular than the model says that something is there.
-        drift: numbers of the base that were free when the search began, with the share of the
-            squared error that they take; None if none were.
+        drift: gains of the base that were far off, with the share of the squared error that they
+            take beside what was found; None if they were not.
         disturbed_by: by how much at random, in words; empty if that is not told.
         unsteady: what the input tells of commands that act later from some time on, in sentences.
         apart: numbers in which robots or runs differ; None where one set does as well.
