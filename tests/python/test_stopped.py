@@ -93,7 +93,7 @@ def test_a_fit_that_is_stopped_at_any_stage_writes_nothing(opened, tmp_path, mon
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("stage", ["_polished", "_with_found", "comparison"])
+@pytest.mark.parametrize("stage", ["_best", "_with_effects", "comparison"])
 @pytest.mark.usefixtures("diagnosed")
 def test_explain_that_is_stopped_says_what_it_wrote(opened, tmp_path, monkeypatch, stage):
     """At each of its stages once: what comes after the first Ctrl-C goes on as it was."""

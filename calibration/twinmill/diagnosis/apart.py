@@ -283,7 +283,7 @@ def _alike(opened: Sequence[Opened], state: State) -> State:
     models = [_of_all(m, middle_s) for m in state.models]
     by_run = any(isinstance(d, Trajectory) and d.by_run for d in state.datasets)
     kept = GAINS if by_run and len({d.robot_id for d in state.datasets}) > 1 else ()
-    data = [_without_own(d, kept) for d in state.datasets]
+    data = [without_own(d, kept) for d in state.datasets]
     known = {p.name for p in state.free}
     names = [n for n in base_names(models[0], opened) if n not in known]
     free = (*state.begun(), *base_parameters(models[0], names))
@@ -297,7 +297,8 @@ def _of_all(model: native.Model, lag_s: float) -> native.Model:
     return model
 
 
-def _without_own(data: Trajectory, kept: Collection[str]) -> Trajectory:
+def without_own(data: Trajectory, kept: Collection[str]) -> Trajectory:
+    """Without what its robot has of its own, but for what is kept."""
     if not isinstance(data, Trajectory):
         return data
     own = tuple(p for p in data.own if p.name not in OWN or p.name in kept)

@@ -32,6 +32,7 @@ from twinmill.diagnosis.findings import (
     steps_of,
     with_stale_numbers,
 )
+from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.notes import (
     answers_notes,
     disturbed_notes,
@@ -64,7 +65,7 @@ from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import search
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.stopped import Course
-from twinmill.diagnosis.taking import needless, tuned
+from twinmill.diagnosis.taking import doubtful_moments, needless, taken, tuned
 from twinmill.diagnosis.ties import instead_of_drift
 from twinmill.diagnosis.trials import (
     REFIT,
@@ -72,6 +73,8 @@ from twinmill.diagnosis.trials import (
     Trial,
     begun_nearer,
     cross_validate,
+    on_base_of,
+    with_base,
     without_effect,
 )
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
@@ -87,6 +90,7 @@ from twinmill.fitting.opening import (
     with_own_gains,
     with_own_lags,
 )
+from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     BASE_GAINS,
@@ -410,11 +414,14 @@ def _concluded(
         instead = None if rest.proven.instead_of else _lacking(late, less, known)
         better = (instead and instead.formula(last.fit)) or rest.proven
         rest = replace(rest, proven=tuned(last.fit, better))
+    base = tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes)))
     rest = rest.at_few_commands() if few else rest
     findings = _beside_formula(findings, last, rest, len(set(hashes)))
     cards = catalogue_of(last.state.model)
     findings = of_many(beside_more(of_another_form(findings, rest), rest, cards))
     findings = of_no_right_model(findings, rest, last.held_score)
+    if rest.proven and _gains_nothing(rest.proven, findings, with_base(last, base)[0], start.fit):
+        rest = replace(rest, proven=None)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, done.start, last)]
     rest = rest.with_findings(findings)
@@ -448,7 +455,7 @@ def _concluded(
         random,
         () if rest.events.later else unsteady([o.measurement for o in known]),
         own,
-        begun_nearer(first, done.start),
+        _drift(given, first, done.start, last),
         random_in_words(scatters, [r.noise for r in modelled], model_file.model) if random else "",
     )
     if weighed.verdict == "outside_catalogue":
@@ -493,7 +500,7 @@ def _concluded(
         robots_off=tuple(off),
         runs_off=tuple(runs_off),
         robots=tuple(resolutions([_with_found(o, fitted, last.state.model) for o in opened])),
-        base_names=tuple(base_names(first.model, known, model_file.known_from_other_logs(hashes))),
+        base_names=base,
         apart=own,
     )
 
@@ -521,6 +528,47 @@ def _beside_formula(
     gone = needless(last.fit, rest.proven, local, runs) if rest.proven else []
     why = "the formula that was proven for the rest, fitted in its place, leaves no more than it"
     return [doubted(f, why) if f.effect in gone else f for f in findings]
+
+
+def _drift(given: float, first: State, start: State, last: Trial) -> Finding | None:
+    """Gains of the base that were far off, with what they take beside all that was found.
+
+    Args:
+        given: score of the model as given.
+        first: where the search started, and what was free there.
+        start: the same with gains nearer.
+        last: the final trial.
+    """
+    names = {p.name for p in first.free if p.name.startswith("base.")}
+    own = [e for e in last.fit.shared_estimates() if e.name in names]
+    if not own or not begun_nearer(first, start):
+        return None
+    own.sort(key=lambda e: -last.fit.moved[e.name])
+    rise = on_base_of(first, last, names).held_score ** 2 - last.held_score**2
+    share = rise / max(given**2 - min(last.held_score**2, 1.0), 1e-9)
+    return Finding(REFIT, None, own, float(np.clip(share, 0.0, 1.0)), "sure")
+
+
+def _gains_nothing(
+    proven: Formula, findings: Sequence[Finding], whole: ScoreFit, first: ScoreFit
+) -> bool:
+    """Whether left-out data do not bear a formula out, once the base is refitted beside it.
+
+    Args:
+        proven: the formula.
+        findings: beside it.
+        whole: all that was found, fitted with the base.
+        first: of the model as given.
+    """
+    found = taken(
+        whole,
+        proven,
+        beside=(),
+        runs=len({d.measurement.log_sha256 for d in whole.datasets}),
+        passing=doubtful_moments(findings, proven),
+        given=first.held_square,
+    )
+    return bool(found.gains_nothing)
 
 
 def _doubted(

@@ -12,15 +12,15 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis.apart import middles, of_runs
 from twinmill.diagnosis.diagnose import diagnose, thinned_to_search
-from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.outliers import Outlier, anew
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.stopped import stopped
-from twinmill.diagnosis.taking import EFFECT, Taken, taken
-from twinmill.diagnosis.trials import REFIT, State, fitted, without_effect
+from twinmill.diagnosis.taking import EFFECT, Taken
+from twinmill.diagnosis.trials import REFIT, fitted, without_effect
+from twinmill.diagnosis.written import Candidate, Candidates, best_of
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import common_clock, time_notes, unsteady_clocks
-from twinmill.fitting.opening import Opened, judged, lag_is_kept, with_own_gains
+from twinmill.fitting.opening import judged, lag_is_kept, with_own_gains
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.covariance import Covariance
@@ -29,19 +29,14 @@ from twinmill.model.parameters import (
     GAINS,
     LAG,
     LAG_EFFECT,
-    Parameter,
     ParameterEstimate,
     base_lag_is_identifiable,
     base_parameters,
     catalogue_name,
     effect_parameters,
-    is_local,
     late_part,
     newest_instance,
-    phases,
-    with_role,
 )
-from twinmill.predict.datasets import Dataset, total_score
 
 
 @dataclass(frozen=True)
@@ -57,6 +52,7 @@ class Explanation:
             was not asked for.
         gained: the new model predicts left-out data better than the given one; else it has the
             numbers that were given.
+        lacks: effects that were found, without which left-out data are predicted better.
     """
 
     diagnosis: Diagnosis
@@ -65,6 +61,7 @@ class Explanation:
     path: Path | None
     formula: Taken | None = None
     gained: bool = True
+    lacks: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -88,13 +85,15 @@ class Explanation:
     @property
     def left_out(self) -> str:
         """What was found and is not in the model, in a sentence; empty if nothing is."""
-        gone = self.diagnosis.passing
-        if not gone:
-            return ""
-        return (
-            f"Not in the new model: {' and '.join(gone)}, which may be of this run alone; another "
-            "log would be predicted worse by it."
+        whys = (
+            (
+                self.diagnosis.passing,
+                "which may be of this run alone; another log would be predicted worse by it",
+            ),
+            (self.lacks, "without which data that were not fitted to are predicted better"),
         )
+        told = [f"Not in the new model: {' and '.join(of)}, {why}." for of, why in whys if of]
+        return " ".join(told)
 
     @property
     def steps(self) -> list[tuple[str | None, float]]:
@@ -113,6 +112,7 @@ class Explanation:
             "score_after": self.after.score,
             "gained": self.gained,
             "passing": self.diagnosis.passing,
+            "lacks": list(self.lacks),
             "parameters": [e.to_json() for e in self.parameters],
             "model": str(self.path) if self.path else None,
         }
@@ -154,10 +154,13 @@ def explain(
     if not diagnosis.search.stopped:
         try:
             diagnosis = _with_stale_lag(diagnosis)
-            fit, beyond = _whole(diagnosis, formula)
-            child, told = _made(diagnosis, model_file, fit, beyond, out=out, command=command)
-            if not _gained(told, fit, beyond):
-                child, told = _as_given(diagnosis, model_file, beyond, out=out, command=command)
+            progress("weighing the models that may be written")
+            best, beyond = _best(diagnosis, model_file, formula)
+            child, told = _made(diagnosis, model_file, best, beyond, out=out, command=command)
+            if of_runs(diagnosis.apart) and told.after.score > diagnosis.before.score:
+                # The middle of runs that differ was fitted to none of them: it is judged as it is.
+                given = Candidates(diagnosis, model_file).given
+                child, told = _made(diagnosis, model_file, given, beyond, out=out, command=command)
             child.write(force)
             return told
         except KeyboardInterrupt:
@@ -166,8 +169,8 @@ def explain(
             diagnosis = stopped(diagnosis, "Stopped before all was fitted together.")
     if not (diagnosis.lasting or diagnosis.robots_off):
         return Explanation(diagnosis, diagnosis.before, [], None)
-    fit = diagnosis.search.last.fit
-    child, told = _made(diagnosis, model_file, fit, None, out=out, command=command)
+    so_far = Candidates(diagnosis, model_file).as_found
+    child, told = _made(diagnosis, model_file, so_far, None, out=out, command=command)
     child.write(force)
     return told
 
@@ -191,113 +194,47 @@ def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
     return replace(diagnosis, search=replace(diagnosis.search, last=last))
 
 
-def _whole(diagnosis: Diagnosis, formula: bool) -> tuple[ScoreFit, Taken | None]:
-    """All that was found fitted together, and a proven formula where that is asked for."""
-    fit = _polished(diagnosis)
+def _best(
+    diagnosis: Diagnosis, model_file: ModelFile, formula: bool
+) -> tuple[Candidate, Taken | None]:
+    """The model that left-out data know best, and what became of a formula that was proven."""
+    all_of = Candidates(diagnosis, model_file)
+    found = all_of.of(diagnosis.search.last)
+    alone = [all_of.refitted()] if found.effects else []
+    best = best_of([all_of.given, *alone, found, *all_of.others_of_groups()])
     proven = diagnosis.rest.proven if formula else None
-    runs = len({own.measurement.log_sha256 for own in diagnosis.opened})
-    beyond = _beyond(diagnosis, fit, proven, runs) if proven else None
-    return (beyond.fit if beyond and beyond.kept else fit), beyond
-
-
-def _gained(told: Explanation, fit: ScoreFit, beyond: Taken | None) -> bool:
-    """Whether a new model predicts better than the model as given, left-out data too.
-
-    The middle of runs that differ may suit fewer of them than the model as given. Numbers that were
-    fitted though nothing was found must predict most blocks better: a few that follow no command
-    pull them wherever they like. Where lateness changes within a log, and it is not known from its
-    input how, a lag goes half of the way, and suits no other log.
-    """
-    diagnosis = told.diagnosis
-    before = diagnosis.before.score
-    if diagnosis.camera:
-        return True  # what is new is not of the motion alone
-    if told.after.score > before:
-        return False
-    if of_runs(diagnosis.apart):
-        return True
-    if len(diagnosis.robots) > 1:
-        return _held_out(diagnosis, fit) <= before
-    if diagnosis.found and not (diagnosis.lasting or (beyond and beyond.kept)):
-        return False
-    if diagnosis.rest.events.later and any(_is_of_time(p) for p in fit.shared):
-        return False
-    start = diagnosis.search.rounds[0].before.fit
-    if not (diagnosis.findings or (beyond and beyond.kept)):
-        falls = np.concatenate(
-            [
-                (old - new) / np.maximum(old + new, 1e-300)
-                for old, new in zip(start.block_squares, fit.block_squares, strict=True)
-            ]
-        )
-        pulled = diagnosis.verdict == "outside_catalogue" or _unsteady(diagnosis, fit)
-        if pulled or np.median(falls) < 0:
-            return False
-    return total_score(fit.held_scores) <= total_score(start.held_scores)
-
-
-def _held_out(diagnosis: Diagnosis, fit: ScoreFit) -> float:
-    """Score of all robots on parts that were not fitted to, those that differ from the others too.
-
-    Args:
-        diagnosis: with what was found.
-        fit: of the others.
-    """
-    off = [r.score_after for r in diagnosis.robots_off for _ in r.models]
-    return total_score([*fit.held_scores, *off])
-
-
-def _is_of_time(parameter: Parameter) -> bool:
-    """Whether it says how late a robot is."""
-    return parameter.name == LAG or parameter.role == "lateness"
-
-
-def _as_given(
-    diagnosis: Diagnosis,
-    model_file: ModelFile,
-    beyond: Taken | None,
-    *,
-    out: Path,
-    command: str,
-) -> tuple[ModelFile, Explanation]:
-    """The model with the numbers that it had, and what the logs tell of clock and rest."""
-    logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
-    before = diagnosis.before
-    told = Fitted(
-        model=model_file.model.copy(),
-        estimates=[],
-        logs=logs,
-        score_before=before.score,
-        score_after=before.score,
-        clock=_clock(diagnosis, diagnosis.search.rounds[0].before.fit),
-        base_told=bool(model_file.known_from_other_logs(logs.values())),
-        left_over=_left_over(diagnosis, beyond),
-    )
-    child = child_of(model_file, told, Path(out), command)
-    return child, Explanation(diagnosis, before, [], child.path, beyond, gained=False)
+    if not proven:
+        return best, None
+    with_it = all_of.with_formula(found if best.as_given else best, proven)
+    given = replace(all_of, gone=with_it.beyond.formula.instead_of).given
+    beyond = replace(with_it.beyond, outdone=not with_it.outdoes(given))
+    return (replace(with_it, beyond=beyond) if beyond.kept else best), beyond
 
 
 def _made(
     diagnosis: Diagnosis,
     model_file: ModelFile,
-    fit: ScoreFit,
+    own: Candidate,
     beyond: Taken | None,
     *,
     out: Path,
     command: str,
 ) -> tuple[ModelFile, Explanation]:
     """The new model, to be written last of all: Ctrl-C before leaves no file."""
-    model = _with_found(diagnosis, model_file, beyond)
-    kept = beyond if beyond and beyond.kept else None
+    fit, kept = own.fit, own.beyond
+    model = _with_effects(diagnosis, model_file, own)
     shared = kept.estimates if kept else fit.shared_estimates()
-    middle = middles(fit, diagnosis.apart) if diagnosis.apart else []
+    apart = None if own.as_given else diagnosis.apart
+    middle = middles(fit, apart) if apart else []
     gone = {m.name for m in middle} | {e.name for e in shared if _passes(e, diagnosis)}
     others = [e for e in shared if e.name not in gone]
-    estimates = [*others, *middle, *fit.first_phases, *diagnosis.detection_estimates]
+    phases = [] if own.as_given else fit.first_phases
+    estimates = [*others, *middle, *phases, *diagnosis.detection_estimates]
     covariance = kept.covariance if kept else fit.shared_covariance()
     for estimate in estimates:
         model.set(estimate.name, estimate.value)
-    diagnosis = diagnosis.with_robots_off(_anew(diagnosis, fit, model))
+    if not own.as_given:
+        diagnosis = diagnosis.with_robots_off(_anew(diagnosis, fit, model))
     logs = {o.measurement.log_name: o.measurement.log_sha256 for o in diagnosis.opened}
     noise = next((s.noise_at_speed for s in diagnosis.modelled if s.noise), None)
     told = Fitted(
@@ -305,21 +242,25 @@ def _made(
         estimates=[e for e in estimates if e.seen],
         logs=logs,
         score_before=diagnosis.before.score,
-        score_after=total_score(fit.held_scores),
-        noise=noise,
+        score_after=own.score,
+        noise=None if own.as_given else noise,
         clock=_clock(diagnosis, fit),
         base_told=bool(model_file.known_from_other_logs(logs.values()) and not middle),
-        left_over=_left_over(diagnosis, beyond),
-        robots=_own_values(diagnosis, fit),
+        left_over=_left_over(diagnosis, kept),
+        robots={} if own.as_given else _own_values(diagnosis, fit),
         covariance=_with_middles(covariance.of([e.name for e in others]), middle),
     )
     child = child_of(model_file, told, Path(out), command)
-    own = phases(child.model)
-    opened = [(o.aligned if own else o.with_model)(child.model) for o in _on_own_clocks(diagnosis)]
-    after = comparison(child, opened)
-    if of_runs(diagnosis.apart):  # none of these has in the file what it had in the fit
+    after = comparison(child, [o.aligned(child.model) for o in diagnosis.opened])
+    if of_runs(apart):  # none of these has in the file what it had in the fit
         child = child_of(model_file, replace(told, score_after=after.score), Path(out), command)
-    return child, Explanation(diagnosis, after, estimates, child.path, beyond)
+    instead = kept.formula.instead_of if kept else ()
+    told_of = {*own.effects, *diagnosis.passing, *instead}
+    lacks = tuple(n for n in diagnosis.motion if n not in told_of)
+    gained = bool(diagnosis.camera) or not own.as_given
+    return child, Explanation(
+        diagnosis, after, estimates, child.path, beyond, gained=gained, lacks=lacks
+    )
 
 
 def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Outlier]:
@@ -342,21 +283,10 @@ def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Out
     ]
 
 
-def _on_own_clocks(diagnosis: Diagnosis) -> list[Opened]:
-    """All measurements, those of robots that differ on the clocks that suit their own numbers."""
-    off = {r.robot_id: iter(r.models) for r in diagnosis.robots_off}
-    opened = []
-    for own in diagnosis.opened:
-        logs = own.floor and own.data is not None
-        models = off.get(own.measurement.track.robot_id) if logs else None
-        model = next(models, own.model) if models else own.model
-        opened.append(own.with_fitted(model))
-    return opened
-
-
 def _passes(estimate: ParameterEstimate, diagnosis: Diagnosis) -> bool:
-    """Whether a number is of an effect that no other run has."""
-    return catalogue_name(estimate.name) in diagnosis.passing
+    """Whether a number is of this run alone: of an effect that passes, or of changing lateness."""
+    late = bool(diagnosis.rest.events.later) and estimate.name == LAG
+    return late or catalogue_name(estimate.name) in diagnosis.passing
 
 
 def _with_middles(told: Covariance, middle: Sequence[ParameterEstimate]) -> Covariance:
@@ -376,70 +306,24 @@ def _unsteady(diagnosis: Diagnosis, fit: ScoreFit) -> list[str]:
     return list(dict.fromkeys([*unsteady_clocks(fit), *later]))
 
 
-def _beyond(diagnosis: Diagnosis, fit: ScoreFit, proven: Formula, runs: int) -> Taken:
-    """The formula in the model, beside what was found and is not in its place."""
-    *_, (_, before) = diagnosis.steps
-    own = [f for f in diagnosis.findings if f.effect not in (REFIT, *proven.instead_of)]
-    doubtful = [f.effect for f in own if f.certainty == "doubtful"]
-    return taken(
-        fit,
-        proven,
-        before=before,
-        beside=[f.effect for f in own if f.effect in doubtful or is_local(f.effect)],
-        runs=runs,
-        passing=[name for name in doubtful if with_role(name, "moment")],
-        given=diagnosis.search.rounds[0].before.fit.held_square,
-    )
-
-
-def _with_found(diagnosis: Diagnosis, model_file: ModelFile, beyond: Taken | None) -> native.Model:
-    """The model as given with all that was found, before its numbers."""
+def _with_effects(diagnosis: Diagnosis, model_file: ModelFile, own: Candidate) -> native.Model:
+    """The model as given with all that is to be written, before its numbers."""
     model = model_file.model.copy()
-    off = diagnosis.robots_off
-    of_effects = [r for r in off if not r.by_gains]
-    own_effects = [catalogue_name(e.name) for r in of_effects for e in r.parameters]
-    moved = diagnosis.model.effects[len(model.effects) :]
-    kept = beyond.formula if beyond and beyond.kept else None
-    gone = (*(kept.instead_of if kept else ()), *diagnosis.passing)
-    moved = [name for name in moved if catalogue_name(name) not in gone]
-    for effect in dict.fromkeys([*moved, *(f.effect for f in diagnosis.camera), *own_effects]):
-        model.add_effect(catalogue_name(effect))
-    if kept:
-        model.add_effect(EFFECT, kept.equation)
+    off = [] if own.as_given else [r for r in diagnosis.robots_off if not r.by_gains]
+    own_effects = [catalogue_name(e.name) for r in off for e in r.parameters]
+    camera = [f.effect for f in diagnosis.camera]
+    for effect in dict.fromkeys([*own.effects, *camera, *own_effects]):
+        model.add_effect(effect)
+    if own.beyond:
+        model.add_effect(EFFECT, own.beyond.formula.equation)
     return model
 
 
-def _left_over(diagnosis: Diagnosis, beyond: Taken | None) -> dict[str, float]:
+def _left_over(diagnosis: Diagnosis, kept: Taken | None) -> dict[str, float]:
     """What the model still leaves, by what it depends on; a formula took its share of all."""
-    left = 1 - beyond.share if beyond and beyond.kept else 1.0
+    left = 1 - kept.share if kept else 1.0
     falls = diagnosis.rest.left_over or {}
     return {group: left * fall for group, fall in falls.items() if left > 0}
-
-
-def _polished(diagnosis: Diagnosis) -> ScoreFit:
-    """All found effects and the base fitted to the score; never to a worse one on held-out data.
-
-    So that a later diagnosis knows what these logs told of the base, found stale or not.
-    """
-    last = diagnosis.search.last
-    state = last.state
-    known = {p.name for p in state.free}
-    held = {p.name for d in state.datasets for p in d.own}
-    held |= set() if base_lag_is_identifiable(state.model) else {LAG}
-    base = [n for n in diagnosis.base_names if n not in known | held]
-    free = [*state.begun(), *base_parameters(state.model, base)]
-    whole = ScoreFit(state.datasets, state.models, free).fit()
-    if total_score(whole.held_scores) <= last.held_score:
-        return whole
-    as_found = ScoreFit(_begun(state), state.models, free)
-    as_found.store()
-    return as_found
-
-
-def _begun(state: State) -> list[Dataset]:
-    """Its data sets with what each has of its own begun at what was found."""
-    pairs = zip(state.datasets, state.models, strict=True)
-    return [replace(d, own=tuple(p.at(m.get(p.name)) for p in d.own)) for d, m in pairs]
 
 
 def _own_values(diagnosis: Diagnosis, fit: ScoreFit) -> dict[int, list[ParameterEstimate]]:

@@ -23,7 +23,15 @@ from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.term import TIME
-from twinmill.diagnosis.trials import REFIT, State, Trial, estimates_of, fitted, with_effects
+from twinmill.diagnosis.trials import (
+    REFIT,
+    State,
+    Trial,
+    estimates_of,
+    fitted_from,
+    on_base_of,
+    with_effects,
+)
 from twinmill.fitting.compare import MISSING
 from twinmill.model.parameters import (
     CLOCK,
@@ -64,7 +72,7 @@ def findings_of(
         less: the final state refitted without each effect.
     """
     names = list(dict.fromkeys(done.found))
-    given = _as_given(done.last, done.start) if REFIT in names else None
+    given = on_base_of(done.start, done.last, done.last.state.base) if REFIT in names else None
     loss = {n: _loss(done.last, given if n == REFIT else less[n]) for n in names}
     names.sort(key=lambda n: -loss[n])
     chains = _Chains(done.start, done.rounds[0].before, done.last)
@@ -130,7 +138,7 @@ def steps_of(
     state, steps = first, []
     for finding, names in zip(found, order, strict=True):
         state = with_effects(state, names)
-        steps.append((finding.effect, _from_final(state, last).held_score))
+        steps.append((finding.effect, fitted_from(state, last).held_score))
     return steps
 
 
@@ -281,38 +289,14 @@ class _Chains:
             upto = (*upto, name)
             if upto not in self._known:
                 state = with_effects(state, [name])
-                self._known[upto] = state, _from_final(state, self._last)
+                self._known[upto] = state, fitted_from(state, self._last)
             chain.append(self._known[upto][1])
         return chain
-
-
-def _from_final(state: State, last: Trial) -> Trial:
-    """A fit of the state that begins at the final model's values."""
-    values = {p.name: last.state.model.get(p.name) for p in last.state.free}
-    models = []
-    for model in state.models:
-        model = model.copy()
-        for p in state.free:
-            model.set(p.name, values.get(p.name, p.value))
-        models.append(model)
-    return fitted(replace(state, models=models))
 
 
 def _loss(last: Trial, less: Trial | None) -> float:
     """Rise of the squared held-out score without one effect, or with the base as it was given."""
     return 0.0 if less is None else less.held_score**2 - last.held_score**2
-
-
-def _as_given(last: Trial, first: State) -> Trial:
-    """The trial's effects refitted on the base of the model as given."""
-    models = []
-    for model, given in zip(last.state.models, first.models, strict=True):
-        model = model.copy()
-        for name in last.state.base:
-            model.set(name, given.get(name))
-        models.append(model)
-    free = tuple(p for p in last.state.begun() if p.name not in last.state.base)
-    return fitted(replace(last.state, models=models, free=free))
 
 
 def _squared(trial: Trial) -> float:

@@ -223,6 +223,11 @@ class Form:
         """Numbers at which each shape adds what is typical."""
         return USUAL[self.adds_to] / np.array(self.sizes)
 
+    def without(self, k: int) -> "Form":
+        """The same without one of its shapes."""
+        shapes, sizes = ((*own[:k], *own[k + 1 :]) for own in (self.shapes, self.sizes))
+        return replace(self, shapes=shapes, sizes=sizes, column=-1)
+
     def at(self, constant: float) -> "Form":
         """The same with another constant."""
         return replace(self, constant=float(f"{constant:.4g}"), sizes=())

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A formula for what is left that was proven, for reports and JSON."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinmill.diagnosis.forms import Form, joined, summed
+from twinmill.diagnosis.forms import ROOM, Form, joined, summed
 from twinmill.diagnosis.known_physics import resembles
 
 
@@ -108,22 +109,41 @@ class Formula:
     def lasting(self) -> "Formula":
         """Without the terms that have moments of the run alone, if there are others."""
         kept = [form for form in self.forms if not self._passes(form)]
-        if len(kept) in (0, len(self.forms)):
-            return self
+        return self if len(kept) in (0, len(self.forms)) else self._of(kept)
+
+    def without(self, k: int) -> "Formula | None":
+        """Without p0 or another of its first numbers; None if that is all of it, or of a pair."""
+        first = 0
+        for form in self.forms:
+            at, first = k - first, first + len(form.shapes)
+            if at >= len(form.shapes):
+                continue
+            if len(form.shapes) == 1:
+                others = [f for f in self.forms if f is not form]
+                return self._of(others) if others else None
+            if form.adds_to == ROOM:
+                return None
+            less = form.without(at)
+            forms = tuple(less if f is form else f for f in self.forms)
+            own = [n for n in self.numbers if n.name != f"p{k}"]
+            return replace(self, forms=forms, numbers=_named(own))
+        return None
+
+    def _of(self, kept: Sequence[Form]) -> "Formula":
+        """With some of its terms alone."""
         shapes = [n for n in self.numbers if n.name]
         constants = [n for n in self.numbers if not n.name]
         own: list[Number] = []
         others: list[Number] = []
         for form in self.forms:
             first, last = len(form.shapes), len(form.searched)
-            if form in kept:
+            if any(form is k for k in kept):
                 own += shapes[:first]
                 others += constants[:last]
             shapes, constants = shapes[first:], constants[last:]
-        own = [replace(n, name=f"p{k}") for k, n in enumerate(own)]
         timed = any(form.names_time for form in kept)
         holds = {name: span for name, span in self.holds.items() if timed or name != "t"}
-        return replace(self, forms=tuple(kept), numbers=(*own, *others), holds=holds)
+        return replace(self, forms=tuple(kept), numbers=_named([*own, *others]), holds=holds)
 
     @property
     def is_late(self) -> bool:
@@ -165,3 +185,9 @@ class Formula:
             "instead_of": list(self.instead_of),
             "holds": {name: list(span) for name, span in self.holds.items()},
         }
+
+
+def _named(numbers: Sequence[Number]) -> tuple[Number, ...]:
+    """With the names p0 and so on in their order; constants have none."""
+    count = iter(range(len(numbers)))
+    return tuple(replace(n, name=f"p{next(count)}") if n.name else n for n in numbers)

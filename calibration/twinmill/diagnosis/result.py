@@ -19,7 +19,7 @@ from twinmill.diagnosis.trials import REFIT
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.settings import FLOOR_SETTINGS
-from twinmill.model.parameters import ParameterEstimate
+from twinmill.model.parameters import ParameterEstimate, makes_late
 from twinmill.predict.detection_errors import DetectionComparison
 
 PASSES = ("model_adequate", "refit_enough")  # verdicts that let pass what is left
@@ -113,8 +113,12 @@ class Diagnosis:
 
     @property
     def passing(self) -> list[str]:
-        """Effects that were found and are of this run, or may be: no other run has them."""
-        return [f.effect for f in self.findings if f.passes]
+        """Effects that were found and are of this run, or may be: no other run has them.
+
+        Where lateness changes within a log, so are those that make it late.
+        """
+        later = self.rest.events.later
+        return [f.effect for f in self.findings if f.passes or (later and makes_late(f.effect))]
 
     @property
     def lasting(self) -> list[str]:

@@ -12,6 +12,7 @@ from math import log
 import numpy as np
 import twinmill_native as native
 
+from twinmill.diagnosis.finding import Finding
 from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, MOST_NUMBERS, Form, tunable
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
@@ -29,6 +30,7 @@ from twinmill.model.parameters import (
     is_local,
     newest_instance,
     phases,
+    with_role,
 )
 from twinmill.predict.datasets import ErrorDataset, Trajectory, total_score
 
@@ -58,6 +60,7 @@ class Taken:
         evidence: fall of the held-out cost, and the same without the block with the most.
         runs: logs that bear it out.
         replaced: effects in its place that the fit had against which it was judged.
+        outdone: the model as given predicts left-out data as well.
     """
 
     formula: Formula
@@ -71,6 +74,7 @@ class Taken:
     evidence: tuple[float, float]
     runs: int
     replaced: int
+    outdone: bool = False
 
     @property
     def kept(self) -> bool:
@@ -82,7 +86,12 @@ class Taken:
         """What keeps it out of the model; empty if nothing does."""
         if self.formula.passing and self.runs < SEVERAL:
             return "it names the time of one run, and nothing shows that another run shares it"
-        if self.after >= self.before:
+        return self.gains_nothing
+
+    @property
+    def gains_nothing(self) -> str:
+        """Why left-out data do not bear it out once all is refitted; empty if they do."""
+        if self.outdone or self.after >= self.before:
             return "refitted with the rest, it predicts left-out data no better"
         # The best of so many forms falls by 2 ln of their number more than one of them would; so
         # does each effect that it replaced, of all effects.
@@ -130,7 +139,6 @@ def taken(
     fit: ScoreFit,
     formula: Formula,
     *,
-    before: float,
     beside: Sequence[str],
     runs: int,
     passing: Sequence[str] = (),
@@ -143,7 +151,6 @@ def taken(
     Args:
         fit: of all that was found; stays as it is.
         formula: proven on these data.
-        before: held-out score without it, as it is told.
         beside: findings beside it; those that bring nothing any more go. What is at a place or for
             a while was fitted to all of it, and has to bring more.
         runs: logs that these are.
@@ -152,7 +159,7 @@ def taken(
         given: squared error over the floor of the model as given.
     """
     formula = formula.lasting if runs < SEVERAL else formula
-    found = _added(fit, formula, before, runs)
+    found = _added(fit, formula, runs)
     lost = SETTINGS.formula_alike * (given - 1)
 
     def without_passing(names: Sequence[str]) -> Taken:
@@ -170,23 +177,40 @@ def taken(
             found = without_passing([name])
             continue
         gone = (*found.formula.instead_of, name)
-        less = _added(fit, replace(formula, instead_of=gone), before, runs)
+        less = _added(fit, replace(formula, instead_of=gone), runs)
         enough = SETTINGS.passing if is_local(name) else SETTINGS.tie
         if less.kept and found.fit.against(less.fit)[0] <= enough:
             found = less
+    return _without_nothing(fit, found, runs)
+
+
+def _without_nothing(fit: ScoreFit, found: Taken, runs: int) -> Taken:
+    """Without numbers that may be zero, and are worth less on left-out data than a number costs."""
+    for k in reversed(range(len(found.numbers))):
+        number = found.numbers[k]
+        may_be_zero = number.name and number.low <= 0 <= number.high
+        formula = found.formula.without(k) if may_be_zero else None
+        less = _added(fit, formula, runs) if formula else None
+        if less and found.fit.against(less.fit)[0] <= SETTINGS.each:
+            found = less
     return found
+
+
+def doubtful_moments(findings: Sequence[Finding], formula: Formula) -> list[str]:
+    """Doubtful findings of a moment of one run, but for those that a formula stands for."""
+    own = [f.effect for f in findings if f.certainty == "doubtful"]
+    return [n for n in own if with_role(n, "moment") and n not in formula.instead_of]
 
 
 def needless(fit: ScoreFit, formula: Formula, local: Sequence[str], runs: int) -> list[str]:
     """Of sure findings at a place or for a while those that bring nothing beside a formula."""
     if not local:
         return []
-    before = total_score(fit.held_scores)
-    found = taken(fit, formula, before=before, beside=local, runs=runs)
+    found = taken(fit, formula, beside=local, runs=runs)
     return [name for name in local if found.kept and name in found.formula.instead_of]
 
 
-def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
+def _added(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
     """The fit with a formula, and without those in the place of which it is."""
     found, told = _refitted(fit, formula, fit.datasets)
     above = max(fit.held_square - 1, fit.held_square - found.held_square, 1e-9)
@@ -199,7 +223,7 @@ def _added(fit: ScoreFit, formula: Formula, before: float, runs: int) -> Taken:
         numbers=told.numbers,
         estimates=estimates,
         covariance=covariance,
-        before=before,
+        before=total_score(fit.held_scores),
         after=total_score(found.held_scores),
         share=share,
         evidence=(fall, without_best),
@@ -213,7 +237,7 @@ def _added_to_less(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
     models = [_without(m, formula.instead_of) for m in fit.models]
     free = _still_free(fit, models[0])
     bare = ScoreFit(fit.datasets, models, free, fit.by_channel).fit()
-    alone = _added(bare, replace(formula, instead_of=()), total_score(bare.held_scores), runs)
+    alone = _added(bare, replace(formula, instead_of=()), runs)
     return replace(alone, formula=replace(alone.formula, instead_of=formula.instead_of))
 
 

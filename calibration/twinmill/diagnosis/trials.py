@@ -13,9 +13,11 @@ from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     CAMERA_STAGES,
+    LAG,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
+    base_lag_is_identifiable,
     base_parameters,
     begun_about,
     catalogue_name,
@@ -137,6 +139,49 @@ def fitted(state: State) -> Trial:
     """The state's free parameters fitted."""
     fit = state.fit_of(state.begun()).fit()
     return Trial((), fit, replace(state, models=fit.models), 0.0, 0.0, 0.0)
+
+
+def fitted_from(state: State, last: Trial) -> Trial:
+    """The state's free parameters fitted, begun where another trial has them."""
+    values = {p.name: last.state.model.get(p.name) for p in last.state.free}
+    models = []
+    for model in state.models:
+        model = model.copy()
+        for p in state.free:
+            model.set(p.name, values.get(p.name, p.value))
+        models.append(model)
+    return fitted(replace(state, models=models))
+
+
+def on_base_of(first: State, last: Trial, names: Collection[str]) -> Trial:
+    """A trial's effects refitted with these numbers of the base as another state has them."""
+    models = []
+    for model, given in zip(last.state.models, first.models, strict=True):
+        model = model.copy()
+        for name in names:
+            model.set(name, given.get(name))
+        models.append(model)
+    free = tuple(p for p in last.state.begun() if p.name not in names)
+    return fitted(replace(last.state, models=models, free=free))
+
+
+def with_base(trial: Trial, names: Sequence[str]) -> tuple[ScoreFit, ScoreFit]:
+    """All that a trial has fitted with these numbers of the base, and the fit that was held out.
+
+    Never to a worse score held out than the trial's: then its values stand, with their errors.
+    """
+    state = trial.state
+    held = {p.name for p in state.free} | {p.name for d in state.datasets for p in d.own}
+    held |= set() if base_lag_is_identifiable(state.model) else {LAG}
+    free = [*state.begun(), *base_parameters(state.model, [n for n in names if n not in held])]
+    whole = ScoreFit(state.datasets, state.models, free).fit()
+    if total_score(whole.held_scores) <= trial.held_score:
+        return whole, whole
+    pairs = zip(state.datasets, state.models, strict=True)
+    begun = [replace(d, own=tuple(p.at(m.get(p.name)) for p in d.own)) for d, m in pairs]
+    as_found = ScoreFit(begun, state.models, free)
+    as_found.store()
+    return as_found, trial.fit
 
 
 def nearer(state: State) -> State:

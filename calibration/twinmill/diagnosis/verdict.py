@@ -16,7 +16,6 @@ from twinmill.fitting.compare import GOOD, LACKING, MISSING
 CHANGED = (
     "What changed between them is outside the catalogue: look at battery, load, wheels and floor."
 )
-BEGUN_FAR = "The base model's numbers were far off, and were refitted first."
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,8 @@ class VerdictInputs:
         known: score that is no news: that of the model on the logs that it was fitted to.
         disturbed: what was said of stretches that are judged nowhere.
         random: the motion is so much less regular than the model says that something is there.
-        far: the base's gains were far off, and the search began with them nearer.
+        drift: gains of the base that were far off, with the share of the squared error that they
+            take beside what was found; None if they were not.
         disturbed_by: by how much at random, in words; empty if that is not told.
         unsteady: what the input tells of commands that act later from some time on, in sentences.
         apart: numbers in which robots or runs differ; None where one set does as well.
@@ -53,7 +53,7 @@ class VerdictInputs:
     random: bool = False
     unsteady: Sequence[str] = ()
     apart: Apart | None = None
-    far: bool = False
+    drift: Finding | None = None
     disturbed_by: str = ""
 
     @property
@@ -230,14 +230,22 @@ class VerdictInputs:
         """The verdict for people, after what the input and what robots or runs differ in."""
         apart = [self.apart.sentence] if self.apart else []
         apart += [CHANGED] if self._only_runs else []
-        far = [BEGUN_FAR] if self._begun_far else []
-        return " ".join([*self.unsteady, *apart, *far, self._own])
+        return " ".join([*self.unsteady, *apart, *self._refitted_first, self._own])
 
     @property
-    def _begun_far(self) -> bool:
-        """The base's gains were far off, no finding says so, and something else is left."""
-        told = len(self.effects) < len(self.findings)
-        return self.far and not told and bool(self.effects or self._unexplained)
+    def _refitted_first(self) -> list[str]:
+        """Numbers of the base that took most before anything was looked for, if something is left.
+
+        No finding says so, as the base's numbers are let drift.
+        """
+        told = len(self.effects) < len(self.findings) or not (self.effects or self._unexplained)
+        known = told or not drifted(self.score, self.first, self.known)
+        if known or not (self.drift and self.drift.share > 1 / 2):
+            return []
+        return [
+            f"The base model's numbers were stale, and were refitted first: {_values(self.drift)} "
+            f"take {self.drift.takes} of the squared error. Shares are of what they leave."
+        ]
 
     @property
     def _nothing(self) -> str:
@@ -311,9 +319,11 @@ class VerdictInputs:
             return f"No effect is missing beside that.{self._as_before}"
         if verdict == "refit_enough":
             effect = "No other effect" if self.unsteady else "No effect"
+            stale = next((f for f in self.findings if f.effect == REFIT), self.drift)
+            values = f" ({_values(stale)})" if stale else ""
             return (
-                f"{effect} is missing; the base model's numbers were stale, and a refit is enough."
-                f"{self._as_before}"
+                f"{effect} is missing; the base model's numbers were stale{values}, and a refit is "
+                f"enough.{self._as_before}"
             )
         if verdict in ("effect_missing", "ambiguous"):
             return f"{lacking(of_all(self.findings, self.rest.share))}{self._left}"
@@ -418,13 +428,19 @@ class VerdictInputs:
             effects = [_named(f) for f in own if f.effect != REFIT]
             also += f" It was found in place of {_in_turn(effects)}."
         depends = self.rest.depends_on and not self.rest.likely
-        taken = self._taken > self.rest.share
+        taken = sum(f.share for f in self.findings) > self.rest.share
         if self.noises and not (events or depends or self.rest.firm or taken):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{self._most_likely}{also}"
         by_itself = "it wanders by itself, or " if self.rest.wanders else ""
         depends = f"it depends {on}" if on else f"{by_itself}no formula that was tried describes it"
         what = f": {proven.equals}" if proven else ""
+        if taken and named and not proven:
+            own = _in_turn([_named(f) for f in of_all(self.findings, self.rest.share)])
+            return (
+                f"Most of the squared error is taken by {own}. Something outside the catalogue is "
+                f"left; {depends}. {events}"
+            ).rstrip()
         return f"Something outside the catalogue is there{what}; {depends}.{also} {events}".rstrip()
 
     @property
@@ -482,7 +498,7 @@ def _named(finding: Finding) -> str:
     """A finding in the sentence, with what it takes."""
     takes = finding.takes
     if finding.effect == REFIT:
-        values = ", ".join(f"{e.short} {e.value:.3g}{e.of_unit}" for e in finding.parameters[:3])
+        values = _values(finding)
         instead = f", or {' or '.join(finding.group[1:])} instead" if finding.group else ""
         share = f"; {takes}" if finding.share >= 0.005 else ""  # else robots' own gains took it
         doubt = ", doubtful" if finding.certainty == "doubtful" else ""
@@ -492,3 +508,8 @@ def _named(finding: Finding) -> str:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"
     doubt = ", doubtful" if finding.certainty == "doubtful" else ""
     return f"{name} ({takes}{doubt})"
+
+
+def _values(stale: Finding) -> str:
+    """The numbers of the base that moved most, as far as a sentence holds them."""
+    return ", ".join(f"{e.short} {e.value:.3g}{e.of_unit}" for e in stale.parameters[:3])

@@ -210,17 +210,42 @@ class Comparison:
         rest = of_others(len(others), _meaning(total_score(others), nothing))
         return f"Missed: {', '.join(named)}. {rest}"
 
+    def error_rows(self) -> list[dict]:
+        """errors[] of the interface, of all that the score is of: root mean squares over robots.
+
+        Each robot of each log counts by its predictions; one without a floor has no score.
+        """
+        cells: dict[tuple, list[tuple[int, dict]]] = {}
+        scored = [r for r in self.robots if np.isfinite(r.score)] or self.robots
+        for robot in scored:
+            for row in robot.error_rows():
+                key = (row["channel"], row["unit"], row["horizon_s"])
+                cells.setdefault(key, []).append((robot.size, row))
+        return [_together(own) for own in cells.values()]
+
     def to_json(self) -> dict:
-        """The interface's object."""
+        """The interface's object; what is of one robot is of the one that it misses most."""
         return {
             "model": self.model_name,
             **self.worst.to_json(),
             "score": self.score,
+            "errors": self.error_rows(),
             "verdict": self.verdict,
             "robots": [r.to_json() for r in self.robots],
             "bits": self.detections.to_json() if self.detections else None,
             "warnings": self.warnings,
         }
+
+
+def _together(rows: Sequence[tuple[int, dict]]) -> dict:
+    """One row of errors in the place of several, each of so many predictions."""
+    (_, first), *others = rows
+    if not others:
+        return first
+    sizes, own = zip(*rows, strict=True)
+    squares = np.square([[row[name] for name in ("rms", "floor", "ratio")] for row in own])
+    means = np.sqrt(np.average(squares, axis=0, weights=sizes))
+    return first | dict(zip(("rms", "floor", "ratio"), means.tolist(), strict=True))
 
 
 def of_others(count: int, sentence: str) -> str:

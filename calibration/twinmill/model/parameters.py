@@ -301,6 +301,11 @@ def late_part(effect: str) -> tuple[str, str] | None:
     return (LATE_PARTS.get(catalogue()[effect]["stage"], "lag"), own[0]) if own else None
 
 
+def makes_late(name: str) -> bool:
+    """Whether an effect makes late, or a quantity is the base's lag or of such an effect."""
+    return name == LAG or bool(with_role(catalogue_name(name), "lateness"))
+
+
 def making_late(part: str) -> list[str]:
     """Effects whose `late_part` this is."""
     return [name for name in catalogue() if (late := late_part(name)) and late[0] == part]

@@ -4,13 +4,17 @@
 The robots are no twin: each hides something of its own, written here in NumPy over whole motions.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from twinmill.challenge.cases import Case, draw, draw_robots, make_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import Explanation, explain
+from twinmill.diagnosis.formula import Number
 from twinmill.diagnosis.taking import taken
+from twinmill.diagnosis.trials import with_base
 from twinmill.fitting.compare import compare
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
@@ -182,17 +186,45 @@ def test_a_doubtful_effect_that_says_nothing_beside_the_formula_goes(explained):
         model.add_effect("floor_tilt")
     tilt = effect_parameters(models[0], "floor_tilt", fresh=True)
     fit = ScoreFit(state.datasets, models, [*state.begun(), *tilt]).fit()
-    formula, before = result.formula.formula, result.formula.before
-    whole = taken(fit, formula, before=before, beside=(), runs=1)
-    less = taken(fit, formula, before=before, beside=("floor_tilt",), runs=1)
+    formula = result.formula.formula
+    whole = taken(fit, formula, beside=(), runs=1)
+    less = taken(fit, formula, beside=("floor_tilt",), runs=1)
     assert "floor_tilt" in effect_names(whole.fit.models[0])
     assert "floor_tilt" not in effect_names(less.fit.models[0])
     assert less.formula.instead_of == (*formula.instead_of, "floor_tilt") and less.kept
 
 
-def test_the_score_without_the_formula_is_the_last_one_of_the_steps(explained):
+def test_a_number_that_is_nothing_is_no_number_of_the_formula(explained):
+    """A second term that is zero all the time had been written, with -5e-26 before it."""
     result = explained(resonant, 101)
-    assert result.formula.before == result.diagnosis.steps[-1][1]
+    formula, state = result.formula.formula, result.diagnosis.search.last.state
+    fit = ScoreFit(state.datasets, state.models, [*state.begun()]).fit()
+    idle = replace(formula.forms[0], shapes=("0*vx",), state=None, constant=0.0, sizes=(1.0,))
+    first, *others = formula.numbers
+    numbers = (first, Number("p1", -5e-26, -1.0, 1.0, "1"), *others)
+    more = replace(formula, forms=(*formula.forms, idle), numbers=numbers)
+    found = taken(fit, more, beside=(), runs=1)
+    assert len(found.numbers) == len(formula.numbers)
+    assert [f.shapes for f in found.formula.forms] == [f.shapes for f in formula.forms]
+
+
+def test_a_formula_that_is_a_gain_of_the_base_gains_nothing_beside_it(explained):
+    """Where the base had been held, such a formula had been proven."""
+    result = explained(resonant, 101)
+    formula, last = result.formula.formula, result.diagnosis.search.last
+    whole, _ = with_base(last, result.diagnosis.base_names)
+    turning = replace(
+        formula.forms[0],
+        **{"adds_to": "omega_radps", "shapes": ("omega",), "constant": 0.0, "sizes": (1.0,)},
+    )
+    gain = replace(formula, forms=(turning,), numbers=formula.numbers[:1], instead_of=())
+    assert taken(whole, gain, beside=(), runs=1).gains_nothing
+
+
+def test_no_formula_is_credited_with_what_a_refit_of_the_base_takes(explained):
+    """The score without it is that of all that was found with the base refitted beside it."""
+    result = explained(resonant, 101)
+    assert result.formula.after < result.formula.before <= result.diagnosis.steps[-1][1]
 
 
 def test_what_is_switched_is_told_with_its_period_its_moments_and_its_size(explained):

@@ -9,9 +9,8 @@ import pytest
 from twinmill.diagnosis import moments
 from twinmill.diagnosis.diagnose import _after_a_look
 from twinmill.diagnosis.doubts import undetermined
-from twinmill.diagnosis.explain import _gained
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.later import Later, later_from
+from twinmill.diagnosis.later import later_from
 from twinmill.diagnosis.moments import (
     Moment,
     _at_changes,
@@ -22,7 +21,7 @@ from twinmill.diagnosis.moments import (
     to_look_at,
 )
 from twinmill.diagnosis.notes import held_notes
-from twinmill.model.parameters import LAG, ParameterEstimate
+from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.windows import EVERY_S, HORIZONS_S
 
 SPEED_MPS, NOISE_M = 0.2, 3e-4
@@ -156,38 +155,6 @@ def test_an_effect_of_which_no_number_is_determined_is_not_sure(seen, certainty)
     numbers = [ParameterEstimate(f"transient_loss.{n}", 1.0, 1.0, "1", False, seen) for n in "ab"]
     (found,) = undetermined([Finding("transient_loss", None, numbers, 1.0, "sure")])
     assert found.certainty == certainty
-
-
-@pytest.mark.parametrize(
-    ("squares", "verdict", "later", "gained"),
-    [
-        ((0.9,) * 8, "model_adequate", (), True),
-        ((0.9,) * 8, "outside_catalogue", (), False),  # single moments alone
-        ((0.9,) * 8, "cannot_tell", (Later("run", 1, 30.0, 0.2),), False),  # of two latenesses
-        ((1.1,) * 7 + (0.0,), "model_adequate", (), False),  # one block pulled the numbers
-        ((1.1,) * 8, "model_adequate", (), False),
-    ],
-)
-def test_numbers_that_gain_nothing_are_not_written(squares, verdict, later, gained):
-    def fit(own):
-        held = [np.sqrt(np.sum(own))]
-        return SimpleNamespace(
-            block_squares=[np.array(own)],
-            held_scores=held,
-            datasets=[],
-            shared=[SimpleNamespace(name=LAG)],
-        )
-
-    rest = SimpleNamespace(events=SimpleNamespace(later=later))
-    start = SimpleNamespace(before=SimpleNamespace(fit=fit((1.0,) * 8)))
-    search = SimpleNamespace(rounds=[start])
-    nothing = {"findings": [], "found": [], "lasting": [], "camera": (), "apart": None}
-    before, after = (SimpleNamespace(score=np.sqrt(np.mean(own))) for own in ((1.0,), squares))
-    diagnosis = SimpleNamespace(
-        search=search, verdict=verdict, robots=(None,), rest=rest, before=before, **nothing
-    )
-    told = SimpleNamespace(diagnosis=diagnosis, after=after)
-    assert _gained(told, fit(squares), None) == gained
 
 
 @pytest.mark.parametrize(

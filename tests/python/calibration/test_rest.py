@@ -612,6 +612,33 @@ def test_a_formula_in_place_of_all_that_is_doubtful_is_told_first(certainty, ins
     assert all(f.effect in weighed.sentence for f in found)
 
 
+@pytest.mark.parametrize(("share", "first"), [(0.96, True), (0.4, False)])
+def test_what_took_most_is_told_first_with_its_numbers(share, first):
+    """A refit took nearly all, and "something outside the catalogue" had stood before it."""
+    gain = ParameterEstimate("base.yaw_gain", 0.785, 0.003, "1", False, True)
+    stale = Finding(REFIT, None, [gain], share, "sure")
+    rest = Rest(1 - share, True, ["place"])
+    weighed = VerdictInputs(8.1, 8.1, 1.8, 1.8, [stale], rest, [], [], [], 1.0)
+    assert weighed.verdict == "outside_catalogue" and "place" in weighed.sentence
+    begin = "Most of the squared error is taken by stale numbers of the base (yaw_gain 0.785"
+    assert weighed.sentence.startswith(begin) == first
+    assert weighed.sentence.startswith("Something outside the catalogue") != first
+
+
+@pytest.mark.parametrize(("share", "first"), [(0.96, True), (0.3, False)])
+def test_gains_that_took_most_before_anything_was_looked_for_are_told_with_their_values(
+    share, first
+):
+    gain = ParameterEstimate("base.forward_gain", 0.7, 0.003, "1", False, True)
+    drift = Finding(REFIT, None, [gain], share, "sure")
+    found = [Finding("transient_loss", None, [], 1.0, "sure")]
+    weighed = VerdictInputs(
+        *(8.1, 2.0, 2.0, 1.0), found, Rest(0.0, False, []), [], [], [], 1.0, drift=drift
+    )
+    assert ("forward_gain 0.7 take 96 % of the squared error" in weighed.sentence) == first
+    assert "Missing: transient_loss (100 %)." in weighed.sentence
+
+
 @pytest.mark.parametrize(
     ("takes", "wrong_form", "verdict"),
     [
