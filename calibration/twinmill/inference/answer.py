@@ -138,13 +138,31 @@ def _named(name: str, best: tuple[str, ...], every: list[Belief], table: Table) 
         certainty, group = "sure", (name,)
     elif total >= PRIORS.sure and len(group) > 1:
         certainty = "group"
-    chosen = max((e for e in table.numbers if sorted(e) == sorted(best)), key=len)
-    numbers = {
-        label.split(".", 1)[1]: v
-        for label, v in table.numbers[chosen].items()
-        if catalogue_name(label) == name
-    }
+    numbers = _averaged(name, every, table)
     return Named(name, p, group, total, certainty, numbers)
+
+
+def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[float, float]]:
+    """Numbers of an effect and their standard deviations, over all sets of effects that hold it.
+
+    The spread between sets counts, too: which others are missing is not known for certain.
+    """
+    weight: dict[tuple[str, ...], float] = {}
+    for b in every:
+        if name in b.fitted:
+            key = tuple(sorted(b.fitted))
+            weight[key] = weight.get(key, 0.0) + b.probability
+    sets = [e for e in table.numbers if name in e]
+    shares = np.array([weight.get(tuple(sorted(e)), 0.0) for e in sets])
+    shares = shares / shares.sum()
+    own = [k for k in table.numbers[sets[0]] if catalogue_name(k) == name]
+    found = {}
+    for label in own:
+        values, stds = np.array([table.numbers[e][label] for e in sets]).T
+        mean = float(shares @ values)
+        spread = float(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)))
+        found[label.split(".", 1)[1]] = mean, spread
+    return found
 
 
 def _rest(

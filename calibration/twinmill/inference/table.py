@@ -136,8 +136,8 @@ class _Beside:
         log_relative: (M,) log prior of its size where it is what the form of each of `subsets`
             leaves, over that of a thing of its own.
         cov: prior covariance of a stale base; None for what is known.
-        local: (B,) what moments cost the evidence, in the blocks in which they are: where a block
-            counts less, so does the price of what happened in it.
+        local: (B,) what moments add to the density of the blocks in which they are, less what
+            the fit of their columns adds: where a block counts less, so does what it cost.
     """
 
     words: tuple[str, ...]
@@ -213,20 +213,21 @@ class _Comparison:
             white = self.view.moments[0][list(on)].reshape(-1, len(self.view.block))
             fall = 2 * float(found.gains[len(on)])
             relative = self._log_relative(np.array(fall))
-            price = self._price(bare, white, chance, on)
-            beside.append(_Beside(words, white, chance, fall, relative, cov, price))
+            local = self._local(bare, white, found, on, chance=chance)
+            beside.append(_Beside(words, white, chance, fall, relative, cov, local))
         return beside[0], beside[1]
 
-    def _price(self, bare: Linear, white: np.ndarray, chance: float, on) -> np.ndarray:
-        """(B,) change of the evidence by moments less that of the density, in their blocks."""
-        count = self.view.block.max() + 1
+    def _local(
+        self, bare: Linear, white: np.ndarray, found: moments.Found, on, *, chance: float
+    ) -> np.ndarray:
+        """(B,) what moments add to the density of their blocks once they are integrated out."""
+        count, block = self.view.block.max() + 1, self.view.block
         if not len(on):
             return np.zeros(count)
-        linear, block = bare.with_columns(white), self.view.block
-        density = linear.log_densities(block).sum() - bare.log_densities(block).sum()
-        price = linear.log_evidence + chance - bare.log_evidence - density
         rows = [np.argmax(np.abs(self.view.moments[0][b]).max(axis=0)) for b in on]
-        return np.bincount(block[rows], minlength=count) * price / len(on)
+        net = np.diff(found.gains)[: len(on)] + chance / len(on)
+        fitted = bare.with_columns(white).log_densities(block) - bare.log_densities(block)
+        return np.bincount(block[rows], net, minlength=count) - fitted
 
     def _likeliest(self, usual: _Beside, own: Evidence) -> _Beside:
         """The likeliest form and size of a dependence, as something that is there as well."""
