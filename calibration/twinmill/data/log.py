@@ -22,6 +22,7 @@ from twinmill.data.lcm_log import (
     most_broken,
     split_events,
 )
+from twinmill.data.other_files import LCM_LOG, LOOKED_AT, other_file
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
@@ -127,6 +128,8 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
     """
     path = Path(path)
     data = read_bytes(path)
+    if (other := other_file(data[:LOOKED_AT])) and other[0] != LCM_LOG:
+        raise LogError(f"{path.name}: is {other[0]}, not an LCM log; {other[1]}.")
     events = split_events(data, path.name)
     return decode_log(events, path, hashlib.sha256(data).hexdigest(), channel_prefix)
 

@@ -7,7 +7,7 @@ import difflib
 import gzip
 import io
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -17,6 +17,7 @@ from typing import TextIO
 import numpy as np
 
 from twinmill.data.log import LogError
+from twinmill.data.other_files import GZIP, other_file
 from twinmill.data.units import UNITS, split_unit
 
 DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
@@ -25,6 +26,11 @@ THOUSANDS = re.compile(r"\s*[+-]?\d{1,3},\d{3}\s*")
 OF_EXCEL = re.compile(r"\s*sep=.\s*", re.IGNORECASE)  # a first line that tells Excel the delimiter
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?")
+# As programs write them into names of files: all parts in digits, which alone would be a number.
+DIGITS = re.compile(
+    r"(20\d\d)[_.-]?([01]\d)[_.-]?([0-3]\d)[_T -]?([0-2]\d)[_:.-]?([0-5]\d)[_:.-]?([0-5]\d)"
+    r"(?:[_.,:-]?(\d{1,9}))?Z?"
+)
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
@@ -42,7 +48,8 @@ def open_text(path: Path) -> Iterator[TextIO]:
     """Opens a text file, `.gz` too; on a terminal with a progress bar.
 
     Raises:
-        LogError: it cannot be read, is no text, or ends in `.gz` and is not gzip.
+        LogError: it cannot be read, is no text or another kind of file, or ends in `.gz` and is
+            not gzip.
     """
     from twinmill.terminal import progress_bar  # slow to import, and logs need none
 
@@ -51,8 +58,12 @@ def open_text(path: Path) -> Iterator[TextIO]:
             progress_bar(counted=False) as progress,
             progress.open(path, "rb", description=path.name) as raw,
         ):
-            binary = gzip.GzipFile(fileobj=raw) if path.suffix == ".gz" else raw
-            buffered = io.BufferedReader(binary, BEGINNING_BYTES)
+            buffered = io.BufferedReader(raw, BEGINNING_BYTES)
+            if path.suffix == ".gz" or buffered.peek().startswith(GZIP):
+                buffered = io.BufferedReader(gzip.GzipFile(fileobj=buffered), BEGINNING_BYTES)
+            if other := other_file(buffered.peek()[:BEGINNING_BYTES]):
+                what, remedy = other
+                raise LogError(f"{path}: is {what}, not a table of text; {remedy}.")
             yield io.TextIOWrapper(buffered, _encoding(buffered), newline="")
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
@@ -101,7 +112,7 @@ class Table:
     zero: dict[str, float] = field(default_factory=dict)  # what stands for nothing, if not 0
     notes: list[str] = field(default_factory=list)  # sentences on how the file was read
 
-    def under(self, sources: dict, flips: frozenset[str]) -> "Table":
+    def under(self, sources: dict) -> "Table":
         """The same cells under other names and in other units; columns that nobody names stay."""
         place = {name: k for k, name in enumerate(self.header)}
         taken = {source.column for source in sources.values()}
@@ -116,9 +127,7 @@ class Table:
             ]
             for row in self.rows
         ]
-        factor = {
-            name: source.factor * (-1 if name in flips else 1) for name, source in sources.items()
-        }
+        factor = {name: source.factor for name, source in sources.items()}
         zero = {name: source.zero for name, source in sources.items()}
         return replace(self, header=[*sources, *rest], rows=rows, factor=factor, zero=zero)
 
@@ -136,15 +145,6 @@ class Table:
         index = np.flatnonzero(kept).tolist()
         rows, line = [self.rows[k] for k in index], [self.line[k] for k in index]
         return replace(self, rows=rows, line=line)
-
-    def flipped(self, rows: np.ndarray, columns: Collection[str]) -> "Table":
-        """The numbers of some rows, (rows,) bool, with another sign in some columns."""
-        places = [(k, self.zero.get(n, 0.0)) for k, n in enumerate(self.header) if n in columns]
-        changed = [[*row] for row in self.rows]
-        for row in (changed[k] for k in np.flatnonzero(rows)):
-            for k, zero in places:
-                row[k] = repr(2 * zero - float(row[k])) if is_number(row[k]) else row[k]
-        return replace(self, rows=changed)
 
     def cells(self, column: str) -> list[str]:
         """(rows,) texts of a column.
@@ -173,6 +173,8 @@ class Table:
             cells = ["nan" if cell.lower() in LOST else cell for cell in cells]
         try:
             values = np.array([float(cell) for cell in cells])
+            if any("_" in cell for cell in cells):
+                raise ValueError(column)
             if empty_is_nan:
                 values[np.isinf(values)] = np.nan
             return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
@@ -204,19 +206,20 @@ class Table:
     def is_dated(self, column: str) -> bool:
         """Whether a column holds dates with times, or times of day."""
         first = self.cells(column)[0]
-        return any(kind.match(first) for kind in (DATE, DAY_FIRST, TIME_OF_DAY))
+        kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
+        return any(kind.match(first) for kind in kinds) or bool(DIGITS.fullmatch(first))
 
     def seconds(self, column: str) -> np.ndarray:
         """(rows,) s of a column of numbers, dates or times of day.
 
-        Dates are ISO 8601, or day, month and year with points between; UTC if they name no zone.
-        Times of day go on over midnight.
+        Dates are ISO 8601, in digits alone (20260105_100030_020), or day, month and year with
+        points between; UTC if they name no zone. Times of day go on over midnight.
         """
         if not self.is_dated(column):
             return self.finite(column)
         import pandas as pd  # slow to import
 
-        cells = [_day_last(cell) for cell in self.cells(column)]
+        cells = _of_digits([_day_last(cell) for cell in self.cells(column)])
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
             spans = stamps - pd.Timestamp(0, tz="UTC")
@@ -275,6 +278,26 @@ def _day_last(cell: str) -> str:
         return cell
     day, month, year, clock, part = found.groups()
     return f"{year}-{int(month):02}-{int(day):02}T{clock.zfill(8)}.{part or 0}"
+
+
+def _of_digits(cells: list[str]) -> list[str]:
+    """Dates and times in digits as ISO 8601 has them, if the first cell is one; else as they are.
+
+    What stands behind the second is a part of it; where it has not the same length in all rows it
+    is a number of ms, or of us.
+    """
+    found = [DIGITS.fullmatch(cell) for cell in cells]
+    if not found[0] or DATE.match(cells[0]):
+        return cells
+    widths = {len(match[7] or "") for match in found if match}
+    width = next((w for w in (3, 6, 9) if w >= max(widths)), 9) if len(widths) > 1 else 0
+    return [
+        "{}-{}-{}T{}:{}:{}".format(*match.groups()[:6])
+        + (f".{match[7].zfill(width)}" if match[7] else "")
+        if match
+        else cell
+        for match, cell in zip(found, cells, strict=True)
+    ]
 
 
 def _quantity(name: str) -> str:
@@ -465,4 +488,4 @@ def is_number(cell: str) -> bool:
         float(cell)
     except ValueError:
         return False
-    return True
+    return "_" not in cell  # which Python lets stand between digits

@@ -15,6 +15,7 @@ import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from twinmill.data.importers.topics import APART, SI, field_of, is_path
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
@@ -174,11 +175,11 @@ LEFT, RIGHT = ("fl_pct", "rl_pct"), ("fr_pct", "rr_pct")
 ROBOT = ("robot", "agent", "robotid", "robot_name", "name")
 ALWAYS = frozenset((*ROBOT, "qw", "qx", "qy", "qz"))  # need no unit
 WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "rr": (4,)}
-# Where a field stands in a message of ROS, as tables of bags have it before its name.
-OF_MESSAGE = re.compile(r"^%?(field_)?((pose|transform|twist)_)*(?=[a-z])")
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
-    **dict.fromkeys(("t", "time", "timestamp", "stamp", "secs", "frame_time"), (("t_s",), _time)),
+    **dict.fromkeys(
+        ("t", "time", "timestamp", "stamp", "secs", "frame_time", "__time"), (("t_s",), _time)
+    ),
     **dict.fromkeys((*ROBOT, "id"), (("robot_id",), _plain)),
     **dict.fromkeys(("x", "pos_x", "position_x", "px", "translation_x"), (("x_m",), _length)),
     **dict.fromkeys(("y", "pos_y", "position_y", "py", "translation_y"), (("y_m",), _length)),
@@ -188,6 +189,9 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **dict.fromkeys(("theta", "yaw", "heading", "psi", "phi", "angle"), (("theta_rad",), _angle)),
     **dict.fromkeys(("v", "vx", "linear_x", "speed"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vy", "linear_y"), (("vy_mps",), _speed)),
+    **dict.fromkeys(
+        ("steering", "steering_angle", "steer", "steer_angle"), (("steering_rad",), _angle)
+    ),
     **dict.fromkeys(("w", "omega", "angular_z", "wz", "yaw_rate"), (("omega_radps",), _turn)),
     **dict.fromkeys(("left", "pwm_left", "pwm_l", "u_l", "duty_left"), (LEFT, _duty)),
     **dict.fromkeys(("right", "pwm_right", "pwm_r", "u_r", "duty_right"), (RIGHT, _duty)),
@@ -228,6 +232,8 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **dict.fromkeys(("vitesse", "velocidad"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vitesse_angulaire", "velocidad_angular"), (("omega_radps",), _turn)),
 }
+OF_PLOTJUGGLER = "__time"  # in s, always
+OUR_DAYS_S = (1e9, 2.5e9)  # since 1970: the years 2001 to 2049
 QUATERNIONS = (("qw", "qx", "qy", "qz"), ("qx", "qy", "qz", "qw"))  # orders of q0 to q3
 NUMBERED = ("q0", "q1", "q2", "q3")
 LEVEL = 0.2  # x and y of the quaternion of a robot on a floor are smaller
@@ -236,7 +242,10 @@ COUNTERS = ("frame", "frame_id", "frame_number", "sample", "index")
 
 
 def explain(
-    table: Table, known: frozenset[str], rename: dict[str, str] | None = None
+    table: Table,
+    known: frozenset[str],
+    rename: dict[str, str] | None = None,
+    topic: str | None = None,
 ) -> list[Guess]:
     """What each column looks like, in the order of the file.
 
@@ -244,8 +253,19 @@ def explain(
         table: as it was read.
         known: our columns that this kind of table has.
         rename: column in the file to ours, as a person decided.
+        topic: the one that is meant, in a table of several.
+
+    Raises:
+        LogError: several topics hold what is looked for, and none is named.
     """
-    looks = [_guess(table, column, known, (rename or {}).get(column)) for column in table.header]
+    new = rename or {}
+    others = _of_other_topics(table, known, new, topic)
+    looks = [
+        Guess(column, (), 1.0, "of another topic: left out", True)
+        if column in others
+        else _guess(table, column, known, new.get(column))
+        for column in table.header
+    ]
     guesses: list[Guess] = []
     holder: dict[str, str] = {}  # column that is each of ours
     for guess in _together(table, known, looks):
@@ -330,13 +350,74 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
     if unit_of is _duty and (centred := _centred(column, targets, values)):
         return centred
     factor, why = unit_of(values)
+    if targets == ("t_s",) and (unit := _since_1970(values)):
+        factor, why = UNITS[unit][1], f"counts {unit} since 1970"
+        return Guess(column, targets, factor, why, True)
+    field = field_of(name, USUAL)[1]
+    if (is_path(name) and field in SI) or field == OF_PLOTJUGGLER:
+        return Guess(column, targets, 1.0, "a field of a message: in m, rad, s (REP 103)", True)
     return Guess(column, targets, factor, why, False)
+
+
+def _since_1970(values: np.ndarray) -> str:
+    """Unit in which numbers count the time since then, by their size; empty if they do not."""
+    for unit, per_s in (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        if OUR_DAYS_S[0] * per_s < values.min() and values.max() < OUR_DAYS_S[1] * per_s:
+            return unit
+    return ""
+
+
+WANTED = {  # what a topic holds that tells poses, or commands
+    "poses": frozenset({"x_m", "y_m"}),
+    "commands": frozenset({"vx_mps", "omega_radps"}),
+}
+
+
+def _of_other_topics(
+    table: Table, known: frozenset[str], rename: dict[str, str], topic: str | None
+) -> set[str]:
+    """Columns of topics that are not the one that is meant.
+
+    That is the one that was named, or the only one that tells what is looked for. Commands are told
+    by odometry, which tells places as well, where nothing else tells them.
+    """
+    fields = {c: field_of(c, USUAL) for c in table.header if is_path(c) and c not in rename}
+    targets: dict[str, set[str]] = {}
+    for name, field in fields.values():
+        if name:
+            targets.setdefault(name, set()).update(USUAL[field][0] if field in USUAL else ())
+    wanted = WANTED["poses" if "x_m" in known else "commands"]
+    telling = [name for name, held in targets.items() if wanted <= held]
+    chosen = topic and _plain_topic(topic)
+    if chosen and chosen not in targets:
+        raise LogError(
+            f"{table.name}: no column is of the topic {topic}; its topics are "
+            f"{', '.join(f'/{name}' for name in targets) or 'none'}."
+        )
+    if not chosen:
+        asked = [name for name in telling if not WANTED["poses"] <= targets[name]]
+        telling = telling if "x_m" in known else asked or telling
+        if len(telling) > 1:
+            option = "--pose" if "x_m" in known else "--command"
+            raise LogError(
+                f"{table.name}: several topics tell what is looked for "
+                f"({', '.join(f'/{name}' for name in telling)}); name one, as in {option} "
+                f"/{telling[0]}."
+            )
+        chosen = telling[0] if telling else None
+    if not chosen:
+        return set()
+    return {column for column, (name, _) in fields.items() if name not in ("", chosen)}
+
+
+def _plain_topic(topic: str) -> str:
+    """A topic as `field_of` has it."""
+    return "/".join(plain_name(word) for word in APART.split(topic) if word)
 
 
 def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
     """What a usual name means, wherever in a message of ROS it stands."""
-    plain = plain_name(name)
-    return USUAL.get(plain) or USUAL.get(OF_MESSAGE.sub("", plain))
+    return USUAL.get(field_of(name, USUAL)[1])
 
 
 def is_usual(name: str, known: frozenset[str]) -> bool:

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from twinmill.data.importers.motive import robots_of, with_z_up
-from twinmill.data.importers.series import PoseSeries
+from twinmill.data.importers.motive import robots_of
+from twinmill.data.importers.series import PoseSeries, with_z_up
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import open_text
 
@@ -31,6 +31,7 @@ READINGS = (
     ("a helical vector", Rotation.from_rotvec),
     ("Euler's", partial(Rotation.from_euler, "XYZ")),
 )
+LAST = {"x": "zyx", "y": "zxy", "z": "yxz"}  # orders of turns whose last is about the one
 APART_RAD = 0.01  # of headings, from which it matters which they are
 
 
@@ -57,7 +58,7 @@ def read_vicon(path: Path, robots: dict[str, int], up: str) -> list[PoseSeries]:
     Args:
         path: the export, `.gz` too.
         robots: robot_id by name of the body; others get the last digits in their names.
-        up: "z", Vicon's default, or "y": the axis that the export calls up.
+        up: the axis that the export calls up, "z" by Vicon's default.
 
     Raises:
         LogError: unreadable, no such export, or nothing in it is a robot's.
@@ -194,7 +195,7 @@ def _read(angles_rad: np.ndarray, up: str, who: str) -> tuple[Rotation, str]:
     readings = [reading(angles_rad) for _, reading in READINGS]
     for turned in readings:
         tilts_rad.append(float(np.linalg.norm(turned.inv().apply(vertical).std(axis=0))))
-        headings_rad.append(turned.as_euler("yxz" if up == "z" else "zxy")[:, 2])
+        headings_rad.append(turned.as_euler(LAST[up])[:, 2])
     best = int(np.argmin(tilts_rad))
     apart_rad = np.angle(np.exp(1j * np.diff(headings_rad, axis=0)))
     if np.abs(apart_rad).max() < APART_RAD:
