@@ -420,10 +420,15 @@ def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
     return USUAL.get(field_of(name, USUAL)[1])
 
 
+def targets_of(name: str, known: frozenset[str]) -> tuple[str, ...]:
+    """Our columns that a name, in any unit or a usual one, stands for; none where we know none."""
+    usual = by_name(name, known) or _usual(name) or ((),)
+    return usual[0] if known.issuperset(usual[0]) else ()
+
+
 def is_usual(name: str, known: frozenset[str]) -> bool:
     """Whether a name is one of ours in any unit, or a usual one for what we know."""
-    usual = _usual(name)
-    return bool(by_name(name, known)) or bool(usual and known.issuperset(usual[0]))
+    return bool(targets_of(name, known))
 
 
 LACKS = {  # what a column is whose factor no table has, and that factor, by what ours hold

@@ -15,6 +15,7 @@ from twinmill.data.importers.columns import (
     is_usual,
     lacks,
     mapping_of,
+    targets_of,
 )
 from twinmill.data.importers.side_by_side import in_rows
 from twinmill.data.log import LogError
@@ -39,7 +40,7 @@ def names_in(tables: Collection[Path], known: frozenset[str], rename: dict[str, 
 
 
 def _ours(names: Iterable[str], known: frozenset[str]) -> set[str]:
-    return {ours for name in names for ours in (by_name(name, known) or ((),))[0]}
+    return {ours for name in names for ours in targets_of(name, known)}
 
 
 def check_renames(
