@@ -40,6 +40,7 @@ UNNAMED = "column_{}"  # what columns are called in a file that does not name th
 BEGINNING_BYTES = 65536  # tell the encoding
 MOSTLY = 0.9
 NEAR = 0.5  # likeness of names from which one is proposed for the other
+WIDE = 5  # times as many cells in a row as there are rows: of no table of samples
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
 
@@ -370,6 +371,7 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
             f"{path.name}: has no rows of numbers, so there is nothing to import; check "
             "that the export worked."
         )
+    _refuse_transposed(path.name, header, rows)
     comma = _has_decimal_commas(rows, delimiter)
     if comma:
         rows = [
@@ -430,6 +432,18 @@ def _delimiter(header: str) -> str:
     """What stands between the names most often; spaces where nothing else does."""
     best = max(",;\t|", key=header.count)
     return best if best in header else " " if " " in header.strip() else ","
+
+
+def _refuse_transposed(name: str, header: list[str], rows: list[list[str]]) -> None:
+    """Raises LogError where the rows are the quantities: few, long, and no names above them."""
+    unnamed = header[0] == UNNAMED.format(1) or all(map(is_number, header[1:]))
+    if unnamed and len(header) > WIDE * (len(rows) + 1):
+        count = len(rows) + (header[0] != UNNAMED.format(1))
+        raise LogError(
+            f"{name}: has {count} rows of {len(header)} numbers, so its rows are what columns "
+            "should be: turn it round, as with pandas: pd.read_csv(FILE, header=None).T, and write "
+            "names above the columns."
+        )
 
 
 def _names(header: list[str]) -> list[str]:
