@@ -17,6 +17,7 @@ from typing import TextIO
 import numpy as np
 
 from twinmill.data.log import LogError
+from twinmill.data.nameless import messages, trajectory
 from twinmill.data.other_files import GZIP, other_file
 from twinmill.data.units import UNITS, split_unit
 
@@ -28,11 +29,12 @@ DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?")
 # As programs write them into names of files: all parts in digits, which alone would be a number.
 DIGITS = re.compile(
-    r"(20\d\d)[_.-]?([01]\d)[_.-]?([0-3]\d)[_T -]?([0-2]\d)[_:.-]?([0-5]\d)[_:.-]?([0-5]\d)"
+    r"(20\d\d)[_./-]?([01]\d)[_./-]?([0-3]\d)[_T -]?([0-2]\d)[_:.-]?([0-5]\d)[_:.-]?([0-5]\d)"
     r"(?:[_.,:-]?(\d{1,9}))?Z?"
 )
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
+DAYS = ("date", "day", "datum", "fecha")  # names of columns that hold no time of day
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 LOST = ("", "nan", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost one
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
@@ -40,6 +42,7 @@ UNNAMED = "column_{}"  # what columns are called in a file that does not name th
 BEGINNING_BYTES = 65536  # tell the encoding
 MOSTLY = 0.9
 NEAR = 0.5  # likeness of names from which one is proposed for the other
+OF_TUM = "it has no names; read as a trajectory of TUM: time, x, y, z and a quaternion, w last"
 WIDE = 5  # times as many cells in a row as there are rows: of no table of samples
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
@@ -220,7 +223,8 @@ class Table:
             return self.finite(column)
         import pandas as pd  # slow to import
 
-        cells = _of_digits([_day_last(cell) for cell in self.cells(column)])
+        cells = self._with_days(self.cells(column))
+        cells = _of_digits([_day_last(cell) for cell in cells])
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
             spans = stamps - pd.Timestamp(0, tz="UTC")
@@ -235,6 +239,13 @@ class Table:
             )
         seconds = (spans // pd.Timedelta(microseconds=1)).to_numpy(float) / 1e6
         return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=DAY_S)
+
+    def _with_days(self, cells: list[str]) -> list[str]:
+        """Times of day with the days that stand in a column of their own, if there is one."""
+        day = next((name for name in self.header if name.strip().lower() in DAYS), None)
+        if day is None or not TIME_OF_DAY.match(cells[0]):
+            return cells
+        return [f"{date} {time}" for date, time in zip(self.cells(day), cells, strict=True)]
 
     def refuse(self, bad: np.ndarray, column: str, values: np.ndarray, why: str) -> None:
         """Raises LogError on the first row that is bad, with its value and why."""
@@ -321,7 +332,7 @@ def read_header(path: Path) -> list[str]:
         LogError: unreadable.
     """
     with open_text(path) as text:
-        lines, _, delimiter = _begin(text)
+        lines, _, delimiter, _ = _begin(text)
         reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
         header = _names(next(reader, []))
         return _with_units(header, next(reader, [])) or header
@@ -341,7 +352,8 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     """
     notes = []
     with open_text(path) as text:
-        lines, before, delimiter = _begin(text)
+        lines, before, delimiter, taken = _begin(text)
+        notes += [f"{path.name}: {taken}."] if taken else []
         last = [""]
         reader = csv.reader(_remembered(lines, last), delimiter=delimiter, skipinitialspace=True)
         header = _names(next(reader, []))
@@ -383,8 +395,8 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     return Table(path.name, header, rows, line, known, notes=notes)
 
 
-def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
-    """Lines from the header on, how many stand before it, and the delimiter.
+def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str, str]:
+    """Lines from the header on, how many stand before it, the delimiter, and what it was taken for.
 
     The header may be the last comment before rows of numbers, as NumPy's `savetxt` writes it. Where
     there is none the columns are called as UNNAMED says.
@@ -397,17 +409,22 @@ def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
         if not before and OF_EXCEL.fullmatch(line):
             before += 1
             continue
+        if found := messages(line, chain([line], lines)):
+            return chain([found.names], found.lines), before - 1, ",", found.note
         if not (delimiter := _between_values(line)):
-            return chain([line], lines), before, _delimiter(line)
+            return chain([line], lines), before, _delimiter(line), ""
         named = _delimiter(comment) if comment.strip() else delimiter
+        cells = _split(line, delimiter)
+        if delimiter == " " and (names := trajectory(cells, _split(comment, named))):
+            return chain([f"{names}\n", line], lines), before - 1, " ", OF_TUM
         if comment.strip() and len(_split(comment, named)) == len(_split(line, named)):
-            return chain([comment, line], lines), before - 1, named
-        columns = range(len(_split(line, delimiter)))
-        if _split(line, delimiter) == list(map(str, columns)):  # as pandas names an array's
-            return chain([line], lines), before, delimiter
+            return chain([comment, line], lines), before - 1, named, ""
+        columns = range(len(cells))
+        if cells == list(map(str, columns)):  # as pandas names an array's
+            return chain([line], lines), before, delimiter, ""
         names = delimiter.join(UNNAMED.format(k + 1) for k in columns) + "\n"
-        return chain([names, line], lines), before - 1, delimiter
-    return iter(()), before, ","
+        return chain([names, line], lines), before - 1, delimiter, ""
+    return iter(()), before, ",", ""
 
 
 def _between_values(line: str) -> str:
@@ -420,7 +437,8 @@ def _between_values(line: str) -> str:
 
 
 def _is_value(cell: str) -> bool:
-    times = (DECIMAL_COMMA.fullmatch, DATE.match, DAY_FIRST.match, TIME_OF_DAY.match)
+    kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
+    times = (DECIMAL_COMMA.fullmatch, DIGITS.fullmatch, *(kind.match for kind in kinds))
     return is_number(cell) or any(matches(cell) for matches in times)
 
 

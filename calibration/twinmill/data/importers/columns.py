@@ -15,7 +15,7 @@ import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from twinmill.data.importers.topics import APART, SI, field_of, is_path
+from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
@@ -173,7 +173,8 @@ def _centred(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess
 
 LEFT, RIGHT = ("fl_pct", "rl_pct"), ("fr_pct", "rr_pct")
 ROBOT = ("robot", "agent", "robotid", "robot_name", "name")
-ALWAYS = frozenset((*ROBOT, "qw", "qx", "qy", "qz"))  # need no unit
+UNITS_OF_ONE = tuple(f"{name}{axis}" for name in ("q", "q_rs_") for axis in "wxyz")
+ALWAYS = frozenset((*ROBOT, *UNITS_OF_ONE))  # need no unit
 WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "rr": (4,)}
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
@@ -209,8 +210,15 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **{
         name: ((f"q{axis}",), _plain)
         for axis in "wxyz"
-        for name in (f"orientation_{axis}", f"rotation_{axis}", f"quat_{axis}", f"q_{axis}")
+        for name in (
+            *(f"orientation_{axis}", f"rotation_{axis}", f"quat_{axis}", f"q_{axis}"),
+            f"q_rs_{axis}",
+        )
     },
+    # Ground truth of EuRoC: of the body (S) in the frame R
+    **{f"p_rs_r_{axis}": ((f"{axis}_m",), _length) for axis in "xyz"},
+    # Trajectories of TUM
+    **{f"t{axis}": ((f"{axis}_m",), _length) for axis in "xyz"},
     # German
     **dict.fromkeys(("zeit", "zeitstempel"), (("t_s",), _time)),
     **dict.fromkeys(("roboter", "roboter_id", "nummer"), (("robot_id",), _plain)),
@@ -276,7 +284,8 @@ def explain(
             guess = replace(guess, targets=(), why=why, sure=True, rival=holder[taken[0]])
         holder |= dict.fromkeys(guess.targets, column)
         guesses.append(guess)
-    if "vx_mps" in holder and "omega_radps" in holder and "vy_mps" not in holder:
+    told = {"vx_mps", "omega_radps"} <= holder.keys()
+    if told and not {"vy_mps", "steering_rad"} & holder.keys():
         guesses.append(Guess("", ("vy_mps",), 0.0, "no sideways speed: 0", False))
     return guesses
 
@@ -353,8 +362,7 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
     if targets == ("t_s",) and (unit := _since_1970(values)):
         factor, why = UNITS[unit][1], f"counts {unit} since 1970"
         return Guess(column, targets, factor, why, True)
-    field = field_of(name, USUAL)[1]
-    if (is_path(name) and field in SI) or field == OF_PLOTJUGGLER:
+    if is_si(name, field_of(name, USUAL)[1]) or plain_name(name) == OF_PLOTJUGGLER:
         return Guess(column, targets, 1.0, "a field of a message: in m, rad, s (REP 103)", True)
     return Guess(column, targets, factor, why, False)
 

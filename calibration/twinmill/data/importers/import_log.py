@@ -183,8 +183,10 @@ def _read_capture(given: Sources, options: ImportOptions) -> list[PoseSeries]:
     """Series of the one that is given; stamps since the epoch, or since the capture's start."""
     if given.motive:
         up, absolute = options.up or "y", bool(given.io_tsv)
-        return read_motive(given.motive, options.robots, up, absolute)
-    return read_vicon(given.vicon, options.robots, options.up or "z")
+        return read_motive(
+            given.motive, options.robots, up, absolute=absolute, only=options.robot_id
+        )
+    return read_vicon(given.vicon, options.robots, options.up or "z", options.robot_id)
 
 
 def _read_commands(

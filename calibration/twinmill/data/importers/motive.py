@@ -43,7 +43,9 @@ class _Header:
     time_column: int
 
 
-def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> list[PoseSeries]:
+def read_motive(
+    path: Path, robots: dict[str, int], up: str, *, absolute: bool, only: int | None = None
+) -> list[PoseSeries]:
     """Poses of all rigid bodies.
 
     Args:
@@ -51,6 +53,7 @@ def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> 
         robots: robot_id by name of the rigid body; bodies not named here get the last digits in
             their name.
         up: the axis that the export calls up, "y" by Motive's default.
+        only: robot_id of the only rigid body.
         absolute: stamps since the epoch, the capture start taken as UTC; else since the start.
 
     Raises:
@@ -80,7 +83,7 @@ def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> 
         body: with_z_up(block[:, :3] * scale, _quaternion(block[:, 3:], header.rotation), up)
         for body, block in zip(header.bodies, blocks, strict=True)
     }
-    return robots_of(poses, utime_us, robots, path.name)
+    return robots_of(poses, utime_us, robots, path.name, only)
 
 
 def robots_of(
@@ -88,6 +91,7 @@ def robots_of(
     utime_us: np.ndarray,
     robots: dict[str, int],
     name: str,
+    only: int | None = None,
 ) -> list[PoseSeries]:
     """The bodies that are robots and were seen; the others are named in a warning.
 
@@ -96,6 +100,7 @@ def robots_of(
         utime_us: (N,) ascending.
         robots: robot_id by body; others get the last digits in their names.
         name: of the file.
+        only: number of the only body.
 
     Raises:
         LogError: no body is a robot or was seen, or two have one number.
@@ -103,7 +108,8 @@ def robots_of(
     series: dict[int, PoseSeries] = {}
     left_out = []
     for body, (position_m, quaternion) in poses.items():
-        number = number_of(body, robots)
+        alone = len(poses) == 1 and only is not None
+        number = only if alone else number_of(body, robots)
         if number in series:
             raise LogError(
                 f"{name}: rigid body '{body}' gives the number {number}, which another has; give "

@@ -14,6 +14,7 @@ PARTS = frozenset(
     ("linear", "angular", "position", "orientation", "translation", "rotation", "covariance")
 ) | frozenset(("header", "stamp", "angular_velocity", "linear_acceleration", "magnetic_field"))
 AXES = "xyzw"
+OF_DRIVE = ("speed", "steering_angle")  # of ackermann_msgs/AckermannDrive, in m/s and rad
 # Fields that are in m, rad and s wherever they stand (REP 103).
 SI = frozenset(
     f"{part}_{axis}"
@@ -25,6 +26,17 @@ SI = frozenset(
 def is_path(column: str) -> bool:
     """Whether a name is that of a field in a message, with the way to it."""
     return bool(APART.search(column.strip().strip("%")))
+
+
+def is_si(column: str, field: str) -> bool:
+    """Whether a column is a field whose unit its message fixes.
+
+    Args:
+        column: its name in the file.
+        field: the usual name of it.
+    """
+    words = APART.split(column.lower())
+    return len(words) > 1 and (field in SI or ("drive" in words[:-1] and field in OF_DRIVE))
 
 
 def field_of(column: str, usual: Collection[str]) -> tuple[str, str]:

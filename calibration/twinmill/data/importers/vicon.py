@@ -52,13 +52,16 @@ class _Part:
     rows: np.ndarray
 
 
-def read_vicon(path: Path, robots: dict[str, int], up: str) -> list[PoseSeries]:
+def read_vicon(
+    path: Path, robots: dict[str, int], up: str, only: int | None = None
+) -> list[PoseSeries]:
     """Poses of all bodies, stamped from the capture's first frame on.
 
     Args:
         path: the export, `.gz` too.
         robots: robot_id by name of the body; others get the last digits in their names.
         up: the axis that the export calls up, "z" by Vicon's default.
+        only: robot_id of the only body.
 
     Raises:
         LogError: unreadable, no such export, or nothing in it is a robot's.
@@ -78,7 +81,8 @@ def read_vicon(path: Path, robots: dict[str, int], up: str) -> list[PoseSeries]:
         position_m, quaternion, warning = _pose(part, columns, up, f"{path.name}: '{body}'")
         poses[body] = with_z_up(position_m, quaternion, up)
         warnings += [warning] if warning else []
-    series = robots_of(poses, np.round(1e6 * t_s).astype(np.int64), robots, path.name)
+    utime_us = np.round(1e6 * t_s).astype(np.int64)
+    series = robots_of(poses, utime_us, robots, path.name, only)
     series[0].warnings.extend(warnings)
     return series
 
