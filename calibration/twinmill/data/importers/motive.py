@@ -83,7 +83,7 @@ def read_motive(
         body: with_z_up(block[:, :3] * scale, _quaternion(block[:, 3:], header.rotation), up)
         for body, block in zip(header.bodies, blocks, strict=True)
     }
-    return robots_of(poses, utime_us, robots, path.name, only)
+    return robots_of(poses, utime_us, robots, path.name, only=only)
 
 
 def robots_of(
@@ -91,6 +91,7 @@ def robots_of(
     utime_us: np.ndarray,
     robots: dict[str, int],
     name: str,
+    *,
     only: int | None = None,
 ) -> list[PoseSeries]:
     """The bodies that are robots and were seen; the others are named in a warning.

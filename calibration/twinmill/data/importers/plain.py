@@ -461,7 +461,8 @@ def _utime_us(table: Table, t_s: np.ndarray) -> np.ndarray:
         unit = next((u for u, top in SINCE_1970.items() if largest < top), "ns")
         raise LogError(
             f"{table.name}: t_s goes to {largest:.4g}, which are no seconds; if it counts {unit} "
-            f"since 1970, name the column t_{unit}, in the file or with --rename t_s=t_{unit}."
+            f"since 1970, name the column t_{unit} there, or with --rename t_s=t_{unit} if no "
+            "other file's t_s is in seconds."
         )
     return np.round(t_s * 1e6).astype(np.int64)
 

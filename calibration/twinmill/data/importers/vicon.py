@@ -82,7 +82,7 @@ def read_vicon(
         poses[body] = with_z_up(position_m, quaternion, up)
         warnings += [warning] if warning else []
     utime_us = np.round(1e6 * t_s).astype(np.int64)
-    series = robots_of(poses, utime_us, robots, path.name, only)
+    series = robots_of(poses, utime_us, robots, path.name, only=only)
     series[0].warnings.extend(warnings)
     return series
 
