@@ -253,3 +253,28 @@ def test_where_no_log_is_written_other_options_are_refused(mode, tmp_path):
         if given and option not in used and option not in ("--pose", "--command"):
             done = CliRunner().invoke(app, ["import", *words, *given])
             assert done.exit_code and f"{option}: does nothing here" in said(done)
+
+
+def test_duties_that_follow_from_inputs_change_their_sign_and_their_side(tmp_path, unchecked):
+    """Left, counter-clockwise: the left side is the slow one; mirrored it is the right one."""
+    words = SOURCES["tables"](tmp_path, RIGHT)
+    (tmp_path / "c.csv").write_text("t_s,speed_input,turn_input\n0,100,0.5\n")
+    for options in (
+        ["--flip", "turn_input"],
+        ["--rename", "fl_pct=fr_pct", "--rename", "fr_pct=fl_pct"]
+        + ["--rename", "rl_pct=rr_pct", "--rename", "rr_pct=rl_pct"],
+    ):
+        _, log = run(tmp_path, words, *options)
+        np.testing.assert_array_equal(log.command[0] * 100, [100, 37, 100, 37])
+    _, log = run(tmp_path, words, "--flip", "fl_pct")
+    np.testing.assert_array_equal(log.command[0] * 100, [-37, 100, 37, 100])
+
+
+def test_signs_of_one_robot_change_that_one_alone(tmp_path, unchecked):
+    rows = "".join(f"{k / 10},{robot},{k},{robot}\n" for k in range(9) for robot in (1, 2))
+    (tmp_path / "p.csv").write_text("t_s,robot_id,x_m,y_m\n" + rows)
+    out = tmp_path / "o.lcmlog"
+    words = ["import", "--poses", str(tmp_path / "p.csv"), "--flip", "R02=y_m", "-o", str(out)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    robots = read_log(out).robots
+    assert (robots[1].pose[0, 1], robots[2].pose[0, 1]) == (1, -2)
