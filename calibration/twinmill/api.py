@@ -1487,8 +1487,9 @@ def import_log(
     """Makes a log from motion capture and commands: tables, or files of other programs.
 
     One source of poses (`poses`, `motive`, `vicon`) is needed, and one of commands (`commands`,
-    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. Tables may be those of pandas; the page Files lists their
-    columns. Arguments are named as the options of `twinmill import`, whose help says more.
+    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. Tables may be
+    those of pandas; the page Files lists their columns. Arguments are named as the options of
+    `twinmill import`, whose help says more.
 
     Args:
         poses: CSV or table: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with

@@ -98,8 +98,7 @@ def test_odometry_stands_in_for_commands_and_is_said_to(tmp_path):
 
 def test_a_table_of_wheels_on_the_bench_is_told_with_its_way_out(tmp_path):
     path = tmp_path / "bench.csv"
-    path.write_text(
-        "duty_pct,left_rpm,right_rpm\n" + "".join(f"{k},{2 * k},{2 * k}\n" for k in range(9))
-    )
+    rows = "".join(f"{k},{2 * k},{2 * k}\n" for k in range(9))
+    path.write_text(f"duty_pct,left_rpm,right_rpm\n{rows}")
     with pytest.raises(LogError, match="bench test; write it as a steady-state table"):
         import_log(path, None, tmp_path / "o.lcmlog", options=ImportOptions(robot_id=1))

@@ -261,8 +261,10 @@ def test_duties_that_follow_from_inputs_change_their_sign_and_their_side(tmp_pat
     (tmp_path / "c.csv").write_text("t_s,speed_input,turn_input\n0,100,0.5\n")
     for options in (
         ["--flip", "turn_input"],
-        ["--rename", "fl_pct=fr_pct", "--rename", "fr_pct=fl_pct"]
-        + ["--rename", "rl_pct=rr_pct", "--rename", "rr_pct=rl_pct"],
+        [
+            *("--rename", "fl_pct=fr_pct", "--rename", "fr_pct=fl_pct"),
+            *("--rename", "rl_pct=rr_pct", "--rename", "rr_pct=rl_pct"),
+        ],
     ):
         _, log = run(tmp_path, words, *options)
         np.testing.assert_array_equal(log.command[0] * 100, [100, 37, 100, 37])

@@ -128,7 +128,7 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
 
 
 def refuse_bench(name: str, header: list[str]) -> None:
-    """Raises LogError where a table is of a bench test: duties and speeds of wheels, no places."""
+    """Raises LogError where a table is of a bench test: duties and wheel speeds, no places."""
     names = [plain_name(column) for column in header]
     units = {unit for unit in (split_unit(column)[1] for column in header) if unit}
     kinds = {UNITS[unit][0] for unit in units}
@@ -139,8 +139,8 @@ def refuse_bench(name: str, header: list[str]) -> None:
         raise LogError(
             f"{name}: has duties and wheel speeds and no poses, as a bench test; write it as a "
             "steady-state table and give that to compare, fit or diagnose: "
-            f"{','.join(COLUMNS)}, with the duty as speed_input, 90, 0, and the wheel's speed times "
-            "its radius as speed_mps."
+            f"{','.join(COLUMNS)}, with the duty as speed_input, 90, 0, and the wheel's speed "
+            "times its radius as speed_mps."
         )
 
 
