@@ -176,8 +176,8 @@ class Table:
         if empty_is_nan:
             cells = ["nan" if cell.lower() in LOST else cell for cell in cells]
         try:
-            values = np.array([float(cell) for cell in cells])
-            if any("_" in cell for cell in cells):
+            values = np.fromiter(map(float, cells), float, len(cells))
+            if "_" in "".join(cells):
                 raise ValueError(column)
             if empty_is_nan:
                 values[np.isinf(values)] = np.nan

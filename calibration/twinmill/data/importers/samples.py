@@ -28,7 +28,7 @@ def samples_of(table: Table, own: Collection[str], of_others: frozenset[str]) ->
         of_others: our names for columns of other topics.
     """
     places = [k for k, name in enumerate(table.header) if name in own]
-    if not places or not any(row[places[0]].strip().lower() in LOST for row in table.rows):
+    if not places or all(row[places[0]][-1:].isdecimal() for row in table.rows):
         return table
     sampled = filled_in(table, places)
     if sampled.all() or not sampled.any():
