@@ -96,6 +96,19 @@ def test_odometry_stands_in_for_commands_and_is_said_to(tmp_path):
     assert any("stand in for commands" in warning for warning in done["warnings"])
 
 
+def test_odometry_in_a_table_stands_in_for_commands_and_is_said_to(tmp_path):
+    fields = ["pose.pose.position.x", "pose.pose.position.y", "twist.twist.linear.x"]
+    names = ["Time", *fields, "twist.twist.linear.y", "twist.twist.angular.z"]
+    rows = [f"{START_S + t},{t / 10},{t / 20},0.1,0,0.2" for t in T_S]
+    path = tmp_path / "odom.csv"
+    path.write_text("\n".join([",".join(names), *rows]) + "\n")
+    options = ImportOptions(robot_id=1)
+    done = import_log(path, path, tmp_path / "o.lcmlog", options=options)
+    robot = read_log(tmp_path / "o.lcmlog").robots[1]
+    np.testing.assert_allclose(robot.command[:, :3], np.tile([0.1, 0, 0.2], (len(T_S), 1)))
+    assert any("stand in for commands" in warning for warning in done["warnings"])
+
+
 def test_a_table_of_wheels_on_the_bench_is_told_with_its_way_out(tmp_path):
     path = tmp_path / "bench.csv"
     rows = "".join(f"{k},{2 * k},{2 * k}\n" for k in range(9))

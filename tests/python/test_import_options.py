@@ -236,6 +236,18 @@ def test_each_option_changes_the_log_or_is_refused_by_its_name(source, tmp_path,
             assert option.strip("-") in said(done) or given[-1] in said(done), (source, said(done))
 
 
+def test_what_is_printed_of_times_that_do_not_meet_works_for_every_source(tmp_path, unchecked):
+    late = changed(pose_t_s=RIGHT.pose_t_s + 100.0)
+    for made in SOURCES.values():
+        options, log = [], None
+        for _ in range(3):  # of a bag receipt first, and then a shift
+            done, log = run(tmp_path, made(tmp_path, late), *options)
+            printed = re.findall(r"--(?:pose-shift-s \S+\d|receive-stamps)", said(done))
+            options += [word for option in printed for word in option.split()] if not log else []
+        assert log is not None, (made.__name__, said(done))
+        assert log.pose_t_s[0] == pytest.approx(log.command_t_s[0], abs=0.01)
+
+
 def test_signs_of_what_nothing_holds_are_refused(tmp_path, unchecked):
     for made in SOURCES.values():
         done, log = run(tmp_path, made(tmp_path, RIGHT), "--flip", "fl_pct")

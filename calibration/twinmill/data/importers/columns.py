@@ -15,6 +15,7 @@ import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from twinmill.data.importers.ros_messages import STAND_IN
 from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, is_number
@@ -240,6 +241,7 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **dict.fromkeys(("vitesse", "velocidad"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vitesse_angulaire", "velocidad_angular"), (("omega_radps",), _turn)),
 }
+OF_ODOMETRY = re.compile(r"(^|[./])twist[./]twist[./]")  # with its covariance, as no command has
 OF_PLOTJUGGLER = "__time"  # in s, always
 OUR_DAYS_S = (1e9, 2.5e9)  # since 1970: the years 2001 to 2049
 QUATERNIONS = (("qw", "qx", "qy", "qz"), ("qx", "qy", "qz", "qw"))  # orders of q0 to q3
@@ -363,7 +365,10 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
         factor, why = UNITS[unit][1], f"counts {unit} since 1970"
         return Guess(column, targets, factor, why, True)
     if is_si(name, field_of(name, USUAL)[1]) or plain_name(name) == OF_PLOTJUGGLER:
-        return Guess(column, targets, 1.0, "a field of a message: in m, rad, s (REP 103)", True)
+        why = "a field of a message: in m, rad, s (REP 103)"
+        stands_in = targets == ("vx_mps",) and OF_ODOMETRY.search(name)
+        note = f"{table.name}: {column} {STAND_IN}." if stands_in else ""
+        return Guess(column, targets, 1.0, why, True, note)
     return Guess(column, targets, factor, why, False)
 
 
