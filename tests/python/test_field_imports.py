@@ -4,7 +4,6 @@
 The recordings' README files say what is right, calculated without Twinmill.
 """
 
-import re
 import shutil
 import subprocess
 import sys
@@ -12,7 +11,6 @@ import sys
 import numpy as np
 import pytest
 
-import twinmill as tm
 from twinmill.data.log import read_log
 
 
@@ -86,7 +84,7 @@ def test_a_sign_is_changed_in_a_bag_and_in_an_export_of_vicon(case, imported, tm
     assert "wrong sign" not in said
 
 
-def test_speed_and_steering_angle_are_read_with_the_wheelbase(case, imported, tmp_path):
+def test_speed_and_steering_angle_are_read_with_the_wheelbase(case, imported):
     """Omega = v tan(steering) / wheelbase; the truth has a lag of 0.10 s and a gain of 1."""
     folder = case("steering_csv")
     words = ["--poses", folder / "poses.csv", "--commands", folder / "commands.csv"]
@@ -97,10 +95,6 @@ def test_speed_and_steering_angle_are_read_with_the_wheelbase(case, imported, tm
     command = log.robots[1].command
     np.testing.assert_allclose(command[:, 0], speed)
     np.testing.assert_allclose(command[:, 2], speed * np.tan(steering) / 0.3)
-    model = tmp_path / "m.toml"
-    known = (case("models") / "twist.toml").read_text()
-    model.write_text(re.sub(r"motor_lag_s = [\d.]+", "motor_lag_s = 0.1", known))
-    assert tm.compare(log.path, model).score < 1.15
 
 
 def test_stamps_of_date_and_time_in_digits_are_read(case, imported):

@@ -23,7 +23,7 @@ from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.corrections import corrected
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
-from twinmill.data.importers.mapped import check_renames, read_columns
+from twinmill.data.importers.mapped import check_renames, names_in, read_columns
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.options import (
     Flips,
@@ -111,6 +111,7 @@ def import_log(
     given = Sources(poses, commands, motive, vicon, tuple(io_tsv), bag, detections)
     check_sources(given, options)
     _check_renames(options, [*poses, *commands], detections)
+    _check_wheelbase(options, commands)
     inputs = [*given.files, bag, options.mapping]
     check_new_file(out, options.force, inputs)
     pose_series, command_series = _read(given, options)
@@ -284,6 +285,18 @@ def _check_renames(options: ImportOptions, tables: list[Path], detections: Path 
             raise LogError("--rename: does nothing beside --mapping; write it into that file.")
         files = tables + ([detections] if detections else [])
         check_renames(names, files, KNOWN | OF_DETECTIONS, mapped | KNOWN)
+
+
+def _check_wheelbase(options: ImportOptions, commands: tuple[Path, ...]) -> None:
+    """Raises LogError where a wheelbase is given for tables without a steering angle."""
+    if options.wheelbase_m is None or not commands:
+        return
+    mapped = read_mapping(options.mapping, "commands", KNOWN) if options.mapping else ()
+    if "steering_rad" not in {*mapped, *names_in(commands, KNOWN, options.rename)}:
+        raise LogError(
+            "--wheelbase-m: no table of commands has a steering angle (steering_rad), which it is "
+            "for; leave the option out."
+        )
 
 
 def _exchanged(poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]) -> list[PoseSeries]:

@@ -272,9 +272,9 @@ def read_bag(
         raise LogError("--pose and --command: give one of each for each robot, in the same order.")
     pairs = list(zip(poses, commands or [""] * len(poses), strict=True))
     numbers = [_number(pair, options, len(pairs)) for pair in pairs]
-    rows = _rows(
-        path, [*((t, "pose") for t in poses), *((t, "command") for t in commands)], options
-    )
+    roles = [*((topic, "pose") for topic in poses), *((topic, "command") for topic in commands)]
+    rows = _rows(path, roles, options)
+    _check_options(options, {given.kind for (_, role), given in rows.items() if role == "command"})
     for (pose, command), number in zip(pairs, numbers, strict=True):
         if command and {_told(pose, "", {}), _told("", command, {})} - {None, number}:
             rows[pose, "pose"].notes.append(f"{pose} and {command} are taken for robot {number}.")
@@ -287,6 +287,14 @@ def read_bag(
         if topic
     ]
     return pose_series, command_series
+
+
+def _check_options(options: BagOptions, kinds: set[str]) -> None:
+    """Raises LogError where a number is given that the commands, by their kinds, do not need."""
+    if options.wheelbase_m is not None and not kinds & {*STEERED}:
+        raise LogError("--wheelbase-m: no command is a steering angle; leave the option out.")
+    if options.full_duty is not None and all(COMMANDS[kind][0] != "duty" for kind in kinds):
+        raise LogError("--full-duty: no command is a duty; leave the option out.")
 
 
 def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
