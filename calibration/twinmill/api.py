@@ -100,7 +100,7 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "exchange": ("exchange", (list, tuple), PAIRS),
     "mapping": ("mapping", (str, Path), A_PATH),
     "flip": ("flips", (*NAMES[0], Mapping), "a list of names, or a dictionary of these by robot"),
-    "up": ("up", str, "`y` or `z`"),
+    "up": ("up", str, "`x`, `y` or `z`"),
     "pose_shift_s": ("pose_shift_s", *OF_ROBOTS),
     "pose_clock_ppm": ("pose_clock_ppm", *OF_ROBOTS),
     "heading_from_path": ("path_heading", *SWITCH),
@@ -1531,9 +1531,10 @@ def import_log(
 ) -> Log:
     """Makes a log from motion capture and commands: tables, or files of other programs.
 
-    One source of poses (`poses`, `motive`, `vicon`) and one of commands (`commands`, `io_tsv`) are
-    needed, or a bag, which holds both. Tables may be those of pandas; the page Files lists their
-    columns. Arguments are named as the options of `twinmill import`, whose help says more.
+    One source of poses (`poses`, `motive`, `vicon`) is needed, and one of commands (`commands`,
+    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. Tables may be
+    those of pandas; the page Files lists their columns. Arguments are named as the options of
+    `twinmill import`, whose help says more.
 
     Args:
         poses: CSV or table: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with

@@ -59,16 +59,24 @@ def test_a_name_without_a_unit_is_asked_about(imported, column, usual, looks):
 @pytest.mark.parametrize(
     ("column", "new", "target"),
     [
-        ("x_m", "pose.position.x", "x_m"),
-        ("x_m", "field.pose.pose.position.x", "x_m"),
-        ("x_m", "transform.translation.x", "x_m"),
-        ("theta_rad", "pose.orientation.z", "qz"),
+        ("x_m", "pose.x", "x_m"),
+        ("theta_rad", "/turtle1/pose/theta", "theta_rad"),
         ("t_s", "%time", "t_s"),
     ],
 )
-def test_fields_of_messages_are_asked_about_by_what_they_are(imported, column, new, target):
+def test_fields_of_messages_without_units_are_asked_about(imported, column, new, target):
     with pytest.raises(LogError, match=f"column '{re.escape(new)}' .*--rename .*={target}"):
         imported(POSES.replace(column, new))
+
+
+@pytest.mark.parametrize(
+    "path", ["pose.position.x", "field.pose.pose.position.x", "/a/transform/translation/x"]
+)
+def test_places_in_messages_are_in_metres(imported, path):
+    """REP 103, "Units"; the topic does not matter."""
+    robot, _ = imported(POSES.replace("x_m", path).replace("y_m", f"{path[:-1]}y"))
+    expected, _ = imported(POSES)
+    np.testing.assert_array_equal(robot.pose, expected.pose)
 
 
 def test_velocities_of_the_room_are_asked_about_as_such(imported):

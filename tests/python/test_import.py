@@ -279,7 +279,7 @@ def test_existing_and_unwritable_outputs_are_refused(put, tmp_path):
 def test_not_gzip_and_not_text_are_refused(put, tmp_path):
     commands = put("c.csv", COMMANDS)
     for name in ("p.csv.gz", "p.csv"):
-        (tmp_path / name).write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
+        (tmp_path / name).write_bytes(b"\x89ABC\r\n\x1a\n\0\0\0\rIHDR")
         with pytest.raises(LogError, match="cannot be read as text"):
             import_log(tmp_path / name, commands, tmp_path / "o.lcmlog")
 
@@ -562,10 +562,10 @@ def test_command_prints_one_json_object(put, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "one source of poses and one of commands"),
+        ([], "a log needs one source of poses"),
         (["--rename", "yaw"], "--rename yaw: must have the form OLD=NEW"),
         (["--robot", "a=b"], "'b' is no robot number"),
-        (["--up", "x"], "--up x: must be y or z"),
+        (["--up", "w"], "--up w: must be x, y or z"),
     ],
 )
 def test_wrong_options_are_one_sentence_on_stderr(twinmill, tmp_path, arguments, sentence):

@@ -19,7 +19,14 @@ from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
-from twinmill.data.importers.ros_bag import Topic, _rows, guess_pairs, list_topics, numbering
+from twinmill.data.importers.ros_bag import (
+    BagOptions,
+    Topic,
+    _rows,
+    guess_pairs,
+    list_topics,
+    numbering,
+)
 from twinmill.data.importers.ros_messages import (
     COMMANDS,
     joints_as_they_stand,
@@ -500,7 +507,7 @@ def test_a_bag_of_another_writer_is_read(tmp_path):
             writer.add_message(channel_id=channel, log_time=10**9 * k, publish_time=0, data=data)
         writer.finish()
     topic = "/r05/cmd_vel"
-    rows = _rows(tmp_path / "run.mcap", [topic], receive=False)[topic]
+    rows = _rows(tmp_path / "run.mcap", [(topic, "command")], BagOptions())[topic, "command"]
     kind, utime_us, values = rows.kind, rows.utime_us, rows.value.tolist()
     assert kind == "geometry_msgs/msg/Twist"
     np.testing.assert_array_equal(utime_us, np.arange(20) * 10**6)
@@ -530,9 +537,9 @@ def test_whatever_bytes_are_wrong_it_is_one_sentence_or_read(tmp_path, kind):
         end = random.integers(0, len(data)) if trial % 4 == 0 else len(data)
         bad.write_bytes(data[:end].tobytes())
         try:
-            topics = [t.name for t in list_topics(bad) if t.role]
+            topics = [(t.name, t.role) for t in list_topics(bad) if t.role]
             if topics:
-                _rows(bad, topics, receive=False)
+                _rows(bad, topics, BagOptions())
         except LogError as error:
             refused += 1
             assert "\n" not in str(error) and len(str(error)) < 700

@@ -86,7 +86,7 @@ def test_semicolons_commas_degrees_and_parts_that_follow_are_read(tmp_path):
         ("\n21,0", "\n20,0", "frame 20 comes after frame 20"),
         ("41,-30.5", "41,far", "row 26: 'far' is no number"),
         ("RX,RY,RZ,", "A,B,C,", "no body has RX"),
-        ("car:car", "cab:cab", "no rigid body 'car'"),
+        ("car:car", "cab:cab", "rigid body 'cab' gives no robot_id"),
     ],
 )
 def test_what_is_wrong_is_one_sentence(old, new, words, tmp_path):

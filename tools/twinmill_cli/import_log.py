@@ -28,6 +28,12 @@ if working():  # not for --help
     from twinmill.terminal import PlainConsole
 
 SHOWN = 10  # warnings in the terminal; --json has all
+# Options that do something where columns are explained, and where a bag is listed.
+EXPLAINED = {
+    *("--explain-columns", "--poses", "--commands", "--pose", "--command"),
+    *("--robot-id", "--force", "--out"),
+}
+LISTED = {"--bag", "--json", "--out"}
 
 
 def _of_robots(option: str, given: list[str] | None) -> dict[int | None, float]:
@@ -90,6 +96,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _command(
+    context: typer.Context,
     beside: Annotated[list[str] | None, typer.Argument(hidden=True)] = None,
     *,
     out: Annotated[
@@ -120,8 +127,9 @@ def _command(
         typer.Option(
             help=(
                 "CSV: t_s, robot_id and fl_pct, fr_pct, rl_pct, rr_pct | speed_input, turn_input | "
-                "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps | vx_world_mps, vy_world_mps; "
-                "held until the next row. As with poses one file or one for each robot."
+                "w1_radps..w4_radps | vx_mps, vy_mps, omega_radps | vx_world_mps, vy_world_mps | "
+                "speed_mps, steering_rad; held until the next row. As with poses one file or one "
+                "for each robot. Without any the log is of poses alone."
             )
         ),
     ] = None,
@@ -143,17 +151,19 @@ def _command(
         list[str] | None,
         typer.Option(
             metavar="TOPIC",
-            help="Poses of a robot in the bag; a frame of tf is /tf:FRAME, as in /tf:base_link.",
+            help="Poses of a robot in the bag; a frame of tf is /tf:FRAME, as in /tf:base_link. Of "
+            "a table of several topics the one that is meant.",
         ),
     ] = None,
     command: Annotated[
-        list[str] | None, typer.Option(metavar="TOPIC", help="Commands of that robot.")
+        list[str] | None, typer.Option(metavar="TOPIC", help="Commands of that robot, likewise.")
     ] = None,
     receive_stamps: Annotated[
         bool, typer.Option("--receive-stamps", help="Times of receipt, not of the headers.")
     ] = False,
     wheelbase_m: Annotated[
-        float | None, typer.Option(help="Distance of the axles, for AckermannDrive in a bag.")
+        float | None,
+        typer.Option(help="Distance of the axles, where commands are speed and steering angle."),
     ] = None,
     full_duty: Annotated[
         float | None,
@@ -182,8 +192,8 @@ def _command(
         list[str] | None,
         typer.Option(
             metavar="[ROBOT=]OLD=NEW",
-            help="Read column OLD of the CSV files as NEW, as in yaw=theta_deg, or R02=x_m=y_m of "
-            "one robot.",
+            help="Read column OLD of the CSV files, or one of ours of any source, as NEW, as in "
+            "yaw=theta_deg, or R02=x_m=y_m of one robot.",
         ),
     ] = None,
     exchange: Annotated[
@@ -215,7 +225,7 @@ def _command(
         str | None,
         typer.Option(
             show_default=False,
-            help="Axis that is up in the export, y or z; default: Motive's y, Vicon's z.",
+            help="Axis that is up in the poses, x, y or z; default: Motive's y, z of all others.",
         ),
     ] = None,
     pose_shift_s: Annotated[
@@ -257,7 +267,7 @@ def _command(
     force: Annotated[bool, typer.Option("--force", help="Replace the output.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")] = False,
 ) -> None:
-    """Make a log from motion capture exports and command tables.
+    """Make a log from motion capture exports and command tables, or of poses alone.
 
     Files may end in .gz. A Motive export that goes with io.tsv is placed in time
     by its capture start, read as UTC; use --pose-shift-s for another time zone.
@@ -274,15 +284,21 @@ def _command(
             "pattern, as in --poses 'poses_R*.csv'."
         )
     if explain_columns_to:
+        _refuse_others(context, "--explain-columns", EXPLAINED, "it only says what columns are")
         asked = {
             "poses": files_of(poses, "--poses"),
             "commands": files_of(commands, "--commands"),
         }
-        explained = explain_columns(*(paths[0] if paths else None for paths in asked.values()))
-        _explain(asked, explained, explain_columns_to, robot_id, force=force)
+        explained = explain_columns(
+            *(paths[0] if paths else None for paths in asked.values()),
+            topics=(pose[0] if pose else None, command[0] if command else None),
+        )
+        log = str(out or "run.lcmlog")
+        _explain(asked, explained, explain_columns_to, robot_id, log=log, force=force)
         return
     if bag and not pose and not command:
-        _list(bag, list_topics(bag), as_json)
+        _refuse_others(context, "--bag", LISTED, "without --pose and --command it is only listed")
+        _list(bag, list_topics(bag), str(out or f"{bag.stem}.lcmlog"), as_json)
         return
     if out is None:
         raise LogError("--out is missing: name the log to write.")
@@ -328,14 +344,25 @@ def _command(
         _print(summary)
 
 
-def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
+def _refuse_others(context: typer.Context, mode: str, used: set[str], why: str) -> None:
+    """Raises LogError where an option was given that does nothing there."""
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name)
+        if source and source.name == "COMMANDLINE" and parameter.opts[0] not in used:
+            raise LogError(
+                f"{parameter.opts[0]}: does nothing here, since {mode} was given and {why}; give "
+                "it with what is printed then."
+            )
+
+
+def _list(bag: Path, topics: list[Topic], log: str, as_json: bool) -> None:
     """What a bag holds, and the command that imports what seems to belong together."""
     words, pairs = ["twinmill", "import", "--bag", str(bag)], guess_pairs(topics)
     for pose, command in pairs:
-        words += ["--pose", pose, "--command", command]
+        words += ["--pose", pose, *(["--command", command] if command else [])]
     steered = {t.name for t in topics if t.kind in STEERED} & {command for _, command in pairs}
     words += numbering(pairs) + (["--wheelbase-m", "METRES"] if steered else [])
-    line = shlex.join([*words, "-o", f"{bag.stem}.lcmlog"]) if pairs else None
+    line = shlex.join([*words, "-o", log]) if pairs else None
     if as_json:
         print_object({"topics": [vars(t) for t in topics], "command": line})
         return
@@ -346,6 +373,8 @@ def _list(bag: Path, topics: list[Topic], as_json: bool) -> None:
     table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
     PlainConsole().print(show.table(table))
     PlainConsole().print(f"Try: {line}" if line else _unpaired(topics), soft_wrap=True)
+    if pairs and not any(command for _, command in pairs):
+        PlainConsole().print("It has no commands that can be read: a log of poses alone.")
 
 
 def _unpaired(topics: list[Topic]) -> str:
@@ -365,6 +394,7 @@ def _explain(
     out: Path,
     robot_id: int | None,
     *,
+    log: str,
     force: bool,
 ) -> None:
     """What each column was taken for, here and as a mapping file, and what to type then."""
@@ -392,7 +422,7 @@ def _explain(
     several = max(map(len, asked.values())) > 1
     if not several and not any("robot_id" in g.targets for g in guesses.get("poses", [])):
         words += ["--robot-id", str(1 if robot_id is None else robot_id)]
-    line = shlex.join([*words, "--mapping", str(out), "-o", "run.lcmlog"])
+    line = shlex.join([*words, "--mapping", str(out), "-o", log])
     told = [word for kind in guesses for word in _lacking(kind, guesses[kind])]
     PlainConsole().print(f"Check {out}{''.join(told)}; then:\n  {line}", soft_wrap=True)
 

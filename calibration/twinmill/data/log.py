@@ -22,6 +22,7 @@ from twinmill.data.lcm_log import (
     most_broken,
     split_events,
 )
+from twinmill.data.other_files import LCM_LOG, LOOKED_AT, other_file
 from twinmill.foreign_text import NAME_MAX, plain_line
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
@@ -128,6 +129,8 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
     """
     path = Path(path)
     data = read_bytes(path)
+    if (other := other_file(data[:LOOKED_AT])) and other[0] != LCM_LOG:
+        raise LogError(f"{path.name}: is {other[0]}, not an LCM log; {other[1]}.")
     events = split_events(data, path.name)
     return decode_log(events, path, hashlib.sha256(data).hexdigest(), channel_prefix)
 
@@ -153,6 +156,7 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
         robot_id: _decode_robot(robot_id, kinds, warnings)
         for robot_id, kinds in sorted(channels.items())
     }
+    warnings += _lacking(messages)
     t0_us = min(
         int(m["utime_us"].min()) for pair in messages.values() for m in pair if m is not None
     )
@@ -236,10 +240,6 @@ def _decode_robot(
     for sources in (("TELEMETRY", "DRIVE"), ("POSE",)):
         source = next((s for s in sources if s in kinds), None)
         if source is None:
-            warnings.append(
-                f"{name}: has no {'poses' if sources == ('POSE',) else 'commands'}; "
-                "it cannot be compared with a model."
-            )
             series.append(None)
             continue
         message = getattr(turbopi, f"{source.lower()}_t")
@@ -248,6 +248,20 @@ def _decode_robot(
         messages = _undamaged(messages, channel, warnings)
         series.append(_in_order(messages, channel, robot_id, warnings))
     return series[0], series[1]
+
+
+def _lacking(messages: dict[int, tuple[np.ndarray | None, np.ndarray | None]]) -> list[str]:
+    """Sentences on robots that have no commands, or no poses."""
+    told = []
+    for k, what in enumerate(("commands", "poses")):
+        without = [f"R{robot_id:02d}" for robot_id, own in messages.items() if own[k] is None]
+        if len(without) == 1:
+            told.append(f"{without[0]}: has no {what}; it cannot be compared with a model.")
+        elif without:
+            told.append(
+                f"{', '.join(without)}: have no {what}; they cannot be compared with a model."
+            )
+    return told
 
 
 def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.ndarray:

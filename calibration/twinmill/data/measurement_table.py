@@ -7,7 +7,7 @@ import difflib
 import gzip
 import io
 import re
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -17,6 +17,8 @@ from typing import TextIO
 import numpy as np
 
 from twinmill.data.log import LogError
+from twinmill.data.nameless import messages, trajectory
+from twinmill.data.other_files import GZIP, other_file
 from twinmill.data.units import UNITS, split_unit
 from twinmill.data.unpacking import BoundedText
 
@@ -26,8 +28,14 @@ THOUSANDS = re.compile(r"\s*[+-]?\d{1,3},\d{3}\s*")
 OF_EXCEL = re.compile(r"\s*sep=.\s*", re.IGNORECASE)  # a first line that tells Excel the delimiter
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?")
+# As programs write them into names of files: all parts in digits, which alone would be a number.
+DIGITS = re.compile(
+    r"(20\d\d)[_./-]?([01]\d)[_./-]?([0-3]\d)[_T -]?([0-2]\d)[_:.-]?([0-5]\d)[_:.-]?([0-5]\d)"
+    r"(?:[_.,:-]?(\d{1,9}))?Z?"
+)
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
 DAY_S = 86_400
+DAYS = ("date", "day", "datum", "fecha")  # names of columns that hold no time of day
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 LOST = ("", "nan", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost one
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
@@ -35,6 +43,8 @@ UNNAMED = "column_{}"  # what columns are called in a file that does not name th
 BEGINNING_BYTES = 65536  # tell the encoding
 MOSTLY = 0.9
 NEAR = 0.5  # likeness of names from which one is proposed for the other
+OF_TUM = "it has no names; read as a trajectory of TUM: time, x, y, z and a quaternion, w last"
+WIDE = 5  # times as many cells in a row as there are rows: of no table of samples
 FEWEST_ROWS = 10  # from which on a last cell that is shorter than all above it was cut
 
 
@@ -43,8 +53,8 @@ def open_text(path: Path) -> Iterator[TextIO]:
     """Opens a text file, `.gz` too; on a terminal with a progress bar.
 
     Raises:
-        LogError: it cannot be read, is no text, ends in `.gz` and is not gzip, unpacks to too much,
-            or has a line without an end.
+        LogError: it cannot be read, is no text or another kind of file, ends in `.gz` and is not
+            gzip, unpacks to too much, or has a line without an end.
     """
     from twinmill.terminal import progress_bar  # slow to import, and logs need none
 
@@ -53,10 +63,14 @@ def open_text(path: Path) -> Iterator[TextIO]:
             progress_bar(counted=False) as progress,
             progress.open(path, "rb", description=path.name) as raw,
         ):
-            is_packed = path.suffix == ".gz"
-            binary = gzip.GzipFile(fileobj=raw) if is_packed else raw
+            buffered = io.BufferedReader(raw, BEGINNING_BYTES)
+            is_packed = path.suffix == ".gz" or buffered.peek().startswith(GZIP)
+            binary = gzip.GzipFile(fileobj=buffered) if is_packed else buffered
             bounded = BoundedText(path, binary, path.stat().st_size if is_packed else None)
             buffered = io.BufferedReader(bounded, BEGINNING_BYTES)
+            if other := other_file(buffered.peek()[:BEGINNING_BYTES]):
+                what, remedy = other
+                raise LogError(f"{path}: is {what}, not a table of text; {remedy}.")
             yield io.TextIOWrapper(buffered, _encoding(buffered), newline="")
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
@@ -105,7 +119,7 @@ class Table:
     zero: dict[str, float] = field(default_factory=dict)  # what stands for nothing, if not 0
     notes: list[str] = field(default_factory=list)  # sentences on how the file was read
 
-    def under(self, sources: dict, flips: frozenset[str]) -> "Table":
+    def under(self, sources: dict) -> "Table":
         """The same cells under other names and in other units; columns that nobody names stay."""
         place = {name: k for k, name in enumerate(self.header)}
         taken = {source.column for source in sources.values()}
@@ -120,9 +134,7 @@ class Table:
             ]
             for row in self.rows
         ]
-        factor = {
-            name: source.factor * (-1 if name in flips else 1) for name, source in sources.items()
-        }
+        factor = {name: source.factor for name, source in sources.items()}
         zero = {name: source.zero for name, source in sources.items()}
         return replace(self, header=[*sources, *rest], rows=rows, factor=factor, zero=zero)
 
@@ -140,15 +152,6 @@ class Table:
         index = np.flatnonzero(kept).tolist()
         rows, line = [self.rows[k] for k in index], [self.line[k] for k in index]
         return replace(self, rows=rows, line=line)
-
-    def flipped(self, rows: np.ndarray, columns: Collection[str]) -> "Table":
-        """The numbers of some rows, (rows,) bool, with another sign in some columns."""
-        places = [(k, self.zero.get(n, 0.0)) for k, n in enumerate(self.header) if n in columns]
-        changed = [[*row] for row in self.rows]
-        for row in (changed[k] for k in np.flatnonzero(rows)):
-            for k, zero in places:
-                row[k] = repr(2 * zero - float(row[k])) if is_number(row[k]) else row[k]
-        return replace(self, rows=changed)
 
     def cells(self, column: str) -> list[str]:
         """(rows,) texts of a column.
@@ -176,7 +179,9 @@ class Table:
         if empty_is_nan:
             cells = ["nan" if cell.lower() in LOST else cell for cell in cells]
         try:
-            values = np.array([float(cell) for cell in cells])
+            values = np.fromiter(map(float, cells), float, len(cells))
+            if "_" in "".join(cells):
+                raise ValueError(column)
             if empty_is_nan:
                 values[np.isinf(values)] = np.nan
             return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
@@ -208,19 +213,21 @@ class Table:
     def is_dated(self, column: str) -> bool:
         """Whether a column holds dates with times, or times of day."""
         first = self.cells(column)[0]
-        return any(kind.match(first) for kind in (DATE, DAY_FIRST, TIME_OF_DAY))
+        kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
+        return any(kind.match(first) for kind in kinds) or bool(DIGITS.fullmatch(first))
 
     def seconds(self, column: str) -> np.ndarray:
         """(rows,) s of a column of numbers, dates or times of day.
 
-        Dates are ISO 8601, or day, month and year with points between; UTC if they name no zone.
-        Times of day go on over midnight.
+        Dates are ISO 8601, in digits alone (20260105_100030_020), or day, month and year with
+        points between; UTC if they name no zone. Times of day go on over midnight.
         """
         if not self.is_dated(column):
             return self.finite(column)
         import pandas as pd  # slow to import
 
-        cells = [_day_last(cell) for cell in self.cells(column)]
+        cells = self._with_days(self.cells(column))
+        cells = _of_digits([_day_last(cell) for cell in cells])
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
             spans = stamps - pd.Timestamp(0, tz="UTC")
@@ -235,6 +242,13 @@ class Table:
             )
         seconds = (spans // pd.Timedelta(microseconds=1)).to_numpy(float) / 1e6
         return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=DAY_S)
+
+    def _with_days(self, cells: list[str]) -> list[str]:
+        """Times of day with the days that stand in a column of their own, if there is one."""
+        day = next((name for name in self.header if name.strip().lower() in DAYS), None)
+        if day is None or not TIME_OF_DAY.match(cells[0]):
+            return cells
+        return [f"{date} {time}" for date, time in zip(self.cells(day), cells, strict=True)]
 
     def refuse(self, bad: np.ndarray, column: str, values: np.ndarray, why: str) -> None:
         """Raises LogError on the first row that is bad, with its value and why."""
@@ -281,6 +295,26 @@ def _day_last(cell: str) -> str:
     return f"{year}-{int(month):02}-{int(day):02}T{clock.zfill(8)}.{part or 0}"
 
 
+def _of_digits(cells: list[str]) -> list[str]:
+    """Dates and times in digits as ISO 8601 has them, if the first cell is one; else as they are.
+
+    What stands behind the second is a part of it; where it has not the same length in all rows it
+    is a number of ms, or of us.
+    """
+    found = [DIGITS.fullmatch(cell) for cell in cells]
+    if not found[0] or DATE.match(cells[0]):
+        return cells
+    widths = {len(match[7] or "") for match in found if match}
+    width = next((w for w in (3, 6, 9) if w >= max(widths)), 9) if len(widths) > 1 else 0
+    return [
+        "{}-{}-{}T{}:{}:{}".format(*match.groups()[:6])
+        + (f".{match[7].zfill(width)}" if match[7] else "")
+        if match
+        else cell
+        for match, cell in zip(found, cells, strict=True)
+    ]
+
+
 def _quantity(name: str) -> str:
     """What a column holds by the unit in its name, as one of our units; empty if it has none."""
     unit = split_unit(name)[1]
@@ -301,7 +335,7 @@ def read_header(path: Path) -> list[str]:
         LogError: unreadable.
     """
     with open_text(path) as text:
-        lines, _, delimiter = _begin(text)
+        lines, _, delimiter, _ = _begin(text)
         reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
         header = _names(next(reader, []))
         return _with_units(header, next(reader, [])) or header
@@ -321,7 +355,8 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     """
     notes = []
     with open_text(path) as text:
-        lines, before, delimiter = _begin(text)
+        lines, before, delimiter, taken = _begin(text)
+        notes += [f"{path.name}: {taken}."] if taken else []
         last = [""]
         reader = csv.reader(_remembered(lines, last), delimiter=delimiter, skipinitialspace=True)
         header = _names(next(reader, []))
@@ -351,6 +386,7 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
             f"{path.name}: has no rows of numbers, so there is nothing to import; check "
             "that the export worked."
         )
+    _refuse_transposed(path.name, header, rows)
     comma = _has_decimal_commas(rows, delimiter)
     if comma:
         rows = [
@@ -362,8 +398,8 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     return Table(path.name, header, rows, line, known, notes=notes)
 
 
-def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
-    """Lines from the header on, how many stand before it, and the delimiter.
+def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str, str]:
+    """Lines from the header on, how many stand before it, the delimiter, and what it was taken for.
 
     The header may be the last comment before rows of numbers, as NumPy's `savetxt` writes it. Where
     there is none the columns are called as UNNAMED says.
@@ -376,17 +412,22 @@ def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str]:
         if not before and OF_EXCEL.fullmatch(line):
             before += 1
             continue
+        if found := messages(line, chain([line], lines)):
+            return chain([found.names], found.lines), before - 1, ",", found.note
         if not (delimiter := _between_values(line)):
-            return chain([line], lines), before, _delimiter(line)
+            return chain([line], lines), before, _delimiter(line), ""
         named = _delimiter(comment) if comment.strip() else delimiter
+        cells = _split(line, delimiter)
+        if delimiter == " " and (names := trajectory(cells, _split(comment, named))):
+            return chain([f"{names}\n", line], lines), before - 1, " ", OF_TUM
         if comment.strip() and len(_split(comment, named)) == len(_split(line, named)):
-            return chain([comment, line], lines), before - 1, named
-        columns = range(len(_split(line, delimiter)))
-        if _split(line, delimiter) == list(map(str, columns)):  # as pandas names an array's
-            return chain([line], lines), before, delimiter
+            return chain([comment, line], lines), before - 1, named, ""
+        columns = range(len(cells))
+        if cells == list(map(str, columns)):  # as pandas names an array's
+            return chain([line], lines), before, delimiter, ""
         names = delimiter.join(UNNAMED.format(k + 1) for k in columns) + "\n"
-        return chain([names, line], lines), before - 1, delimiter
-    return iter(()), before, ","
+        return chain([names, line], lines), before - 1, delimiter, ""
+    return iter(()), before, ",", ""
 
 
 def _between_values(line: str) -> str:
@@ -399,7 +440,8 @@ def _between_values(line: str) -> str:
 
 
 def _is_value(cell: str) -> bool:
-    times = (DECIMAL_COMMA.fullmatch, DATE.match, DAY_FIRST.match, TIME_OF_DAY.match)
+    kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
+    times = (DECIMAL_COMMA.fullmatch, DIGITS.fullmatch, *(kind.match for kind in kinds))
     return is_number(cell) or any(matches(cell) for matches in times)
 
 
@@ -411,6 +453,18 @@ def _delimiter(header: str) -> str:
     """What stands between the names most often; spaces where nothing else does."""
     best = max(",;\t|", key=header.count)
     return best if best in header else " " if " " in header.strip() else ","
+
+
+def _refuse_transposed(name: str, header: list[str], rows: list[list[str]]) -> None:
+    """Raises LogError where the rows are the quantities: few, long, and no names above them."""
+    unnamed = header[0] == UNNAMED.format(1) or all(map(is_number, header[1:]))
+    if unnamed and len(header) > WIDE * (len(rows) + 1):
+        count = len(rows) + (header[0] != UNNAMED.format(1))
+        raise LogError(
+            f"{name}: has {count} rows of {len(header)} numbers, so its rows are what columns "
+            "should be: turn it round, as with pandas: pd.read_csv(FILE, header=None).T, and write "
+            "names above the columns."
+        )
 
 
 def _names(header: list[str]) -> list[str]:
@@ -469,4 +523,4 @@ def is_number(cell: str) -> bool:
         float(cell)
     except ValueError:
         return False
-    return True
+    return "_" not in cell  # which Python lets stand between digits

@@ -9,8 +9,8 @@ import numpy as np
 import turbopi
 from natnet import DataFrame
 
-from twinmill.data.importers.motive import number_of, with_z_up
-from twinmill.data.importers.series import multiply
+from twinmill.data.importers.motive import number_of
+from twinmill.data.importers.series import multiply, with_z_up
 from twinmill.data.natnet_stream import Stream
 
 TURNED_RAD = 0.2  # a body that turned by so much shows which axis is up

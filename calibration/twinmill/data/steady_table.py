@@ -17,6 +17,7 @@ import numpy as np
 from twinmill.chance import chi2_median
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, read_table
+from twinmill.data.units import UNITS, plain_name, split_unit
 
 INPUTS = ("speed_input", "direction_deg", "turn_input")
 COLUMNS = ("robot_id", *INPUTS, "run", "speed_mps", "turn_radps", "note")
@@ -93,6 +94,7 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
     table = read_table(path, frozenset(COLUMNS))
     missing = [name for name in COLUMNS if not table.has(name)]
     if missing:
+        refuse_bench(path.name, table.header)
         raise LogError(
             f"{path}: column {missing[0]} is missing; a steady-state table has {','.join(COLUMNS)} "
             "(poses and commands become a log by `twinmill import`)."
@@ -123,6 +125,23 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
         )
     _check(path, sheets)
     return sheets
+
+
+def refuse_bench(name: str, header: list[str]) -> None:
+    """Raises LogError where a table is of a bench test: duties and wheel speeds, no places."""
+    names = [plain_name(column) for column in header]
+    units = {unit for unit in (split_unit(column)[1] for column in header) if unit}
+    kinds = {UNITS[unit][0] for unit in units}
+    duties = "pct" in kinds or any("duty" in own or "pwm" in own for own in names)
+    turning = "radps" in kinds or any("rpm" in own for own in names)
+    placed = "m" in kinds or {"x", "y"} <= {*names}
+    if duties and turning and not placed:
+        raise LogError(
+            f"{name}: has duties and wheel speeds and no poses, as a bench test; write it as a "
+            "steady-state table and give that to compare, fit or diagnose: "
+            f"{','.join(COLUMNS)}, with the duty as speed_input, 90, 0, and the wheel's speed "
+            "times its radius as speed_mps."
+        )
 
 
 @dataclass

@@ -109,12 +109,12 @@ def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.
         LogError: without commands, or with fewer than two valid poses.
     """
     if not len(robot.command_t_s) or np.count_nonzero(robot.valid) < 2:
-        valid = f"{np.count_nonzero(robot.valid)} of its {len(robot.pose_t_s)} poses are valid"
-        why = valid if len(robot.command_t_s) else "the log has no commands of it"
-        raise LogError(
-            f"robot {robot.robot_id}: {why}, so nothing can be predicted; record telemetry and "
-            "motion capture together."
-        )
+        why = f"{np.count_nonzero(robot.valid)} of its {len(robot.pose_t_s)} poses are valid"
+        remedy = "record telemetry and motion capture together"
+        if not len(robot.command_t_s):
+            why = "the log has no commands of it"
+            remedy += ", or import anew with what it was told (`twinmill import --commands`)"
+        raise LogError(f"robot {robot.robot_id}: {why}, so nothing can be predicted; {remedy}.")
     notes: list[str] = []
     lost_s = np.empty((0, 2)) if len(robot.mode) else lost_commands(robot)
     usable = _trackable(robot, lost_s, notes)

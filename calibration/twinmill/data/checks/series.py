@@ -14,11 +14,7 @@ STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0
 # Commands beyond these no robot on wheels follows: twenty times the fastest there are.
 ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
 NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
-# Axes that follow each other as before, with the one that is up as z.
-LAID_DOWN = {
-    "x": "--rename x_m=z_m --rename y_m=x_m --rename z_m=y_m",
-    "y": "--rename y_m=z_m --rename z_m=y_m --flip y_m",
-}
+LAID_DOWN = {"x": "--up x", "y": "the other --up (y or z)"}  # y: as of Motive read with z up
 UNDER_ONE = "give each robot its own robot_id, in its poses and in its commands"
 MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
 ARM_M = 0.1  # of headings, which part robots that meet
@@ -158,8 +154,7 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             finding(
                 f"{axis} is up in these poses, not z",
                 f"z goes over {height_m:.2f} m and {axis} over {min(x_m, y_m) * 1000:.0f} mm",
-                "import anew with the other --up (y or z), or of a table with "
-                f"{of_robot(LAID_DOWN[axis], own)}",
+                f"import anew with {LAID_DOWN[axis]}",
             )
         ]
     if fast_mps > 1000 * CHECKS.fastest_mps:  # in mm, too
@@ -177,8 +172,7 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             finding(
                 f"the positions are in {' or '.join(units)}, not in m",
                 f"the robot drives at {fast_mps:.0f} m/s by them, over {max(x_m, y_m):.0f} m",
-                "choose metres in the export, or import a table anew with "
-                f"{', or with '.join(named)}",
+                f"choose metres in the export, or import anew with {', or with '.join(named)}",
             )
         ]
     if robot.has_heading and _heading_is_constant(robot, pose):

@@ -15,6 +15,8 @@ import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from twinmill.data.importers.ros_messages import STAND_IN
+from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
@@ -172,13 +174,14 @@ def _centred(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess
 
 LEFT, RIGHT = ("fl_pct", "rl_pct"), ("fr_pct", "rr_pct")
 ROBOT = ("robot", "agent", "robotid", "robot_name", "name")
-ALWAYS = frozenset((*ROBOT, "qw", "qx", "qy", "qz"))  # need no unit
+UNITS_OF_ONE = tuple(f"{name}{axis}" for name in ("q", "q_rs_") for axis in "wxyz")
+ALWAYS = frozenset((*ROBOT, *UNITS_OF_ONE))  # need no unit
 WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "rr": (4,)}
-# Where a field stands in a message of ROS, as tables of bags have it before its name.
-OF_MESSAGE = re.compile(r"^%?(field_)?((pose|transform|twist)_)*(?=[a-z])")
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
-    **dict.fromkeys(("t", "time", "timestamp", "stamp", "secs", "frame_time"), (("t_s",), _time)),
+    **dict.fromkeys(
+        ("t", "time", "timestamp", "stamp", "secs", "frame_time", "__time"), (("t_s",), _time)
+    ),
     **dict.fromkeys((*ROBOT, "id"), (("robot_id",), _plain)),
     **dict.fromkeys(("x", "pos_x", "position_x", "px", "translation_x"), (("x_m",), _length)),
     **dict.fromkeys(("y", "pos_y", "position_y", "py", "translation_y"), (("y_m",), _length)),
@@ -188,6 +191,9 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **dict.fromkeys(("theta", "yaw", "heading", "psi", "phi", "angle"), (("theta_rad",), _angle)),
     **dict.fromkeys(("v", "vx", "linear_x", "speed"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vy", "linear_y"), (("vy_mps",), _speed)),
+    **dict.fromkeys(
+        ("steering", "steering_angle", "steer", "steer_angle"), (("steering_rad",), _angle)
+    ),
     **dict.fromkeys(("w", "omega", "angular_z", "wz", "yaw_rate"), (("omega_radps",), _turn)),
     **dict.fromkeys(("left", "pwm_left", "pwm_l", "u_l", "duty_left"), (LEFT, _duty)),
     **dict.fromkeys(("right", "pwm_right", "pwm_r", "u_r", "duty_right"), (RIGHT, _duty)),
@@ -205,8 +211,15 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **{
         name: ((f"q{axis}",), _plain)
         for axis in "wxyz"
-        for name in (f"orientation_{axis}", f"rotation_{axis}", f"quat_{axis}", f"q_{axis}")
+        for name in (
+            *(f"orientation_{axis}", f"rotation_{axis}", f"quat_{axis}", f"q_{axis}"),
+            f"q_rs_{axis}",
+        )
     },
+    # Ground truth of EuRoC: of the body (S) in the frame R
+    **{f"p_rs_r_{axis}": ((f"{axis}_m",), _length) for axis in "xyz"},
+    # Trajectories of TUM
+    **{f"t{axis}": ((f"{axis}_m",), _length) for axis in "xyz"},
     # German
     **dict.fromkeys(("zeit", "zeitstempel"), (("t_s",), _time)),
     **dict.fromkeys(("roboter", "roboter_id", "nummer"), (("robot_id",), _plain)),
@@ -228,6 +241,9 @@ USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]
     **dict.fromkeys(("vitesse", "velocidad"), (("vx_mps",), _speed)),
     **dict.fromkeys(("vitesse_angulaire", "velocidad_angular"), (("omega_radps",), _turn)),
 }
+OF_ODOMETRY = re.compile(r"(^|[./])twist[./]twist[./]")  # with its covariance, as no command has
+OF_PLOTJUGGLER = "__time"  # in s, always
+OUR_DAYS_S = (1e9, 2.5e9)  # since 1970: the years 2001 to 2049
 QUATERNIONS = (("qw", "qx", "qy", "qz"), ("qx", "qy", "qz", "qw"))  # orders of q0 to q3
 NUMBERED = ("q0", "q1", "q2", "q3")
 LEVEL = 0.2  # x and y of the quaternion of a robot on a floor are smaller
@@ -236,7 +252,10 @@ COUNTERS = ("frame", "frame_id", "frame_number", "sample", "index")
 
 
 def explain(
-    table: Table, known: frozenset[str], rename: dict[str, str] | None = None
+    table: Table,
+    known: frozenset[str],
+    rename: dict[str, str] | None = None,
+    topic: str | None = None,
 ) -> list[Guess]:
     """What each column looks like, in the order of the file.
 
@@ -244,8 +263,19 @@ def explain(
         table: as it was read.
         known: our columns that this kind of table has.
         rename: column in the file to ours, as a person decided.
+        topic: the one that is meant, in a table of several.
+
+    Raises:
+        LogError: several topics hold what is looked for, and none is named.
     """
-    looks = [_guess(table, column, known, (rename or {}).get(column)) for column in table.header]
+    new = rename or {}
+    others = _of_other_topics(table, known, new, topic)
+    looks = [
+        Guess(column, (), 1.0, "of another topic: left out", True)
+        if column in others
+        else _guess(table, column, known, new.get(column))
+        for column in table.header
+    ]
     guesses: list[Guess] = []
     holder: dict[str, str] = {}  # column that is each of ours
     for guess in _together(table, known, looks):
@@ -256,7 +286,8 @@ def explain(
             guess = replace(guess, targets=(), why=why, sure=True, rival=holder[taken[0]])
         holder |= dict.fromkeys(guess.targets, column)
         guesses.append(guess)
-    if "vx_mps" in holder and "omega_radps" in holder and "vy_mps" not in holder:
+    told = {"vx_mps", "omega_radps"} <= holder.keys()
+    if told and not {"vy_mps", "steering_rad"} & holder.keys():
         guesses.append(Guess("", ("vy_mps",), 0.0, "no sideways speed: 0", False))
     return guesses
 
@@ -330,19 +361,87 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
     if unit_of is _duty and (centred := _centred(column, targets, values)):
         return centred
     factor, why = unit_of(values)
+    if targets == ("t_s",) and (unit := _since_1970(values)):
+        factor, why = UNITS[unit][1], f"counts {unit} since 1970"
+        return Guess(column, targets, factor, why, True)
+    if is_si(name, field_of(name, USUAL)[1]) or plain_name(name) == OF_PLOTJUGGLER:
+        why = "a field of a message: in m, rad, s (REP 103)"
+        stands_in = targets == ("vx_mps",) and OF_ODOMETRY.search(name)
+        note = f"{table.name}: {column} {STAND_IN}." if stands_in else ""
+        return Guess(column, targets, 1.0, why, True, note)
     return Guess(column, targets, factor, why, False)
+
+
+def _since_1970(values: np.ndarray) -> str:
+    """Unit in which numbers count the time since then, by their size; empty if they do not."""
+    for unit, per_s in (("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)):
+        if OUR_DAYS_S[0] * per_s < values.min() and values.max() < OUR_DAYS_S[1] * per_s:
+            return unit
+    return ""
+
+
+WANTED = {  # what a topic holds that tells poses, or commands
+    "poses": frozenset({"x_m", "y_m"}),
+    "commands": frozenset({"vx_mps", "omega_radps"}),
+}
+
+
+def _of_other_topics(
+    table: Table, known: frozenset[str], rename: dict[str, str], topic: str | None
+) -> set[str]:
+    """Columns of topics that are not the one that is meant.
+
+    That is the one that was named, or the only one that tells what is looked for. Commands are told
+    by odometry, which tells places as well, where nothing else tells them.
+    """
+    fields = {c: field_of(c, USUAL) for c in table.header if is_path(c) and c not in rename}
+    targets: dict[str, set[str]] = {}
+    for name, field in fields.values():
+        if name:
+            targets.setdefault(name, set()).update(USUAL[field][0] if field in USUAL else ())
+    wanted = WANTED["poses" if "x_m" in known else "commands"]
+    telling = [name for name, held in targets.items() if wanted <= held]
+    chosen = topic and _plain_topic(topic)
+    if chosen and chosen not in targets:
+        raise LogError(
+            f"{table.name}: no column is of the topic {topic}; its topics are "
+            f"{', '.join(f'/{name}' for name in targets) or 'none'}."
+        )
+    if not chosen:
+        asked = [name for name in telling if not WANTED["poses"] <= targets[name]]
+        telling = telling if "x_m" in known else asked or telling
+        if len(telling) > 1:
+            option = "--pose" if "x_m" in known else "--command"
+            raise LogError(
+                f"{table.name}: several topics tell what is looked for "
+                f"({', '.join(f'/{name}' for name in telling)}); name one, as in {option} "
+                f"/{telling[0]}."
+            )
+        chosen = telling[0] if telling else None
+    if not chosen:
+        return set()
+    return {column for column, (name, _) in fields.items() if name not in ("", chosen)}
+
+
+def _plain_topic(topic: str) -> str:
+    """A topic as `field_of` has it."""
+    return "/".join(plain_name(word) for word in APART.split(topic) if word)
 
 
 def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
     """What a usual name means, wherever in a message of ROS it stands."""
-    plain = plain_name(name)
-    return USUAL.get(plain) or USUAL.get(OF_MESSAGE.sub("", plain))
+    return USUAL.get(field_of(name, USUAL)[1])
+
+
+def targets_of(name: str, known: frozenset[str]) -> tuple[str, ...]:
+    """Our columns that a name, in any unit or a usual one, stands for; none where we know none."""
+    usual = by_name(name, known) or _usual(name) or ((),)
+    return usual[0] if known.issuperset(usual[0]) else ()
 
 
 def is_usual(name: str, known: frozenset[str]) -> bool:
     """Whether a name is one of ours in any unit, or a usual one for what we know."""
-    usual = _usual(name)
-    return bool(by_name(name, known)) or bool(usual and known.issuperset(usual[0]))
+    return bool(targets_of(name, known))
 
 
 LACKS = {  # what a column is whose factor no table has, and that factor, by what ours hold

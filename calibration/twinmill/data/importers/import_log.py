@@ -3,7 +3,7 @@
 
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +20,20 @@ from twinmill.data.checks import (
     own_option,
 )
 from twinmill.data.importers.columns import Guess, explain, read_mapping
+from twinmill.data.importers.corrections import corrected
 from twinmill.data.importers.io_tsv import read_io_tsv
 from twinmill.data.importers.log_writer import write_log
-from twinmill.data.importers.mapped import check_renames, read_columns
+from twinmill.data.importers.mapped import check_renames, names_in, read_columns
 from twinmill.data.importers.motive import read_motive
+from twinmill.data.importers.options import (
+    Flips,
+    ImportOptions,
+    OfRobots,
+    Sources,
+    check_numbered,
+    check_sources,
+    named_robots,
+)
 from twinmill.data.importers.path_heading import with_path_heading
 from twinmill.data.importers.plain import (
     KNOWN,
@@ -35,7 +45,7 @@ from twinmill.data.importers.plain import (
     read_detections,
     read_poses,
 )
-from twinmill.data.importers.robot_files import Given, files_of, read_each, robot_numbers
+from twinmill.data.importers.robot_files import Given, Series, files_of, read_each, robot_numbers
 from twinmill.data.importers.ros_bag import BagOptions, read_bag
 from twinmill.data.importers.series import (
     CommandSeries,
@@ -57,59 +67,10 @@ MOST_PPM = 1e5  # by which one clock gains on another
 OF_KINDS = ("poses", "commands")  # tables of a mapping file
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
-Flips = Mapping[int | None, frozenset[str]]  # of all robots, by None; or by robot_id
-OfRobots = float | Mapping[int | None, float]  # of all robots; or by robot_id, None for all
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """How to read the files.
-
-    Attributes:
-        robot_id: whose the rows are, for files that do not say.
-        robots: robot_id by name: of a rigid body, in a table's column robot_id, as a word in the
-            name of a robot's own table or in a bag's topics.
-        rename: column in a plain CSV file to column as we name it, or with another unit; or one of
-            ours, whatever the file calls it, to another one of ours.
-        own_renames: the same in the rows of single robots, by number.
-        exchange: pairs of robots of which each has the other's poses; one after the other.
-        mapping: file that says which column is what, in place of `rename`.
-        flips: our columns that are to change their sign.
-        up: "y" or "z", the axis that an export of Motive or Vicon calls up; None: its default.
-        pose_shift_s: added to the stamps of poses; of a robot that is named, to that of all.
-        pose_clock_ppm: by which the poses' clock gains on the commands', taken out; likewise.
-        heading_offset_rad: from the tracked body's x axis to the robot's front, left positive;
-            likewise.
-        path_heading: take the heading from the path, where positions alone were recorded.
-        same_clock: one clock stamped poses and commands: no offset is estimated.
-        pose_topics, command_topics: of a ROS bag, one of each for each robot.
-        receive_stamps: of a ROS bag, take the times of receipt, not those in the headers.
-        wheelbase_m: of a ROS bag with steering angles.
-        full_duty: of a ROS bag with duties, the number that stands for full duty.
-        wheel_factor: by which wheel speeds are multiplied to be those of the wheels in rad/s.
-        force: replace an output that exists.
-    """
-
-    robot_id: int | None = None
-    robots: dict[str, int] = field(default_factory=dict)
-    rename: dict[str, str] = field(default_factory=dict)
-    own_renames: dict[int, dict[str, str]] = field(default_factory=dict)
-    exchange: tuple[tuple[int, int], ...] = ()
-    mapping: Path | None = None
-    flips: Flips = field(default_factory=dict)
-    up: str | None = None
-    pose_shift_s: OfRobots = 0.0
-    pose_clock_ppm: OfRobots = 0.0
-    heading_offset_rad: OfRobots = 0.0
-    path_heading: bool = False
-    same_clock: bool = False
-    pose_topics: tuple[str, ...] = ()
-    command_topics: tuple[str, ...] = ()
-    receive_stamps: bool = False
-    wheelbase_m: float | None = None
-    full_duty: float | None = None
-    wheel_factor: float | None = None
-    force: bool = False
+POSES_ALONE = (
+    "no commands are given: metrics, plot, compare-swarm and export need none; compare, diagnose, "
+    "fit and explain do: import anew with --commands (of a bag with --command)."
+)
 
 
 def import_log(
@@ -124,7 +85,7 @@ def import_log(
     detections: Path | None = None,
     options: ImportOptions | None = None,
 ) -> dict:
-    """Makes a log from one source of poses and one of commands.
+    """Makes a log from one source of poses and one of commands; or of poses alone.
 
     Args:
         poses: plain CSV, several where each robot has its own, or None with `motive` or `vicon`.
@@ -146,55 +107,20 @@ def import_log(
         LogError: one sentence on what is wrong; nothing was written.
     """
     options = options or ImportOptions()
-    if options.up not in ("y", "z", None):
-        raise LogError(f"--up {options.up}: must be y or z.")
     poses, commands = files_of(poses, "--poses"), files_of(commands, "--commands")
-    captures = [path for path in (poses, motive, vicon) if path]
-    if bag and (captures or commands or io_tsv):
-        raise LogError("--bag: holds poses and commands; give no other source beside it.")
-    if not bag and (len(captures) != 1 or bool(commands) == bool(io_tsv)):
-        raise LogError(
-            "a log needs one source of poses and one of commands: give --poses, --motive or "
-            "--vicon, and --commands or --io-tsv."
-        )
-    several = max(len(poses), len(commands), len(io_tsv)) > 1
-    if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or several):
-        raise LogError(
-            f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
-            "number several by the names of their files or of their folders."
-        )
+    given = Sources(poses, commands, motive, vicon, tuple(io_tsv), bag, detections)
+    check_sources(given, options)
     _check_renames(options, [*poses, *commands], detections)
-    paths = (*poses, motive, vicon, *commands, *io_tsv, detections)
-    sources = [path for path in paths if path is not None]
-    inputs = [*sources, bag, options.mapping]
+    _check_wheelbase(options, commands)
+    inputs = [*given.files, bag, options.mapping]
     check_new_file(out, options.force, inputs)
-    if bag:
-        topics = list(options.pose_topics), list(options.command_topics)
-        how = BagOptions(
-            options.robot_id,
-            options.robots,
-            options.receive_stamps,
-            options.wheelbase_m,
-            options.full_duty,
-        )
-        pose_series, command_series = read_bag(bag, *topics, how)
-    else:
-        of_files = robot_numbers(poses, commands, options.robots)
-        pose_series = (
-            _read_tables(poses, "poses", options, of_files)
-            if poses
-            else _read_capture(motive, vicon, options, absolute=bool(io_tsv))
-        )
-        command_series = _read_commands(
-            commands, io_tsv, options, of_files=of_files, poses=pose_series
-        )
-    if options.wheel_factor is not None:
-        command_series = _geared(command_series, options.wheel_factor)
-    _check_names(options, [series.robot_id for series in (*pose_series, *command_series)])
+    pose_series, command_series = _read(given, options)
+    _check_names(options, given, [*pose_series, *command_series])
     pose_series = _exchanged(pose_series, options.exchange)
-    pose_series = [_moved(series, options) for series in pose_series]
-    shift = not bag or options.receive_stamps
-    left_out = _of_no_run(pose_series, command_series, shift)
+    pose_series = [
+        replace(series, utime_us=_on_our_clock(series, options)) for series in pose_series
+    ]
+    left_out = _of_no_run(pose_series, command_series, given, options)
     pose_series, command_series = (
         [own for own in series if own.robot_id not in left_out]
         for series in (pose_series, command_series)
@@ -202,6 +128,7 @@ def import_log(
     rows = {own.robot_id: len(own.utime_us) for own in command_series}
     if options.path_heading:
         pose_series = _headed(pose_series, command_series)
+    pose_series = _turned(pose_series, options)
     by_robot = {series.robot_id: series for series in pose_series}
     command_series = [
         in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
@@ -209,37 +136,76 @@ def import_log(
     ]
     seen = _detections(detections, options, by_robot, left_out) if detections else []
     with replacing(out, options.force, inputs=inputs) as temporary:
-        provenance = _provenance(sources, options)
+        provenance = _provenance(given.files, options)
         write_log(temporary, pose_series, command_series, config_toml=provenance, detections=seen)
         warnings = [f"Left out: {why}" for why in left_out.values()]
         warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
+        if not command_series:
+            warnings.append(POSES_ALONE)
         return _summary(read_log(temporary), out, warnings, rows)
 
 
-def _read_capture(
-    motive: Path | None, vicon: Path | None, options: ImportOptions, *, absolute: bool
-) -> list[PoseSeries]:
+def _read(given: Sources, options: ImportOptions) -> tuple[list[PoseSeries], list[CommandSeries]]:
+    """Series of all robots, their signs and names put right."""
+    if given.bag:
+        how = BagOptions(
+            options.robot_id,
+            options.robots,
+            options.receive_stamps,
+            options.wheelbase_m,
+            options.full_duty,
+            options.up,
+        )
+        topics = list(options.pose_topics), list(options.command_topics)
+        poses, commands = read_bag(given.bag, *topics, how)
+    else:
+        of_files = robot_numbers(given.poses, given.commands, options.robots)
+        poses = (
+            _read_tables(given.poses, "poses", options, of_files)
+            if given.poses
+            else _read_capture(given, options)
+        )
+        poses = _numbered(poses, options)
+        commands = _numbered(
+            _read_commands(given, options, of_files=of_files, poses=poses), options
+        )
+    if options.wheel_factor is not None:
+        commands = _geared(commands, options.wheel_factor)
+    check_numbered(options, poses, commands)
+    return corrected(poses, commands, given, options)
+
+
+def _numbered(series: list[Series], options: ImportOptions) -> list[Series]:
+    """Those of the one robot of a source, under the number that was given."""
+    if len(series) != 1 or options.robot_id is None:
+        return series
+    return [replace(series[0], robot_id=options.robot_id)]
+
+
+def _read_capture(given: Sources, options: ImportOptions) -> list[PoseSeries]:
     """Series of the one that is given; stamps since the epoch, or since the capture's start."""
-    if motive:
-        return read_motive(motive, options.robots, options.up or "y", absolute)
-    return read_vicon(vicon, options.robots, options.up or "z")
+    if given.motive:
+        up, absolute = options.up or "y", bool(given.io_tsv)
+        return read_motive(
+            given.motive, options.robots, up, absolute=absolute, only=options.robot_id
+        )
+    return read_vicon(given.vicon, options.robots, options.up or "z", options.robot_id)
 
 
 def _read_commands(
-    commands: tuple[Path, ...],
-    io_tsv: tuple[Path, ...],
+    given: Sources,
     options: ImportOptions,
     *,
     of_files: dict[Path, int],
     poses: list[PoseSeries],
 ) -> list[CommandSeries]:
     """Series of the kind that is given; one table without robots is of the only one with poses."""
-    if not commands:
-        return [read_io_tsv(path, options.robot_id) for path in io_tsv]
+    if not given.commands:
+        return [read_io_tsv(path, options.robot_id) for path in given.io_tsv]
     numbers = {series.robot_id for series in poses}
-    if len(commands) == len(numbers) == 1 and options.robot_id is None:
+    if len(given.commands) == len(numbers) == 1 and options.robot_id is None:
         options = replace(options, robot_id=numbers.pop())
-    return _read_tables(commands, "commands", options, of_files)
+    return _read_tables(given.commands, "commands", options, of_files)
 
 
 def _read_tables(
@@ -310,22 +276,17 @@ def _detections(
 
 def _columns(options: ImportOptions, kind: str) -> Columns:
     """How to read the table of poses, or that of commands."""
-    flips = dict(options.flips)
-    if unknown := frozenset().union(*flips.values()) - KNOWN:
-        raise LogError(
-            f"--flip {min(unknown)}: is not one of our columns; they are "
-            f"{', '.join(sorted(KNOWN))}."
-        )
     mapping = read_mapping(options.mapping, kind, KNOWN) if options.mapping else None
-    of_all = flips.pop(None, frozenset())
+    topics = options.pose_topics if kind == "poses" else options.command_topics
     return Columns(
         rename=options.rename,
         mapping=mapping,
-        flips=of_all,
+        topic=topics[0] if topics else None,
         own_renames=options.own_renames,
-        own_flips=flips,
         robot_id=options.robot_id,
         robots=options.robots,
+        up=options.up or "z",
+        wheelbase_m=options.wheelbase_m,
     )
 
 
@@ -337,10 +298,22 @@ def _check_renames(options: ImportOptions, tables: list[Path], detections: Path 
         tables = []
     for own in (options.rename, *options.own_renames.values()):
         names = {**options.rename, **own}
-        if options.mapping and not detections and names.keys() - mapped:
+        if options.mapping and not detections and names.keys() - mapped - KNOWN:
             raise LogError("--rename: does nothing beside --mapping; write it into that file.")
         files = tables + ([detections] if detections else [])
-        check_renames(names, files, KNOWN | OF_DETECTIONS, mapped)
+        check_renames(names, files, KNOWN | OF_DETECTIONS, mapped | KNOWN)
+
+
+def _check_wheelbase(options: ImportOptions, commands: tuple[Path, ...]) -> None:
+    """Raises LogError where a wheelbase is given for tables without a steering angle."""
+    if options.wheelbase_m is None or not commands:
+        return
+    mapped = read_mapping(options.mapping, "commands", KNOWN) if options.mapping else ()
+    if "steering_rad" not in {*mapped, *names_in(commands, KNOWN, options.rename)}:
+        raise LogError(
+            "--wheelbase-m: no table of commands has a steering angle (steering_rad), which it is "
+            "for; leave the option out."
+        )
 
 
 def _exchanged(poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]) -> list[PoseSeries]:
@@ -354,20 +327,27 @@ def _exchanged(poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]) -> lis
 
 
 def explain_columns(
-    poses: Path | None, commands: Path | None
+    poses: Path | None,
+    commands: Path | None,
+    topics: tuple[str | None, str | None] = (None, None),
 ) -> dict[str, tuple[Table, list[Guess]]]:
     """Both tables and what their columns look like, by `poses` and `commands`."""
     given = (("poses", poses, OF_POSES), ("commands", commands, OF_COMMANDS))
-    tables = {kind: (read_columns(path, known), known) for kind, path, known in given if path}
-    return {kind: (table, explain(table, known)) for kind, (table, known) in tables.items()}
+    tables = [(*one, topic) for one, topic in zip(given, topics, strict=True) if one[1]]
+    read = [(kind, read_columns(path, known), known, topic) for kind, path, known, topic in tables]
+    return {kind: (table, explain(table, known, {}, topic)) for kind, table, known, topic in read}
 
 
-def _check_names(options: ImportOptions, ids: list[int]) -> None:
-    """Raises LogError where --robot names a robot that nothing in the files is of."""
+def _check_names(
+    options: ImportOptions, given: Sources, series: Sequence[PoseSeries | CommandSeries]
+) -> None:
+    """Raises LogError where an option names a robot that nothing in the files is of."""
+    ids, names = [own.robot_id for own in series], given.names(options, series)
     for name, number in options.robots.items():
-        if number not in ids:
+        if number not in ids or name not in names:
+            known = f" (names are {', '.join(sorted(names))})" if names else ""
             raise LogError(
-                f"--robot {name}={number}: no robot in the files has that name; correct it."
+                f"--robot {name}={number}: no robot in the files has that name{known}; correct it."
             )
     of_poses = {
         "--pose-shift-s": options.pose_shift_s,
@@ -376,8 +356,8 @@ def _check_names(options: ImportOptions, ids: list[int]) -> None:
         "--flip": options.flips,
         "--rename": options.own_renames,
     }
-    for option, given in of_poses.items():
-        named = set(given) - {None} if isinstance(given, Mapping) else set()
+    for option, own in of_poses.items():
+        named = set(own) - {None} if isinstance(own, Mapping) else set()
         if unknown := named - set(ids):
             raise _unknown_robot(option, min(unknown), ids)
 
@@ -389,18 +369,21 @@ def _unknown_robot(option: str, robot_id: int, ids: Collection[int]) -> LogError
     )
 
 
-def _moved(series: PoseSeries, options: ImportOptions) -> PoseSeries:
-    """Poses on the shifted clock, of the body whose x axis is the robot's front."""
-    half = _of(series.robot_id, options.heading_offset_rad) / 2
-    turn = np.array([np.cos(half), 0, 0, np.sin(half)])
-    return PoseSeries(
-        series.robot_id,
-        _on_our_clock(series, options),
-        series.position_m,
-        multiply(series.orientation_wxyz, turn),
-        series.valid,
-        series.warnings,
-    )
+def _turned(poses: list[PoseSeries], options: ImportOptions) -> list[PoseSeries]:
+    """Poses of the bodies whose x axes are the robots' fronts."""
+    for number in named_robots(options.heading_offset_rad):
+        own = [p for p in poses if number in (None, p.robot_id)]
+        if own and not any(np.isfinite(p.orientation_wxyz).any() for p in own):
+            raise LogError(
+                "--heading-offset-deg: no heading was recorded that could be turned; leave the "
+                "option out."
+            )
+    halves = [_of(p.robot_id, options.heading_offset_rad) / 2 for p in poses]
+    turns = [np.array([np.cos(half), 0, 0, np.sin(half)]) for half in halves]
+    return [
+        replace(p, orientation_wxyz=multiply(p.orientation_wxyz, turn))
+        for p, turn in zip(poses, turns, strict=True)
+    ]
 
 
 def _headed(poses: list[PoseSeries], commands: list[CommandSeries]) -> list[PoseSeries]:
@@ -439,7 +422,10 @@ def _of(robot_id: int, given: OfRobots) -> float:
 
 
 def _of_no_run(
-    poses: list[PoseSeries], commands: list[CommandSeries], shift: bool
+    poses: list[PoseSeries],
+    commands: list[CommandSeries],
+    given: Sources,
+    options: ImportOptions,
 ) -> dict[int, LogError]:
     """Robots whose poses and commands are of no one run, and why, where others' are.
 
@@ -449,6 +435,10 @@ def _of_no_run(
         LogError: no robot has both, at the same time, without absurd holds; or two sources of
             commands are for one robot.
     """
+    if not commands:
+        for p in poses:
+            _check_rate(p, bool(given.poses))
+        return {}
     ids = [series.robot_id for series in commands]
     if len(set(ids)) < len(ids):
         raise LogError(
@@ -462,43 +452,42 @@ def _of_no_run(
             f"robot has both; number them alike, for example with --robot {ids[0]}="
             f"{poses[0].robot_id}."
         )
-    wrong = _wrong_times(pairs, shift, own=True)
+    shift = not given.bag or options.receive_stamps
+    wrong = _wrong_times(pairs, given, shift, own=True)
     if len(wrong) == len(pairs):
-        raise next(iter(_wrong_times(pairs, shift, own=False).values()))
+        raise next(iter(_wrong_times(pairs, given, shift, own=False).values()))
     return wrong
 
 
 def _wrong_times(
-    pairs: list[tuple[PoseSeries, CommandSeries]], shift: bool, own: bool
+    pairs: list[tuple[PoseSeries, CommandSeries]], given: Sources, shift: bool, own: bool
 ) -> dict[int, LogError]:
     """Errors of `_check_times` by robot."""
     wrong = {}
     for p, c in pairs:
         try:
-            _check_times(p, c, shift, own)
+            _check_times(p, c, given, shift=shift, own=own)
         except LogError as error:
             wrong[p.robot_id] = error
     return wrong
 
 
-def _check_times(p: PoseSeries, c: CommandSeries, shift: bool, own: bool) -> None:
+def _check_times(
+    p: PoseSeries, c: CommandSeries, given: Sources, *, shift: bool, own: bool
+) -> None:
     """Raises LogError unless poses and commands of a robot are of one time, without long holds.
 
     Args:
         p: poses of one robot.
         c: its commands.
+        given: where they are from.
         shift: the remedy is a shift of the poses ...
         own: ... of this robot alone, since others' are right as they are.
     """
     first_s, last_s = p.utime_us[[0, -1]] / 1e6
     start_s, end_s = c.utime_us[[0, -1]] / 1e6
-    _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s)
-    _check_rate(p)
-    if len(p.utime_us) == 1:
-        raise LogError(
-            f"robot {p.robot_id}: has one pose, at {first_s:.3f} s, which tells no motion; record "
-            "its poses all the time while it drives."
-        )
+    _check_unit_of_time(p.robot_id, last_s - first_s, end_s - start_s, given)
+    _check_rate(p, bool(given.poses and given.commands))
     if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
         remedy = (
             "shift the poses, for example so that both start together: --pose-shift-s "
@@ -518,28 +507,44 @@ def _check_times(p: PoseSeries, c: CommandSeries, shift: bool, own: bool) -> Non
         )
 
 
-def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float) -> None:
-    """Raises LogError where one series lasts a thousand times as long as the other, or more."""
+def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float, given: Sources) -> None:
+    """Raises LogError where a table lasts a thousand times as long as the other, or more."""
     (short_s, short), (long_s, long) = sorted([(poses_s, "poses"), (commands_s, "commands")])
     for unit, times in TIME_UNITS.items():
-        if short_s > 0 and abs(long_s / short_s / times - 1) < SAME_LENGTH:
+        alike = short_s > 0 and abs(long_s / short_s / times - 1) < SAME_LENGTH
+        if alike and getattr(given, long):
             raise LogError(
                 f"robot {robot_id}: the {long} last {long_s:.0f} s, the {short} {short_s:.1f} s; "
                 f"the times of the {long} are in {unit}, so name that column t_{unit}."
             )
 
 
-def _check_rate(poses: PoseSeries) -> None:
-    """Raises LogError where poses are so far apart that they tell nothing of a drive."""
+def _check_rate(poses: PoseSeries, in_tables: bool) -> None:
+    """Raises LogError where poses are so far apart that they tell nothing of a drive.
+
+    Args:
+        poses: of one robot.
+        in_tables: all stamps are those of tables, whose unit may be another one.
+    """
+    if len(poses.utime_us) == 1:
+        raise LogError(
+            f"robot {poses.robot_id}: has one pose, at {poses.utime_us[0] / 1e6:.3f} s, which "
+            "tells no motion; record its poses all the time while it drives."
+        )
     if len(poses.utime_us) < FEWEST_POSES:
         return
     step_s = float(np.median(np.diff(poses.utime_us))) * 1e-6
     if step_s > SLOWEST_S:
         unit = next((u for u, times in TIME_UNITS.items() if step_s / times < SLOWEST_S), "ns")
+        remedy = (
+            f"if the times are in {unit}, name that column t_{unit} in all files, or import anew "
+            f"with --rename t_s=t_{unit}"
+            if in_tables
+            else "record them at 10 Hz or more"
+        )
         raise LogError(
             f"robot {poses.robot_id}: its poses are {step_s:g} s apart, too far to tell of a "
-            f"drive; if the times are in {unit}, name that column t_{unit} in both files, or "
-            f"import anew with --rename t_s=t_{unit}."
+            f"drive; {remedy}."
         )
 
 
@@ -614,9 +619,9 @@ def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> 
                 **({"detections": len(robot.seen)} if len(robot.seen) else {}),
             }
         )
-        if len(series) == 2 and robot.valid.sum() > 1:
+        if len(robot.pose_t_s) and robot.valid.sum() > 1:
             judged.append(robot)
-        elif len(series) == 2:
+        elif len(robot.pose_t_s):
             warnings.append(
                 f"robot {robot.robot_id}: {robot.valid.sum()} of its {len(robot.pose_t_s)} poses "
                 "are valid; nothing of it can be judged, and it is left out there."
@@ -647,7 +652,8 @@ def _told_of(robots: Sequence[RobotLog]) -> list[str]:
         own = own_option(robot.robot_id, len(robots))
         of_series += check_commanded(robot, "") or check_poses(robot, "", own)
     add(of_all_robots(of_series, {"": len(robots)}))
-    cleaned = {r.robot_id: ("", make_track(r)) for r in robots if not found[r.robot_id]}
+    sound = [r for r in robots if len(r.command_t_s) and not found[r.robot_id]]
+    cleaned = {r.robot_id: ("", make_track(r)) for r in sound}
     add([f for f in check_recorded(list(cleaned.values()), None) if f.fatal])
     add(check_driven([t for k, t in cleaned.items() if not found[k]], None))
     said = []

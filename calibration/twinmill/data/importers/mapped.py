@@ -2,7 +2,7 @@
 """Other people's tables under our names and in our units, or what must be asked first."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from twinmill.data.importers.columns import (
     is_usual,
     lacks,
     mapping_of,
+    targets_of,
 )
 from twinmill.data.importers.side_by_side import in_rows
 from twinmill.data.log import LogError
@@ -31,6 +32,17 @@ def _header(path: Path, known: frozenset[str]) -> list[str]:
     return in_rows(Table(path.name, read_header(path), [], [], known)).header
 
 
+def names_in(tables: Collection[Path], known: frozenset[str], rename: dict[str, str]) -> set[str]:
+    """Columns of tables, by their own names, by new ones, and by ours where these say all."""
+    names = {name for path in tables for name in _header(path, known)}
+    names |= {new for old, new in rename.items() if old in names}
+    return names | _ours(names, known)
+
+
+def _ours(names: Iterable[str], known: frozenset[str]) -> set[str]:
+    return {ours for name in names for ours in targets_of(name, known)}
+
+
 def check_renames(
     rename: dict[str, str], tables: list[Path], known: frozenset[str], mapped: Collection[str] = ()
 ) -> None:
@@ -44,7 +56,7 @@ def check_renames(
     """
     headers = {p.name: _header(p, known) for p in tables} if rename else {}
     names = {*rename.values(), *(name for header in headers.values() for name in header)}
-    read = {*mapped, *(ours for name in names for ours in (by_name(name, known) or ((),))[0])}
+    read = {*mapped, *_ours(names, known)}
     for old, new in rename.items():
         held = any(old in header for header in headers.values())
         if not held and not (old in read and by_name(new, known)):
@@ -66,7 +78,7 @@ def read_mapped(
     *,
     mapping: Mapping | None,
     rename: dict[str, str],
-    flips: frozenset[str],
+    topic: str | None = None,
 ) -> Table:
     """A table under our names and in our units.
 
@@ -76,7 +88,7 @@ def read_mapped(
         mapping: what a person decided; None: names that say all, and `rename`.
         rename: column in the file to ours, which may have another unit (`yaw=theta_deg`); or one
             of ours, whatever it is called in the file, to another of ours (`x_m=y_m`).
-        flips: our columns that are to change their sign.
+        topic: whose columns are meant, in a table of several topics; None: there is one.
 
     Raises:
         LogError: as read_table; a column of the mapping is not there, one looks like ours and
@@ -85,7 +97,8 @@ def read_mapped(
     table = read_columns(path, known)
     ours = {k: new for k, new in rename.items() if _is_of_ours(k, new, table.header, known)}
     if mapping is None:
-        guesses = explain(table, known, {k: new for k, new in rename.items() if k not in ours})
+        of_file = {k: new for k, new in rename.items() if k not in ours}
+        guesses = explain(table, known, of_file, topic)
         for guess in guesses:
             if guess.rival:
                 raise _rivals(table.name, guess)
@@ -99,7 +112,7 @@ def read_mapped(
             f"{table.name}: the mapping names column '{gone[0]}', but the file has "
             f"{', '.join(table.header)}; correct the mapping."
         )
-    return table.under(_renamed(table.name, mapping, ours, known), flips)
+    return table.under(_renamed(table.name, mapping, ours, known))
 
 
 def _is_of_ours(old: str, new: str, header: Collection[str], known: frozenset[str]) -> bool:

@@ -2,8 +2,8 @@
 """Rigid bodies from a CSV export of OptiTrack Motive (format versions 1.21 to 1.24).
 
 Line 1 holds pairs of key and value; then rows of types, names, identifiers and components stand
-over the row `Frame,Time (Seconds),...` that names the axes. Columns are found by these rows, since
-their order and number vary (markers, mean errors, time codes).
+over the row `Frame,Time (Seconds),...` that names the axes. Columns are found by these rows, in
+capital letters or small ones, since their order and number vary (markers, mean errors, time codes).
 (docs.optitrack.com, "Data Export: CSV".) Euler angles are degrees about axes that turn with the
 body, in the order that the rotation type names (help.naturalpoint.com, "Changes in Motive's
 Reported Euler Angles").
@@ -19,15 +19,16 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from twinmill.data.importers.series import PoseSeries
+from twinmill.data.importers.series import PoseSeries, with_z_up
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import open_text
 
 UNIT_M = {"Meters": 1.0, "Centimeters": 0.01, "Millimeters": 0.001}
 HEADER_ROWS = 10  # more than any version has above the first frame
 CAPTURE_TIME = "%Y-%m-%d %I.%M.%S.%f %p"
-TIMES = ("Time (Seconds)", "Time")  # from format 1.22 on, and before
+TIMES = ("TIME (SECONDS)", "TIME")  # from format 1.22 on, and before
 QUATERNION = "Quaternion"
+BODY = "rigid body"
 UNNAMED = "XYZ"  # angles of a file that does not name their order
 ROTATIONS = (QUATERNION, "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
@@ -42,15 +43,17 @@ class _Header:
     time_column: int
 
 
-def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> list[PoseSeries]:
+def read_motive(
+    path: Path, robots: dict[str, int], up: str, *, absolute: bool, only: int | None = None
+) -> list[PoseSeries]:
     """Poses of all rigid bodies.
 
     Args:
         path: the export, `.gz` too, in global coordinates.
         robots: robot_id by name of the rigid body; bodies not named here get the last digits in
             their name.
-        up: "y", Motive's default, or "z": the axis that the export calls up. Y up is turned by
-            x, y, z -> x, -z, y.
+        up: the axis that the export calls up, "y" by Motive's default.
+        only: robot_id of the only rigid body.
         absolute: stamps since the epoch, the capture start taken as UTC; else since the start.
 
     Raises:
@@ -80,7 +83,7 @@ def read_motive(path: Path, robots: dict[str, int], up: str, absolute: bool) -> 
         body: with_z_up(block[:, :3] * scale, _quaternion(block[:, 3:], header.rotation), up)
         for body, block in zip(header.bodies, blocks, strict=True)
     }
-    return robots_of(poses, utime_us, robots, path.name)
+    return robots_of(poses, utime_us, robots, path.name, only=only)
 
 
 def robots_of(
@@ -88,6 +91,8 @@ def robots_of(
     utime_us: np.ndarray,
     robots: dict[str, int],
     name: str,
+    *,
+    only: int | None = None,
 ) -> list[PoseSeries]:
     """The bodies that are robots and were seen; the others are named in a warning.
 
@@ -96,19 +101,16 @@ def robots_of(
         utime_us: (N,) ascending.
         robots: robot_id by body; others get the last digits in their names.
         name: of the file.
+        only: number of the only body.
 
     Raises:
-        LogError: no body is a robot or was seen, two have one number, or `robots` names another.
+        LogError: no body is a robot or was seen, or two have one number.
     """
-    if unknown := set(robots) - set(poses):
-        raise LogError(
-            f"{name}: has no rigid body '{min(unknown)}' (it has {', '.join(poses)}); correct "
-            "--robot."
-        )
     series: dict[int, PoseSeries] = {}
     left_out = []
     for body, (position_m, quaternion) in poses.items():
-        number = number_of(body, robots)
+        alone = len(poses) == 1 and only is not None
+        number = only if alone else number_of(body, robots)
         if number in series:
             raise LogError(
                 f"{name}: rigid body '{body}' gives the number {number}, which another has; give "
@@ -122,7 +124,7 @@ def robots_of(
         elif not own.valid.any():
             left_out.append(f"rigid body '{body}' is never tracked; export it solved")
         else:
-            series[number] = own
+            series[number] = replace(own, called=body)
     if not series:
         raise LogError(f"{name}: {left_out[0]}.")
     told = [f"{name}: {reason}; it is left out." for reason in left_out]
@@ -133,26 +135,31 @@ def _header(reader, name: str) -> _Header:
     rows: list[list[str]] = []
     for row in reader:
         rows.append([cell.strip() for cell in row])
-        if rows[-1][:1] == ["Frame"]:
+        if [cell.lower() for cell in rows[-1][:1]] == ["frame"]:
             break
         if len(rows) > HEADER_ROWS:
             break
-    if not rows or rows[0][:1] != ["Format Version"] or rows[-1][:1] != ["Frame"]:
+    ends = [row[0].lower() for row in (*rows[:1], *rows[-1:]) if row]
+    if ends != ["format version", "frame"]:
         raise LogError(
             f"{name}: does not begin with 'Format Version' and a row 'Frame,Time "
             "(Seconds)', so it is no Motive export; use --poses for plain CSV."
         )
-    fields = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
+    fields = dict(zip(map(str.title, rows[0][::2]), rows[0][1::2], strict=False))
     for key, good in (("Rotation Type", ROTATIONS), ("Coordinate Space", ("Global",))):
-        if fields.get(key, good[0]) not in good:
+        if fields.get(key, good[0]).lower() not in map(str.lower, good):
             raise LogError(
                 f"{name}: {key} is '{fields[key]}', but must be {' or '.join(good)}; export "
                 "again with that setting."
             )
-    time = next((k for k, cell in enumerate(rows[-1]) if cell in TIMES), None)
+    named = [cell.upper() for cell in rows[-1]]
+    time = next((k for k, cell in enumerate(named) if cell in TIMES), None)
     if time is None:
-        raise LogError(f"{name}: has no column {' or '.join(TIMES)}; export the take again.")
-    rotation = fields.get("Rotation Type", QUATERNION if "W" in rows[-1] else UNNAMED)
+        raise LogError(
+            f"{name}: has no column {' or '.join(map(str.title, TIMES))}; export the take again."
+        )
+    rotation = fields.get("Rotation Type", QUATERNION if "W" in named else UNNAMED)
+    rotation = next(known for known in ROTATIONS if known.lower() == rotation.lower())
     axes = "WXYZ" if rotation == QUATERNION else "XYZ"
     return _Header(fields, rotation, _bodies(rows, axes, name), time)
 
@@ -161,16 +168,18 @@ def _bodies(rows: list[list[str]], turned_about: str, name: str) -> dict[str, li
     """Columns of each rigid body: position, then rotation."""
     wanted = [("Position", axis) for axis in "XYZ"]
     wanted += [("Rotation", axis) for axis in turned_about]
-    types = next((k for k, row in enumerate(rows) if "Rigid Body" in row), None)
+    kinds = [[cell.lower() for cell in row] for row in rows]
+    types = next((k for k, row in enumerate(kinds) if BODY in row), None)
     if types is None:
         raise LogError(
             f"{name}: has no rigid body; define one in Motive and export again with rigid bodies."
         )
-    names, components, axes = rows[types + 1], rows[-2], rows[-1]
+    names = rows[types + 1]
+    components, axes = map(str.title, rows[-2]), map(str.upper, rows[-1])
     places: dict[str, dict[tuple[str, str], int]] = {}
-    for k, kind in enumerate(rows[types]):
-        if kind == "Rigid Body":
-            places.setdefault(names[k], {})[components[k], axes[k]] = k
+    for k, (kind, *column) in enumerate(zip(kinds[types], components, axes, strict=False)):
+        if kind == BODY:
+            places.setdefault(names[k], {})[tuple(column)] = k
     for body, columns in places.items():
         if missing := [" ".join(c) for c in wanted if c not in columns]:
             raise LogError(
@@ -216,15 +225,6 @@ def _pose_series(
     return PoseSeries(robot_id, utime_us, np.where(valid[:, None], position_m, np.nan), unit, valid)
 
 
-def with_z_up(
-    position_m: np.ndarray, quaternion_wxyz: np.ndarray, up: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) and (N, 4) as they are, or with y up turned by x, y, z -> x, -z, y."""
-    if up == "z":
-        return position_m, quaternion_wxyz
-    return position_m[:, [0, 2, 1]] * [1, -1, 1], quaternion_wxyz[:, [0, 1, 3, 2]] * [1, 1, -1, 1]
-
-
 def number_of(body: str, robots: dict[str, int]) -> int:
     """robot_id of a rigid body: as `robots` says, else the last digits in its name; -1 if none."""
     digits = re.findall(r"\d+", body)
@@ -233,7 +233,7 @@ def number_of(body: str, robots: dict[str, int]) -> int:
 
 
 def _unit_m(header: _Header, name: str) -> float:
-    unit = header.fields.get("Length Units", "")
+    unit = header.fields.get("Length Units", "").title()
     if unit not in UNIT_M:
         raise LogError(
             f"{name}: Length Units is '{unit}', not one of {', '.join(UNIT_M)}; export "

@@ -13,21 +13,26 @@ import turbopi
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.columns import Mapping
 from twinmill.data.importers.mapped import read_mapped
+from twinmill.data.importers.samples import samples_of
 from twinmill.data.importers.series import (
     CommandSeries,
     DetectionSeries,
     PoseSeries,
     quaternion_from_heading,
+    velocities_of_steering,
+    with_z_up,
 )
 from twinmill.data.importers.stamps import sound_rows
 from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import LOST, CellError, Table, is_number
+from twinmill.data.steady_table import refuse_bench
 from twinmill.model.mixing import duties_from_inputs
 
 HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
 QUATERNION = ("qw", "qx", "qy", "qz")
 WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
+STEERED = ("vx_mps", "steering_rad")
 LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
 SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller
 WRAP_DEG = 20  # more than a robot turns from row to row
@@ -38,10 +43,18 @@ VALUES: dict[CommandKind, tuple[str, ...]] = {
 }
 OF_POSES = frozenset({"t_s", "robot_id", "x_m", "y_m", "z_m", "theta_rad", "valid", *QUATERNION})
 OF_COMMANDS = frozenset(
-    {"t_s", "robot_id", *INPUTS, *WORLD, *(name for names in VALUES.values() for name in names)}
+    {
+        "t_s",
+        "robot_id",
+        *INPUTS,
+        *WORLD,
+        *STEERED,
+        *(name for names in VALUES.values() for name in names),
+    }
 )
 OF_DETECTIONS = frozenset({"t_s", "robot_id", "seen", "range_m", "bearing_rad"})
 KNOWN = OF_POSES | OF_COMMANDS
+OF_ALL = frozenset({"t_s", "robot_id"})  # of rows of any kind
 Series = TypeVar("Series", PoseSeries, CommandSeries, DetectionSeries)
 
 
@@ -50,25 +63,29 @@ class Columns:
     """How to read a table: as `mapped.read_mapped`, and whose rows they are.
 
     Attributes:
-        rename, mapping, flips: as there.
-        own_renames, own_flips: of single robots, by number.
+        rename, mapping, topic: as there.
+        own_renames: of single robots, by number.
         robot_id: of all rows, for files without that column, or with one name in it.
         robots: robot_id by what stands in that column.
+        up: axis that positions and quaternions call up.
+        wheelbase_m: of a robot that is told steering angles.
         lacks_robot: what to do about a file without robots, beside adding that column.
     """
 
     rename: dict[str, str] = field(default_factory=dict)
     mapping: Mapping | None = None
-    flips: frozenset[str] = frozenset()
+    topic: str | None = None
     own_renames: dict[int, dict[str, str]] = field(default_factory=dict)
-    own_flips: dict[int, frozenset[str]] = field(default_factory=dict)
     robot_id: int | None = None
     robots: dict[str, int] = field(default_factory=dict)
+    up: str = "z"
+    wheelbase_m: float | None = None
     lacks_robot: str = "give --robot-id for a file of one robot"
 
     def read(self, path: Path, known: frozenset[str]) -> Table:
-        """The table under our names."""
-        return read_mapped(path, known, mapping=self.mapping, rename=self.rename, flips=self.flips)
+        """The table under our names, rows that are no samples of what is known left out."""
+        named = read_mapped(path, known, mapping=self.mapping, rename=self.rename, topic=self.topic)
+        return samples_of(named, known - OF_ALL, KNOWN - known)
 
     def of_robot(self, robot_id: int | None) -> "Columns":
         """The same for rows of one robot alone."""
@@ -91,6 +108,7 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
 
 
 def _poses(table: Table, columns: Columns) -> list[PoseSeries]:
+    refuse_bench(table.name, table.header)
     table, utime_us, ids, notes = _stamped(table, columns)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
@@ -103,14 +121,19 @@ def _poses(table: Table, columns: Columns) -> list[PoseSeries]:
     if table.has("theta_rad"):
         _refuse_degrees(table, ids)
     position[~valid] = orientation[~valid] = np.nan
+    position, turned = with_z_up(position, orientation, columns.up)
+    if table.has(*QUATERNION):  # an angle on the floor is one about what is up
+        orientation = turned
     for number in np.unique(ids):
         utime_us[ids == number], said = at_even_beat(
             utime_us[ids == number], f"{table.name}: robot {number}"
         )
         notes = notes + said
     return [
-        PoseSeries(number, utime_us[rows], position[rows], orientation[rows], valid[rows], notes)
-        for number, rows, notes in _by_robot(table, ids, utime_us, notes)
+        PoseSeries(
+            number, utime_us[rows], position[rows], orientation[rows], valid[rows], notes, called
+        )
+        for number, rows, notes, called in _by_robot(table, ids, utime_us, notes)
     ]
 
 
@@ -142,7 +165,7 @@ def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
         table.refuse(
             np.abs(inputs[:, k]) > limit, name, inputs[:, k], f"must lie in -{limit}..{limit}"
         )
-    value = _values(table, kind, inputs)
+    value = _values(table, kind, inputs, columns.wheelbase_m)
     return [
         CommandSeries(
             robot_id=number,
@@ -155,8 +178,10 @@ def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
             mode=turbopi.telemetry_t.MODE_SCRIPT,
             warnings=notes,
             world=world,
+            called=called,
+            mixed=kind == "duty" and not table.has(*VALUES["duty"]),
         )
-        for number, rows, notes in _by_robot(table, ids, utime_us, notes)
+        for number, rows, notes, called in _by_robot(table, ids, utime_us, notes)
     ]
 
 
@@ -201,7 +226,7 @@ def _seen(table: Table, columns: Columns) -> list[DetectionSeries]:
             more["bearing_rad"][rows],
             notes,
         )
-        for number, rows, notes in _by_robot(table, ids, utime_us, notes)
+        for number, rows, notes, _ in _by_robot(table, ids, utime_us, notes)
     ]
 
 
@@ -241,7 +266,7 @@ def _of_sound_robots(
     Raises:
         CellError: those of no robot can.
     """
-    table, left_out = _with_own_flips(table, columns), []
+    left_out = []
     while True:
         try:
             found = read(table, columns)
@@ -271,33 +296,26 @@ def _with_robots(table: Table) -> Table:
     return replace(table.where(told), notes=[*table.notes, note])
 
 
-def _with_own_flips(table: Table, columns: Columns) -> Table:
-    """With the signs changed that are wrong in the rows of single robots."""
-    ids = _robot_ids(table, columns)[0] if columns.own_flips else None
-    for number, names in columns.own_flips.items():
-        table = table.flipped(ids == number, names)
-    return table
-
-
 def _input(table: Table, name: str) -> np.ndarray:
     """(rows,) of one input; beside duties it need not be known."""
     return table.numbers(name, True) if table.has(*VALUES["duty"]) else table.finite(name)
 
 
 def _kind(table: Table) -> CommandKind:
-    groups = [(kind, columns) for kind, columns in VALUES.items()] + [("twist", WORLD)]
-    found = [kind for kind, columns in groups if table.has(*columns)]
+    groups = {kind: [columns] for kind, columns in VALUES.items()}
+    groups["twist"] += [WORLD, STEERED]
+    found = [(kind, columns) for kind in groups for columns in groups[kind] if table.has(*columns)]
     if len(found) > 1:
         raise LogError(
-            f"{table.name}: has columns for {' and '.join(found)}, but a log keeps to "
-            "one kind of command; remove the others."
+            f"{table.name}: has columns for {' and '.join(', '.join(own) for _, own in found)}, "
+            "but a log keeps to one kind of command; remove the others."
         )
     if found:
-        return found[0]
+        return found[0][0]
     if table.has(*INPUTS):
         return "duty"
     # Name the column that is missing from the group that is most complete.
-    groups = [*VALUES.values(), INPUTS, WORLD]
+    groups = [*VALUES.values(), INPUTS, WORLD, STEERED]
     group = max(groups, key=lambda names: sum(table.has(name) for name in names) / len(names))
     if not any(map(table.has, group)):
         raise LogError(
@@ -312,6 +330,8 @@ def _columns_of(table: Table, kind: CommandKind) -> tuple[str, ...]:
     """Columns that hold the commands; those of the duties are not there beside inputs alone."""
     if table.has(*WORLD):
         return (*WORLD, *(["omega_radps"] if table.has("omega_radps") else []))
+    if table.has(*STEERED) and not table.has(*VALUES[kind]):
+        return STEERED
     return VALUES[kind] if table.has(*VALUES[kind]) else INPUTS
 
 
@@ -331,11 +351,15 @@ def _complete(table: Table, kind: CommandKind) -> Table:
     return replace(table.where(whole), notes=[*table.notes, note])
 
 
-def _values(table: Table, kind: CommandKind, inputs: np.ndarray) -> np.ndarray:
+def _values(
+    table: Table, kind: CommandKind, inputs: np.ndarray, wheelbase_m: float | None
+) -> np.ndarray:
     """(rows, 4) as in CommandSeries."""
     columns = _columns_of(table, kind)
     if columns == INPUTS:
         return np.array([duties_from_inputs(*row) for row in inputs], float)
+    if columns == STEERED:
+        return velocities_of_steering(table.name, *map(table.finite, STEERED), wheelbase_m)
     value = np.zeros((len(table.rows), 4))
     for k, name in enumerate(columns):
         value[:, k] = table.finite(name)
@@ -439,19 +463,21 @@ def _utime_us(table: Table, t_s: np.ndarray) -> np.ndarray:
         unit = next((u for u, top in SINCE_1970.items() if largest < top), "ns")
         raise LogError(
             f"{table.name}: t_s goes to {largest:.4g}, which are no seconds; if it counts {unit} "
-            f"since 1970, name the column t_{unit}, in the file or with --rename t_s=t_{unit}."
+            f"since 1970, name the column t_{unit} there, or with --rename t_s=t_{unit} if no "
+            "other file's t_s is in seconds."
         )
     return np.round(t_s * 1e6).astype(np.int64)
 
 
 def _by_robot(
     table: Table, ids: np.ndarray, utime_us: np.ndarray, said: list[str]
-) -> Iterator[tuple[int, np.ndarray, list[str]]]:
-    """Each robot, its rows in order of time, each stamp once (the last row), and what was done.
+) -> Iterator[tuple[int, np.ndarray, list[str], str]]:
+    """Each robot, its rows in order of time, each stamp once (the last row), what was done, a name.
 
-    The first robot tells what was done with the whole table, too.
+    The first robot tells what was done with the whole table, too. The name is that in the table.
     """
     said = [*table.notes, *said]
+    named = table.header.index("robot_id") if table.has("robot_id") else None
     for number in np.unique(ids).tolist():
         rows = np.flatnonzero(ids == number)
         stamps = utime_us[rows]
@@ -463,5 +489,6 @@ def _by_robot(
         if not last.all():
             double = np.count_nonzero(~last)
             notes.append(f"{where}{double} rows repeat a stamp; the last of each was kept.")
-        yield number, rows[last], said + notes
+        called = "" if named is None else table.rows[rows[0]][named].strip()
+        yield number, rows[last], said + notes, called
         said = []

@@ -9,7 +9,7 @@ import re
 import struct
 from array import array
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -32,6 +32,7 @@ from twinmill.data.importers.ros_messages import (
     MANY,
     ODOMETRY,
     POSES,
+    STAND_IN,
     STEERED,
     TAGS,
     TF,
@@ -43,8 +44,14 @@ from twinmill.data.importers.ros_messages import (
     transform_row,
     transforms_of,
 )
-from twinmill.data.importers.series import CommandSeries, PoseSeries
+from twinmill.data.importers.series import (
+    CommandSeries,
+    PoseSeries,
+    velocities_of_steering,
+    with_z_up,
+)
 from twinmill.data.log import LogError
+from twinmill.data.other_files import refuse_other_file
 from twinmill.data.unpacking import UnpackError, bound_bag_readers
 from twinmill.terminal import progress_bar
 
@@ -57,6 +64,13 @@ FULL_DUTIES = (1.0, 100.0, 255.0)
 SIDES = {2: "left, right", 4: "front left, front right, rear left, rear right"}
 OF_BASE = re.compile(r"base(_link|_footprint)?$")
 OF_CAMERA = re.compile(r"camera|optical|(^|_)cam(_|$)")  # frames whose z is ahead, not up
+
+
+Role = tuple[str, str]  # a topic, and what it is to be: pose or command
+VALUES: dict[str, dict[str, Callable[[Any], Row]]] = {
+    "pose": POSES,
+    "command": {kind: value_of for kind, (_, value_of) in COMMANDS.items()},
+}
 
 
 @dataclass(frozen=True)
@@ -94,6 +108,7 @@ class BagOptions:
         robots: robot_id by a word in the topics; others have the last number in their topics.
         receive: take the times of receipt, not those in the headers.
         wheelbase_m: turns steering angles into turns of the body.
+        up: the axis that the poses call up.
         full_duty: the number that stands for full duty; None: the least of FULL_DUTIES that does.
     """
 
@@ -102,6 +117,7 @@ class BagOptions:
     receive: bool = False
     wheelbase_m: float | None = None
     full_duty: float | None = None
+    up: str | None = None
 
 
 def list_topics(path: Path) -> list[Topic]:
@@ -160,9 +176,21 @@ def _parts(kind: str, message: object) -> Iterator[str]:
 
 
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
-    """Pose and command topic of each robot: of one name; the one with most messages."""
+    """Pose and command topic of each robot: of one name; the one with most messages.
+
+    Where nothing is a command, what odometry measured stands in beside other poses. Poses without
+    either have an empty name as their command.
+    """
     pairs = []
     all_commands = [t for t in topics if t.role == "command"]
+    if not all_commands:
+        poses = [t for t in topics if t.role == "pose"]
+        all_commands = [t for t in poses if t.kind == ODOMETRY]
+        topics = [t for t in poses if t.kind != ODOMETRY]
+        if not (topics and all_commands):
+            robots = sorted({t.robot for t in poses})
+            own = ([t for t in poses if t.robot == robot] for robot in robots)
+            return [(max(of_one, key=_likely).name, "") for of_one in own]
     robots = sorted({t.robot for t in all_commands})
     for robot in robots:
         commands = [t for t in all_commands if t.robot == robot]
@@ -205,8 +233,8 @@ def numbering(pairs: list[tuple[str, str]]) -> list[str]:
     free = (k for k in range(1, 100) if k not in taken)
     return [
         word
-        for _, command in open_pairs
-        for word in ("--robot", f"{_name_in(command)}={next(free)}")
+        for pose, command in open_pairs
+        for word in ("--robot", f"{_name_in(command or pose)}={next(free)}")
     ]
 
 
@@ -235,25 +263,39 @@ def read_bag(
     Args:
         path: file or folder of the bag.
         poses: topics, one for each robot; a frame of tf is `/tf:frame`.
-        commands: topics, in the same order of robots.
+        commands: topics, in the same order of robots; or none at all.
         options: how to read it.
 
     Raises:
         LogError: unreadable, a topic that is not there or holds nothing that is known.
     """
-    if len(poses) != len(commands) or not poses:
+    if not poses or (commands and len(poses) != len(commands)):
         raise LogError("--pose and --command: give one of each for each robot, in the same order.")
-    pairs = list(zip(poses, commands, strict=True))
+    pairs = list(zip(poses, commands or [""] * len(poses), strict=True))
     numbers = [_number(pair, options, len(pairs)) for pair in pairs]
-    rows = _rows(path, [*poses, *commands], options.receive)
+    roles = [*((topic, "pose") for topic in poses), *((topic, "command") for topic in commands)]
+    rows = _rows(path, roles, options)
+    _check_options(options, {given.kind for (_, role), given in rows.items() if role == "command"})
     for (pose, command), number in zip(pairs, numbers, strict=True):
-        if {_told(pose, "", {}), _told("", command, {})} - {None, number}:
-            rows[pose].notes.append(f"{pose} and {command} are taken for robot {number}.")
-    pose_series = [_poses(n, rows[topic]) for n, topic in zip(numbers, poses, strict=True)]
+        if command and {_told(pose, "", {}), _told("", command, {})} - {None, number}:
+            rows[pose, "pose"].notes.append(f"{pose} and {command} are taken for robot {number}.")
+    pose_series = [
+        _poses(n, rows[topic, "pose"], options) for n, topic in zip(numbers, poses, strict=True)
+    ]
     command_series = [
-        _commands(n, rows[topic], options) for n, topic in zip(numbers, commands, strict=True)
+        _commands(n, rows[topic, "command"], options)
+        for n, (_, topic) in zip(numbers, pairs, strict=True)
+        if topic
     ]
     return pose_series, command_series
+
+
+def _check_options(options: BagOptions, kinds: set[str]) -> None:
+    """Raises LogError where a number is given that the commands, by their kinds, do not need."""
+    if options.wheelbase_m is not None and not kinds & {*STEERED}:
+        raise LogError("--wheelbase-m: no command is a steering angle; leave the option out.")
+    if options.full_duty is not None and all(COMMANDS[kind][0] != "duty" for kind in kinds):
+        raise LogError("--full-duty: no command is a duty; leave the option out.")
 
 
 def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
@@ -261,9 +303,10 @@ def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
         return options.robot_id
     number = _told(*pair, options.robots)
     if number is None:
-        remedy = "--robot-id 1" if robots == 1 else f"--robot {_name_in(pair[1])}=1"
+        topic = pair[1] or pair[0]
+        remedy = "--robot-id 1" if robots == 1 else f"--robot {_name_in(topic)}=1"
         raise LogError(
-            f"{pair[1]}: has no number in 0..99 that tells the robot; number it, for example with "
+            f"{topic}: has no number in 0..99 that tells the robot; number it, for example with "
             f"{remedy}."
         )
     return number
@@ -286,6 +329,8 @@ def _open(path: Path):
     try:
         with TemporaryDirectory() as folder:
             storage = _storage(path)
+            for file in sorted(storage.glob("*.[dm]*[3p]")) if storage.is_dir() else [storage]:
+                refuse_other_file(file, "a ROS bag")
             check_chunks(storage)
             if is_cut(storage):
                 write_whole(storage, Path(folder) / "whole.mcap")
@@ -420,7 +465,7 @@ class _Rows:
     of_camera: bool = False
 
     @classmethod
-    def of(cls, topic: str, messages: _Messages, receive: bool) -> "_Rows":
+    def of(cls, topic: str, role: str, messages: _Messages, receive: bool) -> "_Rows":
         """Those that are kept, on the clock that is taken."""
         stamps_ns, kept, notes = _stamps(topic, messages, receive)
         if messages.lost:
@@ -440,7 +485,9 @@ class _Rows:
             )
         if messages.root:
             notes.append(f"{topic}: its place in the frame {messages.root} is taken.")
-        if messages.kind == ODOMETRY or _words(messages.root)[-1:] == ["odom"]:
+        if messages.kind == ODOMETRY and role == "command":
+            notes.append(f"{topic}: {STAND_IN}.")
+        elif messages.kind == ODOMETRY or _words(messages.root)[-1:] == ["odom"]:
             notes.append(
                 f"{topic}: is odometry; if it counts the robot's own wheels, slip and wrong wheels "
                 "do not show in it: then take poses of a camera or of motion capture."
@@ -472,10 +519,10 @@ class _Rows:
         return rows[last], [*self.notes, note]
 
 
-def _rows(path: Path, topics: list[str], receive: bool) -> dict[str, _Rows]:
-    """By topic; what is to be said of the bag stands with the first."""
+def _rows(path: Path, topics: list[Role], options: BagOptions) -> dict[Role, _Rows]:
+    """By topic and what it is to be; what is to be said of the bag stands with the first."""
     found = _read(path, topics)
-    rows = {topic: _Rows.of(topic, messages, receive) for topic, messages in found.items()}
+    rows = {key: _Rows.of(*key, messages, options.receive) for key, messages in found.items()}
     next(iter(rows.values())).notes[:0] = _of_bag(path)
     return rows
 
@@ -491,19 +538,20 @@ def _of_bag(path: Path) -> list[str]:
     return notes
 
 
-def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
+def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
     """Messages of each topic that is wanted, and of each frame of tf."""
-    found: dict[str, _Messages] = {}
+    found: dict[Role, _Messages] = {}
     wanted: dict[str, dict[str, _Messages]] = {}  # frames, by the topic of tf
-    frames, with_frames = Frames(), any(":" in topic for topic in topics)
+    whole: dict[str, list[tuple[_Messages, Callable[[Any], Row]]]] = {}  # topics that are one thing
+    frames, with_frames = Frames(), any(":" in topic for topic, _ in topics)
     with _open(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
-        names = [topic.partition(":")[0] for topic in topics]
+        names = [topic.partition(":")[0] for topic, _ in topics]
         if missing := [name for name in names if name not in kinds]:
             raise LogError(
                 f"{path.name}: has no topic {missing[0]}; it has {', '.join(sorted(kinds))}."
             )
-        for topic, name in zip(topics, names, strict=True):
+        for (topic, role), name in zip(topics, names, strict=True):
             kind = kinds[name]
             if kind in MANY and topic == name:
                 what = "frames" if kind == TF else "tags"
@@ -518,9 +566,13 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
                 )
             if not role_of(kind) and kind not in MANY:
                 raise LogError(f"{path.name}: {topic} holds {kind}, which is not read here.")
-            found[topic] = _Messages(kind)
+            if kind not in VALUES[role] and (kind not in MANY or role == "command"):
+                raise LogError(f"--{role}: {topic} holds {kind}, which is no {role}.")
+            found[topic, role] = _Messages(kind)
             if kind == TF:
-                wanted.setdefault(name, {})[topic.partition(":")[2]] = found[topic]
+                wanted.setdefault(name, {})[topic.partition(":")[2]] = found[topic, role]
+            elif kind not in TAGS:
+                whole.setdefault(name, []).append((found[topic, role], VALUES[role][kind]))
         chosen = [
             c for c in reader.connections if c.topic in names or (with_frames and c.msgtype == TF)
         ]
@@ -534,18 +586,19 @@ def _read(path: Path, topics: list[str]) -> dict[str, _Messages]:
             kind = connection.msgtype
             if kind in TAGS:
                 for number, row in tag_rows(message):
-                    if f"{name}:{number}" in found:
-                        found[f"{name}:{number}"].add(message.header.stamp, received_ns, row)
+                    if own := found.get((f"{name}:{number}", "pose")):
+                        own.add(message.header.stamp, received_ns, row)
                 continue
-            if kind == JOINTS and not found[name]:
-                found[name].left_out = joints_beside_wheels(message)
-                found[name].unordered = joints_as_they_stand(message)
-            value_of = POSES.get(kind) or COMMANDS[kind][1]
             stamp = getattr(getattr(message, "header", None), "stamp", None)
-            found[name].add(stamp, received_ns, value_of(message))
-        for name in set(names) & set(found):
-            found[name].lost = reader.topics[name].msgcount - len(found[name])
-    for topic, messages in found.items():
+            for own, value_of in whole[name]:
+                if kind == JOINTS and not own:
+                    own.left_out = joints_beside_wheels(message)
+                    own.unordered = joints_as_they_stand(message)
+                own.add(stamp, received_ns, value_of(message))
+        for name, of_topic in whole.items():
+            for own, _ in of_topic:
+                own.lost = reader.topics[name].msgcount - len(own)
+    for (topic, _), messages in found.items():
         if messages:
             continue
         if _is_static(topic.partition(":")[0]):
@@ -632,9 +685,12 @@ def _stamps(
     return header, kept, notes
 
 
-def _poses(robot_id: int, given: _Rows) -> PoseSeries:
-    if given.kind not in POSES and given.kind not in MANY:
-        raise LogError(f"--pose: {given.topic} holds {given.kind}, which is no pose.")
+def _poses(robot_id: int, given: _Rows, options: BagOptions) -> PoseSeries:
+    if given.of_camera and options.up:
+        raise LogError(
+            f"--up {options.up}: {given.topic} is seen by a camera, and laid on the floor that its "
+            "poses are on; leave the option out."
+        )
     utime_us, evened = at_even_beat(given.utime_us, given.topic)
     given = replace(given, utime_us=utime_us, notes=given.notes + evened)
     rows, notes = given.ordered()
@@ -646,13 +702,12 @@ def _poses(robot_id: int, given: _Rows) -> PoseSeries:
     if given.of_camera and valid.any():
         value[valid, :3], value[valid, 3:], note = on_floor(value[valid, :3], value[valid, 3:])
         notes = [*notes, f"{given.topic}: {note}."]
-    return PoseSeries(robot_id, given.utime_us[rows], value[:, :3], value[:, 3:], valid, notes)
+    position_m, quaternion = with_z_up(value[:, :3], value[:, 3:], options.up or "z")
+    return PoseSeries(robot_id, given.utime_us[rows], position_m, quaternion, valid, notes)
 
 
 def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries:
     topic, kind = given.topic, given.kind
-    if kind not in COMMANDS:
-        raise LogError(f"--command: {topic} holds {kind}, which is no command.")
     if kind == JOINTS and given.widths == [0]:
         raise LogError(
             f"--command: {topic} has positions of joints and no velocities; record what the wheels "
@@ -672,7 +727,7 @@ def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries
         )
     command_kind = COMMANDS[kind][0]
     if kind in STEERED:
-        value = _velocities(topic, value, options.wheelbase_m)
+        value = velocities_of_steering(topic, *value.T, options.wheelbase_m)
     elif value.shape[1] == 2:  # left, right
         value = value[:, [0, 1, 0, 1]]
     elif value.shape[1] == 3:
@@ -692,17 +747,6 @@ def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries
         mode=turbopi.telemetry_t.MODE_SCRIPT,
         warnings=notes,
     )
-
-
-def _velocities(topic: str, steered: np.ndarray, wheelbase_m: float | None) -> np.ndarray:
-    """(M, 4) velocities of the body: omega = v tan(steering) / wheelbase (Rajamani 2012, ch. 2)."""
-    if wheelbase_m is None or not wheelbase_m > 0:
-        raise LogError(
-            f"{topic}: tells steering angles; give the distance of the axles, --wheelbase-m METRES."
-        )
-    speed, steering = steered.T
-    zero = np.zeros_like(speed)
-    return np.column_stack([speed, zero, speed * np.tan(steering) / wheelbase_m, zero])
 
 
 def _percent(topic: str, value: np.ndarray, full: float | None) -> tuple[np.ndarray, list[str]]:

@@ -20,6 +20,10 @@ TAGS = tuple(  # poses of tags in the camera's frame, by several packages
     )
 )
 CORNERS = "apriltag_msgs/msg/AprilTagDetectionArray"  # without poses: these are on /tf
+STAND_IN = (
+    "is odometry: the speeds that it measured stand in for commands, so that lags and losses of "
+    "the motors do not show"
+)
 JOINTS = "sensor_msgs/msg/JointState"
 ODOMETRY = "nav_msgs/msg/Odometry"
 ESTIMATES = (ODOMETRY, "geometry_msgs/msg/PoseWithCovarianceStamped")  # often of the robot itself
@@ -144,6 +148,7 @@ POSES: dict[str, Callable[[Any], Row]] = {
 COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {
     "geometry_msgs/msg/Twist": ("twist", _twist),
     "geometry_msgs/msg/TwistStamped": ("twist", lambda m: _twist(m.twist)),
+    ODOMETRY: ("twist", lambda m: _twist(m.twist.twist)),
     STEERED[0]: ("twist", _steered),
     STEERED[1]: ("twist", lambda m: _steered(m.drive)),
     JOINTS: ("wheel_speed", _wheel_speeds),
@@ -155,5 +160,5 @@ COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {
 
 
 def role_of(kind: str) -> str:
-    """`pose`, `command` or empty, by the type of a message."""
+    """`pose`, `command` or empty, by the type of a message; odometry is a pose first."""
     return "pose" if kind in POSES else "command" if kind in COMMANDS else ""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from twinmill.data.log import CommandKind, heading_rad
+from twinmill.data.log import CommandKind, LogError, heading_rad
 
 TURNED_RAD = 0.02  # turns a velocity by 2 % of itself
 
@@ -21,6 +21,7 @@ class PoseSeries:
         orientation_wxyz: (N, 4) unit quaternions; all NaN where the heading was not recorded.
         valid: (N,) bool; elsewhere position and orientation are NaN.
         warnings: sentences.
+        called: name of the robot in the source; empty where it has none.
     """
 
     robot_id: int
@@ -29,6 +30,7 @@ class PoseSeries:
     orientation_wxyz: np.ndarray
     valid: np.ndarray
     warnings: list[str] = field(default_factory=list)
+    called: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,8 @@ class CommandSeries:
         mode: of the telemetry.
         warnings: sentences.
         world: whether velocities are along the axes of W, not of the body.
+        called: name of the robot in the source; empty where it has none.
+        mixed: whether duties follow from `inputs` by the robot's own mixing.
     """
 
     robot_id: int
@@ -58,6 +62,8 @@ class CommandSeries:
     mode: int
     warnings: list[str] = field(default_factory=list)
     world: bool = False
+    called: str = ""
+    mixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,10 +123,40 @@ def in_body_frame(commands: CommandSeries, poses: PoseSeries | None) -> CommandS
     )
 
 
+def velocities_of_steering(
+    where: str, speed_mps: np.ndarray, steering_rad: np.ndarray, wheelbase_m: float | None
+) -> np.ndarray:
+    """(M, 4) velocities of the body: omega = v tan(steering) / wheelbase (Rajamani 2012, ch. 2).
+
+    Raises:
+        LogError: the wheelbase is not known.
+    """
+    if wheelbase_m is None or not wheelbase_m > 0:
+        raise LogError(
+            f"{where}: tells steering angles; give the distance of the axles, --wheelbase-m METRES."
+        )
+    zero = np.zeros_like(speed_mps)
+    omega_radps = speed_mps * np.tan(steering_rad) / wheelbase_m
+    return np.column_stack([speed_mps, zero, omega_radps, zero])
+
+
 def quaternion_from_heading(heading_rad: np.ndarray) -> np.ndarray:
     """(N,) rad to (N, 4) w, x, y, z."""
     zero = np.zeros_like(heading_rad)
     return np.column_stack([np.cos(heading_rad / 2), zero, zero, np.sin(heading_rad / 2)])
+
+
+def with_z_up(
+    position_m: np.ndarray, quaternion_wxyz: np.ndarray, up: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) and (N, 4) in axes that follow each other as before, the one that is up as z."""
+    order, sign = {
+        "x": ([1, 2, 0], [1, 1, 1]),
+        "y": ([0, 2, 1], [1, -1, 1]),
+        "z": ([0, 1, 2], [1, 1, 1]),
+    }[up]
+    turned = quaternion_wxyz[:, [0, *(1 + k for k in order)]] * [1, *sign]
+    return position_m[:, order] * sign, turned
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:

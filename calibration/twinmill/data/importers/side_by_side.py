@@ -4,12 +4,16 @@
 import re
 from dataclasses import replace
 
+import numpy as np
+
 from twinmill.data.importers.columns import is_usual
+from twinmill.data.importers.samples import FEWER, filled_in
+from twinmill.data.importers.topics import is_path
 from twinmill.data.measurement_table import Table
 
 ROBOT = "robot_id"
 # A robot has a number: before the name of what is measured (`r1_x`, `robot2.yaw`), or after it.
-BEFORE = re.compile(r"^(?P<robot>[A-Za-z]*[_ ]?\d+)[_. /](?P<name>.+)$")
+BEFORE = re.compile(r"^/?(?P<robot>[A-Za-z]*[_ ]?\d+)[_. /](?P<name>.+)$")
 AFTER = re.compile(r"^(?P<name>.+?)[_. /]?(?P<robot>(robot|r)?\d+)$", re.IGNORECASE)
 FEWEST = 2  # robots, and columns of each
 
@@ -35,7 +39,8 @@ def _places(table: Table, pattern: re.Pattern) -> dict[str, dict[str, int]]:
     places: dict[str, dict[str, int]] = {}
     for k, column in enumerate(table.header):
         found = pattern.match(column)
-        if found and not is_usual(column, table.known) and is_usual(found["name"], table.known):
+        of_robot = is_path(column) or not is_usual(column, table.known)
+        if found and of_robot and is_usual(found["name"], table.known):
             places.setdefault(found["robot"], {})[found["name"]] = k
     return places
 
@@ -44,16 +49,31 @@ def _stacked(table: Table, places: dict[str, dict[str, int]]) -> Table:
     of_robots = {k for columns in places.values() for k in columns.values()}
     shared = [k for k in range(len(table.header)) if k not in of_robots]
     names = list(next(iter(places.values())))
-    rows = [
-        [*(row[k] for k in shared), robot, *(row[columns[name]] for name in names)]
-        for row in table.rows
-        for robot, columns in places.items()
-    ]
+    sampled = _sampled(table, places)
+    rows, line = [], []
+    for n, (row, number) in enumerate(zip(table.rows, table.line, strict=True)):
+        for robot, columns in places.items():
+            if sampled[robot][n]:
+                rows.append([*(row[k] for k in shared), robot, *(row[columns[c]] for c in names)])
+                line.append(number)
     note = f"{table.name}: the robots {', '.join(places)} stand side by side; each has its rows."
     return replace(
         table,
         header=[*(table.header[k] for k in shared), ROBOT, *names],
         rows=rows,
-        line=[line for line in table.line for _ in places],
+        line=line,
         notes=[*table.notes, note],
     )
+
+
+def _sampled(table: Table, places: dict[str, dict[str, int]]) -> dict[str, np.ndarray]:
+    """(rows,) bool by robot: those with something of it; all, unless others mostly stand elsewhere.
+
+    Robots that one frame shows have rows in common: one that is empty there was lost.
+    """
+    filled = {robot: filled_in(table, [*own.values()]) for robot, own in places.items()}
+    for robot, own in filled.items():
+        others = np.any([f for name, f in filled.items() if name != robot], axis=0)
+        if not own.any() or others[own].mean() >= FEWER:
+            filled[robot] = np.ones(len(own), bool)
+    return filled

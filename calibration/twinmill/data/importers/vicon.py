@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from twinmill.data.importers.motive import robots_of, with_z_up
-from twinmill.data.importers.series import PoseSeries
+from twinmill.data.importers.motive import robots_of
+from twinmill.data.importers.series import PoseSeries, with_z_up
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import open_text
 
@@ -31,6 +31,7 @@ READINGS = (
     ("a helical vector", Rotation.from_rotvec),
     ("Euler's", partial(Rotation.from_euler, "XYZ")),
 )
+LAST = {"x": "zyx", "y": "zxy", "z": "yxz"}  # orders of turns whose last is about the one
 APART_RAD = 0.01  # of headings, from which it matters which they are
 
 
@@ -51,13 +52,16 @@ class _Part:
     rows: np.ndarray
 
 
-def read_vicon(path: Path, robots: dict[str, int], up: str) -> list[PoseSeries]:
+def read_vicon(
+    path: Path, robots: dict[str, int], up: str, only: int | None = None
+) -> list[PoseSeries]:
     """Poses of all bodies, stamped from the capture's first frame on.
 
     Args:
         path: the export, `.gz` too.
         robots: robot_id by name of the body; others get the last digits in their names.
-        up: "z", Vicon's default, or "y": the axis that the export calls up.
+        up: the axis that the export calls up, "z" by Vicon's default.
+        only: robot_id of the only body.
 
     Raises:
         LogError: unreadable, no such export, or nothing in it is a robot's.
@@ -77,7 +81,8 @@ def read_vicon(path: Path, robots: dict[str, int], up: str) -> list[PoseSeries]:
         position_m, quaternion, warning = _pose(part, columns, up, f"{path.name}: '{body}'")
         poses[body] = with_z_up(position_m, quaternion, up)
         warnings += [warning] if warning else []
-    series = robots_of(poses, np.round(1e6 * t_s).astype(np.int64), robots, path.name)
+    utime_us = np.round(1e6 * t_s).astype(np.int64)
+    series = robots_of(poses, utime_us, robots, path.name, only=only)
     series[0].warnings.extend(warnings)
     return series
 
@@ -194,7 +199,7 @@ def _read(angles_rad: np.ndarray, up: str, who: str) -> tuple[Rotation, str]:
     readings = [reading(angles_rad) for _, reading in READINGS]
     for turned in readings:
         tilts_rad.append(float(np.linalg.norm(turned.inv().apply(vertical).std(axis=0))))
-        headings_rad.append(turned.as_euler("yxz" if up == "z" else "zxy")[:, 2])
+        headings_rad.append(turned.as_euler(LAST[up])[:, 2])
     best = int(np.argmin(tilts_rad))
     apart_rad = np.angle(np.exp(1j * np.diff(headings_rad, axis=0)))
     if np.abs(apart_rad).max() < APART_RAD:

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables, exports and bags as people wrote them, read as their owners would give them.
+
+The recordings' README files say what is right, calculated without Twinmill.
+"""
+
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from twinmill.data.log import read_log
+
+
+@pytest.fixture
+def case(data_dir):
+    """Folder of one recording by its name."""
+
+    def find(name):
+        path = data_dir / "field_cases" / name
+        if not path.is_dir():
+            pytest.skip(f"no recording at {path}")
+        return path
+
+    return find
+
+
+@pytest.fixture
+def imported(twinmill, tmp_path):
+    """The log of an import and what was said; arguments as of `twinmill import`."""
+
+    def run(*words):
+        out = tmp_path / "o.lcmlog"
+        code, said, wrong = twinmill("import", *words, "-o", out, "--force")
+        assert code == 0, wrong
+        return read_log(out), " ".join(said.split())
+
+    return run
+
+
+def rows_of(path):
+    """Numbers of a table, NaN where a cell is empty."""
+    return np.genfromtxt(path, delimiter=",", skip_header=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "pose", "commands"),
+    [("one_table_two_rates", [0, 1, 2], [0, 4, 5, 6]), ("slash_names", [0, 8, 9], [0, 2, 3, 1])],
+)
+def test_one_table_of_two_topics_is_read_as_the_two(case, imported, name, pose, commands):
+    """The rows of each topic, taken apart by hand: all are there, and no pose was lost."""
+    table = case(name) / "all.csv"
+    log, said = imported("--poses", table, "--commands", table, "--robot-id", 1, "--same-clock")
+    rows = rows_of(table)
+    seen, told = (rows[np.isfinite(rows[:, own]).all(axis=1)][:, own] for own in (pose, commands))
+    robot = log.robots[1]
+    assert len(robot.pose_t_s) == np.count_nonzero(robot.valid) == len(seen) == 1500
+    np.testing.assert_allclose(robot.pose[:, :2], seen[:, 1:])
+    told = told[np.append(np.diff(told[:, 0]) > 0, True)]
+    np.testing.assert_allclose(robot.command[:, :3], told[:, 1:])
+    np.testing.assert_allclose(robot.pose_t_s, seen[:, 0] - seen[0, 0], atol=1e-5)
+    assert "!" not in said
+
+
+def test_a_sign_is_changed_in_a_bag_and_in_an_export_of_vicon(case, imported, tmp_path):
+    """What was written into them has vy of the wrong sign, and in Vicon y as well."""
+    folder = tmp_path / "bag"
+    shutil.copytree(case("options_ignored"), folder)
+    subprocess.run([sys.executable, folder / "bag.py"], check=True)
+    topics = ["--pose", "/r1/pose", "--command", "/r1/cmd_vel"]
+    told = rows_of(folder / "commands.csv")[:, 3]
+    log, said = imported("--bag", folder / "told_bag", *topics, "--flip", "vy_mps")
+    np.testing.assert_allclose(log.robots[1].command[:, 1], -told)
+    assert "wrong sign" not in said
+    log, said = imported(
+        *("--vicon", folder / "vicon.csv", "--commands", folder / "commands.csv"),
+        *("--flip", "vy_mps", "--flip", "y_m"),
+    )
+    robot = log.robots[1]
+    np.testing.assert_allclose(robot.command[:, 1], -told)
+    np.testing.assert_allclose(robot.pose[:, 1], rows_of(folder / "poses.csv")[:, 3], atol=6e-6)
+    assert "wrong sign" not in said
+
+
+def test_speed_and_steering_angle_are_read_with_the_wheelbase(case, imported):
+    """Omega = v tan(steering) / wheelbase; the truth has a lag of 0.10 s and a gain of 1."""
+    folder = case("steering_csv")
+    words = ["--poses", folder / "poses.csv", "--commands", folder / "commands.csv"]
+    with pytest.raises(AssertionError, match="--wheelbase-m METRES"):
+        imported(*words, "--same-clock")
+    log, _ = imported(*words, "--same-clock", "--wheelbase-m", 0.3)
+    _, _, speed, steering = rows_of(folder / "commands.csv").T
+    command = log.robots[1].command
+    np.testing.assert_allclose(command[:, 0], speed)
+    np.testing.assert_allclose(command[:, 2], speed * np.tan(steering) / 0.3)
+
+
+def test_stamps_of_date_and_time_in_digits_are_read(case, imported):
+    folder = case("underscore_stamps")
+    log, _ = imported(
+        *("--poses", folder / "poses.csv", "--commands", folder / "commands.csv"),
+        *("--robot-id", 1),
+    )
+    robot = log.robots[1]
+    assert len(robot.pose_t_s) == 2000
+    np.testing.assert_allclose(robot.pose_t_s, np.arange(2000) * 0.02, atol=1e-6)
+    assert log.t0_utime_us == 1_767_607_230_000_000  # 2026-01-05 10:00:30 UTC, by date -u
+
+
+def test_header_cells_of_motive_in_small_letters_are_read(case, imported):
+    folder = case("motive_small_w")
+    words = ["--motive", folder / "take.csv", "--commands", folder / "commands.csv"]
+    robot = imported(*words)[0].robots[1]
+    assert np.count_nonzero(robot.valid) == 2000 and np.ptp(robot.pose_t_s) == pytest.approx(39.98)
+
+
+def test_poses_alone_make_a_log_and_what_needs_commands_says_so(case, imported, twinmill, tmp_path):
+    """Metrics of it are those of the same poses heard with commands; compare asks for these."""
+    folder = case("poses_only")
+    log, said = imported("--poses", folder / "poses.csv")
+    np.testing.assert_array_equal(
+        log.robots[2].pose[:, :2], rows_of(folder / "poses.csv")[1::2, 2:4]
+    )
+    assert "no commands are given" in said
+    out = str(tmp_path / "o.lcmlog")
+    assert twinmill("metrics", out)[0] == 0
+    assert twinmill("plot", out, "-o", tmp_path / "o.svg")[0] == 0
+    assert twinmill("export", out, "--to", "csv", "-o", tmp_path / "o.csv")[0] == 0
+    for words in (["compare"], ["diagnose"], ["fit", "-o", tmp_path / "m.toml"]):
+        code, _, wrong = twinmill(*words, out, "--model", case("models") / "twist.toml")
+        assert code and "no commands of it" in wrong and "import --commands" in wrong
+    words = ["--heading-from-path", "--same-clock"]
+    for word in words:
+        code, _, wrong = twinmill("import", "--poses", folder / "poses.csv", word, "-o", "x.lcmlog")
+        assert code and word in wrong
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "what", "remedy"),
+    [
+        ("--bag", "pointer.db3", "a Git LFS pointer", "git lfs pull"),
+        ("--poses", "pointer.db3", "a Git LFS pointer", "git lfs pull"),
+        ("--poses", "book.xlsx", "an Excel file", "save it as CSV"),
+        ("--motive", "book.xlsx", "an Excel file", "save it as CSV"),
+        ("--poses", "transposed.csv", "3 rows of 120 numbers", "turn it round"),
+        ("--poses", "echo.yaml", "`ros2 topic echo`", "record a bag"),
+    ],
+)
+def test_files_of_other_kinds_are_told_with_their_way_out(
+    case, twinmill, tmp_path, option, name, what, remedy
+):
+    path = case("small_words") / name
+    topics = ["--pose", "/r1/a", "--command", "/r1/b"] if option == "--bag" else []
+    code, _, wrong = twinmill("import", option, path, *topics, "-o", tmp_path / "o.lcmlog")
+    assert code == 1 and what in wrong and remedy in wrong and wrong.count("\n") == 1
+    assert not (tmp_path / "o.lcmlog").exists()

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forms that other programs write: trajectories, messages of ROS in text, dates in many ways.
+
+Each form holds one path, x = t / 10 and y = t / 20 at a heading of 0.4 rad; its layout is that of
+the format's own page or program.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from twinmill.data.importers.import_log import ImportOptions, import_log
+from twinmill.data.log import LogError, read_log
+
+START_S = 1_700_000_000  # 2023-11-14 22:13:20 UTC, by date -u
+T_S = np.arange(20) / 10
+Z, W = math.sin(0.2), math.cos(0.2)
+ECHO = "{sec},{nanosec},map,{x},{y},0.0,0.0,0.0,{z},{w}"
+
+
+def _text(form: str, header: str = "") -> str:
+    rows = []
+    for t in T_S.tolist():
+        whole, part = divmod(round(t * 1e9), 10**9)
+        values = {"t": f"{START_S + t:.6f}", "ns": START_S * 10**9 + round(t * 1e9)}
+        values |= {"sec": START_S + whole, "nanosec": part, "x": t / 10, "y": t / 20}
+        values |= {"date": "2023-11-14", "time": f"22:13:{20 + t:09.6f}", "ms": f"{part // 10**6}"}
+        values |= {"s": 20 + whole, "z": Z, "w": W}
+        rows.append(form.format(**values))
+    return "\n".join([header, *rows] if header else rows) + "\n"
+
+
+EUROC = ",".join(
+    ["#timestamp [ns]"]
+    + [f"p_RS_R_{axis} [m]" for axis in "xyz"]
+    + [f"q_RS_{axis} []" for axis in "wxyz"]
+)
+FORMS = {
+    "TUM without names": _text("{t} {x} {y} 0 0 0 {z} {w}"),
+    "TUM": _text("{t} {x} {y} 0 0 0 {z} {w}", "# timestamp tx ty tz qx qy qz qw"),
+    "EuRoC": _text("{ns},{x},{y},0,{w},0,0,{z}", EUROC),
+    "ros2 topic echo --csv": _text(ECHO),
+    "days beside times": _text("{date},{time},{x},{y},0.4", "Date,Time,x_m,y_m,theta_rad"),
+    "digits": _text("2023_11_14_22_13_{s}_{ms},{x},{y},0.4", "timestamp,x_m,y_m,theta_rad"),
+    "nanoseconds": _text("{ns},{x},{y},0.4", "time,x_m,y_m,theta_rad"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_form_of_another_program_is_read_without_an_option(form, tmp_path):
+    path, out = tmp_path / "p.txt", tmp_path / "o.lcmlog"
+    path.write_text(FORMS[form])
+    import_log(path, None, out, options=ImportOptions(robot_id=1))
+    log = read_log(out)
+    robot = log.robots[1]
+    np.testing.assert_allclose(robot.pose_t_s, T_S, atol=2e-6)
+    np.testing.assert_allclose(robot.pose[:, 0], T_S / 10)
+    np.testing.assert_allclose(robot.pose[:, 2], 0.4)
+    assert log.t0_utime_us == START_S * 10**6
+
+
+def test_odometry_stands_in_for_commands_and_is_said_to(tmp_path):
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds, odometry = store.types, "nav_msgs/msg/Odometry"
+
+    def vector(x=0.0, z=0.0):
+        return kinds["geometry_msgs/msg/Vector3"](x=x, y=0.0, z=z)
+
+    with Writer(tmp_path / "bag", version=9) as writer:
+        topic = writer.add_connection("/r1/odom", odometry, typestore=store)
+        for k in range(40):
+            stamp = kinds["builtin_interfaces/msg/Time"](sec=k // 10, nanosec=k % 10 * 10**8)
+            turned = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=Z, w=W)
+            pose = kinds["geometry_msgs/msg/Pose"](
+                position=kinds["geometry_msgs/msg/Point"](x=0.02 * k, y=0.0, z=0.0),
+                orientation=turned,
+            )
+            twist = kinds["geometry_msgs/msg/Twist"](linear=vector(0.2), angular=vector(z=0.1))
+            sure = np.zeros(36)
+            message = kinds[odometry](
+                header=kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="odom"),
+                child_frame_id="base_link",
+                pose=kinds["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=sure),
+                twist=kinds["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=sure),
+            )
+            writer.write(topic, k * 10**8, store.serialize_cdr(message, odometry))
+    options = ImportOptions(pose_topics=("/r1/odom",), command_topics=("/r1/odom",))
+    done = import_log(None, None, tmp_path / "o.lcmlog", bag=tmp_path / "bag", options=options)
+    robot = read_log(tmp_path / "o.lcmlog").robots[1]
+    np.testing.assert_allclose(robot.command[:, :3], np.tile([0.2, 0, 0.1], (40, 1)))
+    np.testing.assert_allclose(robot.pose[:, 0], 0.02 * np.arange(40))
+    assert any("stand in for commands" in warning for warning in done["warnings"])
+
+
+def test_odometry_in_a_table_stands_in_for_commands_and_is_said_to(tmp_path):
+    fields = ["pose.pose.position.x", "pose.pose.position.y", "twist.twist.linear.x"]
+    names = ["Time", *fields, "twist.twist.linear.y", "twist.twist.angular.z"]
+    rows = [f"{START_S + t},{t / 10},{t / 20},0.1,0,0.2" for t in T_S]
+    path = tmp_path / "odom.csv"
+    path.write_text("\n".join([",".join(names), *rows]) + "\n")
+    options = ImportOptions(robot_id=1)
+    done = import_log(path, path, tmp_path / "o.lcmlog", options=options)
+    robot = read_log(tmp_path / "o.lcmlog").robots[1]
+    np.testing.assert_allclose(robot.command[:, :3], np.tile([0.1, 0, 0.2], (len(T_S), 1)))
+    assert any("stand in for commands" in warning for warning in done["warnings"])
+
+
+def test_a_table_of_wheels_on_the_bench_is_told_with_its_way_out(tmp_path):
+    path = tmp_path / "bench.csv"
+    rows = "".join(f"{k},{2 * k},{2 * k}\n" for k in range(9))
+    path.write_text(f"duty_pct,left_rpm,right_rpm\n{rows}")
+    with pytest.raises(LogError, match="bench test; write it as a steady-state table"):
+        import_log(path, None, tmp_path / "o.lcmlog", options=ImportOptions(robot_id=1))
