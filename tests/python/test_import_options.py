@@ -198,6 +198,7 @@ ASKED = {
     "--receive-stamps": ["--receive-stamps"],
     "--wheelbase-m": ["--wheelbase-m", "0.3"],
     "--full-duty": ["--full-duty", "255"],
+    "--wheel-factor": ["--wheel-factor", "0.1"],
     "--pose": ["--pose", "/r2/pose"],
     "--command": ["--command", "/r2/cmd_vel"],
 }
