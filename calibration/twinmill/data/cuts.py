@@ -54,25 +54,31 @@ class _Limits:
 
     Attributes:
         usual: m/s, rad/s.
+        fastest: m/s, rad/s that it has nowhere in its log.
         noise: m, rad.
     """
 
     usual: tuple[float, float]
+    fastest: tuple[float, float]
     noise: tuple[float, float]
 
     @classmethod
     def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "_Limits":
         """With the noise that second differences of the poses show: motion is smooth beside it.
 
-        Stamps that jitter are noise as well: the way in the time that they are off.
+        Stamps that jitter are noise as well: the way in the time that they are off. Half turns of
+        the heading are none, be they many: a tag whose front flickers makes them.
         """
         pose = robot.pose[usable]
-        pose[:, 2] = np.unwrap(pose[:, 2])
-        late = JUMP_SIGMA * _jitter_s(robot.pose_t_s[usable]) * _fast(robot.pose_t_s[usable], pose)
+        pose[:, 2] = np.unwrap(pose[:, 2], period=np.pi)
+        fast = _fast(robot.pose_t_s[usable], pose)
+        late = JUMP_SIGMA * _jitter_s(robot.pose_t_s[usable]) * fast
         bend = np.abs(np.diff(np.nan_to_num(pose), n=2, axis=0))
         sigma = np.median(bend, axis=0) / 0.6745 / np.sqrt(6) if len(bend) else np.zeros(3)
+        mps, radps = np.maximum(usual, JUMP_FACTOR * fast)
         return cls(
             usual,
+            (float(mps), float(radps)),
             (
                 max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max()), float(late[0])),
                 max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2]), float(late[1])),
@@ -131,26 +137,70 @@ def _short_way(angle_rad: np.ndarray) -> np.ndarray:
 def _excursions(
     robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
 ) -> np.ndarray:
-    """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
+    """(N,) bool: poses off the way that those around them go, as when markers are mixed up."""
     outlier = np.zeros(len(usable), bool)
     index = np.flatnonzero(usable)
-    jumps = np.flatnonzero(np.logical_or(*_jumps(robot, index, limits)))
-    position = 0
-    while position + 1 < len(jumps):
-        before, after = index[jumps[position]], index[jumps[position + 1] + 1]
-        ends = np.array([before, after])
-        back = robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot) and not np.any(
-            _jumps(robot, ends, limits)
-        )
-        if back:
-            outlier[before + 1 : after] = True
-        position += 2 if back else 1
+    outlier[np.setdiff1d(index, index[_longest_way(_links(robot, index, limits))])] = True
     if outlier.any():
         notes.append(
             f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
             "on jump away and back; left out."
         )
     return outlier
+
+
+def _links(robot: RobotLog, index: np.ndarray, limits: _Limits) -> list[np.ndarray]:
+    """Of each reach from 1 pose on to those within a gap: (K - reach,) bool, the way may go so.
+
+    Poses are left out between a jump away and one back alone: a step that lasts is none of these.
+    Over a gap in time a robot may go anywhere.
+    """
+    t_s, pose, links = robot.pose_t_s[index], robot.pose[index], []
+    gap_s = _gap_s(robot)
+    for reach in range(1, len(index)):
+        dt_s, step = t_s[reach:] - t_s[:-reach], pose[reach:] - pose[:-reach]
+        far = np.hypot(step[:, 0], step[:, 1]) > limits.fastest[0] * dt_s + limits.noise[0]
+        turn_rad = np.abs(np.nan_to_num(_short_way(step[:, 2])))
+        far |= turn_rad > limits.fastest[1] * dt_s + limits.noise[1]
+        within = dt_s <= gap_s
+        if links:
+            jumps = ~links[0]
+            links.append(within & ~far & jumps[: 1 - reach] & jumps[reach - 1 :])
+        else:
+            links.append(~(within & far))
+        if links[0].all() or not within.any():
+            break
+    return links
+
+
+def _longest_way(links: list[np.ndarray]) -> np.ndarray:
+    """Poses, by their number, of the way through most of them (Bellman 1957).
+
+    A step that no robot makes costs as much as all poses within a gap, so that as many are left
+    out to spare two of them.
+
+    Args:
+        links: as of `_links`.
+    """
+    count, cut = len(links[0]) + 1 if links else 0, len(links)
+    if not links or links[0].all():
+        return np.arange(count)
+    cost, before, near = list(range(count)), [-1] * count, [link.tolist() for link in links]
+    for k in range(1, count):
+        for reach in range(1, min(k, cut) + 1):
+            j = k - reach
+            linked = near[reach - 1][j]
+            if not linked and reach > 1:
+                continue
+            new = cost[j] + reach - 1 + (0 if linked else cut)
+            if new < cost[k] or before[k] < 0 and new <= cost[k]:
+                cost[k], before[k] = new, j
+    k = min(range(max(0, count - cut), count), key=lambda k: cost[k] + count - 1 - k)
+    way = []
+    while k >= 0:
+        way.append(k)
+        k = before[k]
+    return np.array(way[::-1])
 
 
 def _turned_by_tracker(

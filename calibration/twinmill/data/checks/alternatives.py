@@ -348,12 +348,19 @@ class Search:
             variance += (len(without) - 1) * float(np.var(without))  # Efron and Stein 1981
         return float(np.sqrt(variance))
 
-    def best(self, alternatives: list[Alternative]) -> list[Explained]:
-        """Each at the lag and the shift where it explains most, of those that are likely."""
+    def best(
+        self, alternatives: list[Alternative], keys: list[tuple[float, float]] | None = None
+    ) -> list[Explained]:
+        """Each at the lag and the shift where it explains most, of some; else of the likely ones."""
         found: list[Explained] = []
         for (sign, mirrored, turned), group in by_pose(alternatives):
-            keys = self.keys(sign, mirrored)
-            found += self._best_of(group, sign=sign, mirrored=mirrored, turned=turned, keys=keys)
+            found += self._best_of(
+                group,
+                sign=sign,
+                mirrored=mirrored,
+                turned=turned,
+                keys=keys or self.keys(sign, mirrored),
+            )
         return found
 
     def without(self, e: Explained, lates_s: np.ndarray) -> "Search":

@@ -37,7 +37,8 @@ def at_axle(search: Search, alternatives: list[Alternative]) -> Search:
     )
     motion = search.motion.at_axle(led_m, simplest.heading_sign, simplest.mirrored)
     axle = Search(motion, search.wheels, search.felt, search.lates_s)
-    (seen,), (turned_about,) = search.best([simplest]), axle.best([simplest])
+    keys = search.keys(simplest.heading_sign, simplest.mirrored)
+    (seen,), (turned_about,) = (s.best([simplest], keys) for s in (search, axle))
     return axle if far_better(turned_about, seen) else search
 
 
