@@ -10,6 +10,7 @@ from twinmill.data.log import RobotLog
 GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
 GAP_PERIODS = 4  # the same for slower cameras
 LOSSY_GAP_S = 0.25  # and for captures that lose frames all the time; a pick-up takes longer
+USUAL_MPS, USUAL_RADPS = 1.5, 12.0  # below which no step is a jump: four times a TurboPi's
 JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
 JUMP_SIGMA = 8  # times the noise of a camera that is worse than that
 JUMP_FACTOR = 3  # times as fast as just before or after: no wheels do that between two frames
@@ -34,14 +35,14 @@ def find_segments(
     Returns:
         (N,) number of the stretch; -1 where unusable.
     """
-    limits = _Limits.of(robot, usable, *usual)
+    limits = Limits.of(robot, usable, *usual)
     usable = usable & ~_excursions(robot, usable, limits, notes)
     turned = _turned_by_tracker(robot, usable, limits, notes)
     index, begins = _cuts(robot, usable, limits, notes, turned=turned)
     return _segments(robot, index, begins, notes)
 
 
-def _gap_s(robot: RobotLog) -> float:
+def longest_gap_s(robot: RobotLog) -> float:
     """Longest time between usable poses over which the track goes on."""
     spacing_s = np.diff(robot.pose_t_s[robot.valid])
     usual_s = max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
@@ -49,7 +50,7 @@ def _gap_s(robot: RobotLog) -> float:
 
 
 @dataclass(frozen=True)
-class _Limits:
+class Limits:
     """What a step of one robot's poses can be by noise alone, and by speeds it may have.
 
     Attributes:
@@ -63,7 +64,7 @@ class _Limits:
     noise: tuple[float, float]
 
     @classmethod
-    def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "_Limits":
+    def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "Limits":
         """With the noise that second differences of the poses show: motion is smooth beside it.
 
         Stamps that jitter are noise as well: the way in the time that they are off. Half turns of
@@ -83,6 +84,13 @@ class _Limits:
                 max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max()), float(late[0])),
                 max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2]), float(late[1])),
             ),
+        )
+
+    def far(self, dt_s: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """(K,) bool: a robot does not go so far, or turn so, in such times; step (K, 3)."""
+        moved_m, turn_rad = np.hypot(*step[:, :2].T), np.abs(np.nan_to_num(_short_way(step[:, 2])))
+        return (moved_m > self.fastest[0] * dt_s + self.noise[0]) | (
+            turn_rad > self.fastest[1] * dt_s + self.noise[1]
         )
 
     def possible(self, channel: int, speed: np.ndarray, dt_s: np.ndarray) -> np.ndarray:
@@ -115,7 +123,7 @@ def _beside(speed: np.ndarray) -> np.ndarray:
     return np.maximum(medians[: len(speed)], medians[BESIDE + 1 :])
 
 
-def _jumps(robot: RobotLog, index: np.ndarray, limits: _Limits) -> tuple[np.ndarray, np.ndarray]:
+def _jumps(robot: RobotLog, index: np.ndarray, limits: Limits) -> tuple[np.ndarray, np.ndarray]:
     """(len(index) - 1,) bool each: steps and turns between these poses that no robot makes."""
     dt_s = np.diff(robot.pose_t_s[index])
     step = np.diff(robot.pose[index, :2], axis=0)
@@ -135,7 +143,7 @@ def _short_way(angle_rad: np.ndarray) -> np.ndarray:
 
 
 def _excursions(
-    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
+    robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str]
 ) -> np.ndarray:
     """(N,) bool: poses off the way that those around them go, as when markers are mixed up."""
     outlier = np.zeros(len(usable), bool)
@@ -149,20 +157,17 @@ def _excursions(
     return outlier
 
 
-def _links(robot: RobotLog, index: np.ndarray, limits: _Limits) -> list[np.ndarray]:
+def _links(robot: RobotLog, index: np.ndarray, limits: Limits) -> list[np.ndarray]:
     """Of each reach from 1 pose on to those within a gap: (K - reach,) bool, the way may go so.
 
     Poses are left out between a jump away and one back alone: a step that lasts is none of these.
     Over a gap in time a robot may go anywhere.
     """
     t_s, pose, links = robot.pose_t_s[index], robot.pose[index], []
-    gap_s = _gap_s(robot)
+    gap_s = longest_gap_s(robot)
     for reach in range(1, len(index)):
-        dt_s, step = t_s[reach:] - t_s[:-reach], pose[reach:] - pose[:-reach]
-        far = np.hypot(step[:, 0], step[:, 1]) > limits.fastest[0] * dt_s + limits.noise[0]
-        turn_rad = np.abs(np.nan_to_num(_short_way(step[:, 2])))
-        far |= turn_rad > limits.fastest[1] * dt_s + limits.noise[1]
-        within = dt_s <= gap_s
+        dt_s = t_s[reach:] - t_s[:-reach]
+        far, within = limits.far(dt_s, pose[reach:] - pose[:-reach]), dt_s <= gap_s
         if links:
             jumps = ~links[0]
             links.append(within & ~far & jumps[: 1 - reach] & jumps[reach - 1 :])
@@ -204,7 +209,7 @@ def _longest_way(links: list[np.ndarray]) -> np.ndarray:
 
 
 def _turned_by_tracker(
-    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
+    robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str]
 ) -> np.ndarray:
     """(N,) bool: poses between a turn that no robot makes and the next one, which undoes it.
 
@@ -233,7 +238,7 @@ def _turned_by_tracker(
 
 
 def _cuts(
-    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str], *, turned: np.ndarray
+    robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str], *, turned: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool.
 
@@ -243,7 +248,7 @@ def _cuts(
     t = robot.pose_t_s[index]
     moves, turns = _jumps(robot, index, limits)
     jump = moves | turns
-    gap = np.diff(t) > _gap_s(robot)
+    gap = np.diff(t) > longest_gap_s(robot)
     lost = gap & (np.diff(index) > 1)
     keep = np.ones(len(index), bool)
     for k in np.flatnonzero(jump | gap):
