@@ -312,6 +312,7 @@ def _made(
         left_over=_left_over(diagnosis, beyond),
         robots=_own_values(diagnosis, fit),
         covariance=_with_middles(covariance.of([e.name for e in others]), middle),
+        shares={f.effect: f.share for f in diagnosis.findings},
     )
     child = child_of(model_file, told, Path(out), command)
     own = phases(child.model)
