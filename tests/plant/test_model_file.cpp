@@ -75,7 +75,7 @@ const Bad kBad[] = {
     {"Infinite", "[robot]\nmass_kg = inf", {"robot.mass_kg", "inf", "kg"}},
     {"InfiniteParameter",
      "[[effect]]\nname = \"marker_offset\"\nx_m = -inf",
-     {"marker_offset.x_m", "-inf", "-0.5 to 0.5 m"}},
+     {"marker_offset.x_m", "-inf", "-3 to 3 m"}},
     {"NotANumberInTheTable", "[base]\nduty_pct = [0, nan]", {"base.duty_pct", "nan"}},
     {"TextForANumber", "[robot]\nmass_kg = \"1.2\"", {"robot.mass_kg", "number", "kg"}},
     {"TruthForANumber", "[robot]\nmass_kg = true", {"robot.mass_kg", "number", "kg"}},

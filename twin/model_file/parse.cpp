@@ -322,8 +322,8 @@ private:
 
     void ReadEffectValues(const toml::table &table, const EffectSpec &spec)
     {
-        std::set<std::string> known{"name",      "std",          "bounds",
-                                    "fitted_on", "error_before", "error_after"};
+        std::set<std::string> known{"name",         "std",         "bounds", "fitted_on",
+                                    "error_before", "error_after", "share"};
         for (const TextParameter &text : spec.texts)
             known.insert(text.name);
         std::set<std::string> parameters;

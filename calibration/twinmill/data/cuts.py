@@ -10,6 +10,7 @@ from twinmill.data.log import RobotLog
 GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
 GAP_PERIODS = 4  # the same for slower cameras
 LOSSY_GAP_S = 0.25  # and for captures that lose frames all the time; a pick-up takes longer
+USUAL_MPS, USUAL_RADPS = 1.5, 12.0  # below which no step is a jump: four times a TurboPi's
 JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
 JUMP_SIGMA = 8  # times the noise of a camera that is worse than that
 JUMP_FACTOR = 3  # times as fast as just before or after: no wheels do that between two frames
@@ -34,14 +35,14 @@ def find_segments(
     Returns:
         (N,) number of the stretch; -1 where unusable.
     """
-    limits = _Limits.of(robot, usable, *usual)
+    limits = Limits.of(robot, usable, *usual)
     usable = usable & ~_excursions(robot, usable, limits, notes)
     turned = _turned_by_tracker(robot, usable, limits, notes)
     index, begins = _cuts(robot, usable, limits, notes, turned=turned)
     return _segments(robot, index, begins, notes)
 
 
-def _gap_s(robot: RobotLog) -> float:
+def longest_gap_s(robot: RobotLog) -> float:
     """Longest time between usable poses over which the track goes on."""
     spacing_s = np.diff(robot.pose_t_s[robot.valid])
     usual_s = max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
@@ -49,34 +50,47 @@ def _gap_s(robot: RobotLog) -> float:
 
 
 @dataclass(frozen=True)
-class _Limits:
+class Limits:
     """What a step of one robot's poses can be by noise alone, and by speeds it may have.
 
     Attributes:
         usual: m/s, rad/s.
+        fastest: m/s, rad/s that it has nowhere in its log.
         noise: m, rad.
     """
 
     usual: tuple[float, float]
+    fastest: tuple[float, float]
     noise: tuple[float, float]
 
     @classmethod
-    def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "_Limits":
+    def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "Limits":
         """With the noise that second differences of the poses show: motion is smooth beside it.
 
-        Stamps that jitter are noise as well: the way in the time that they are off.
+        Stamps that jitter are noise as well: the way in the time that they are off. Half turns of
+        the heading are none, be they many: a tag whose front flickers makes them.
         """
         pose = robot.pose[usable]
-        pose[:, 2] = np.unwrap(pose[:, 2])
-        late = JUMP_SIGMA * _jitter_s(robot.pose_t_s[usable]) * _fast(robot.pose_t_s[usable], pose)
+        pose[:, 2] = np.unwrap(pose[:, 2], period=np.pi)
+        fast = _fast(robot.pose_t_s[usable], pose)
+        late = JUMP_SIGMA * _jitter_s(robot.pose_t_s[usable]) * fast
         bend = np.abs(np.diff(np.nan_to_num(pose), n=2, axis=0))
         sigma = np.median(bend, axis=0) / 0.6745 / np.sqrt(6) if len(bend) else np.zeros(3)
+        mps, radps = np.maximum(usual, JUMP_FACTOR * fast)
         return cls(
             usual,
+            (float(mps), float(radps)),
             (
                 max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max()), float(late[0])),
                 max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2]), float(late[1])),
             ),
+        )
+
+    def far(self, dt_s: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """(K,) bool: a robot does not go so far, or turn so, in such times; step (K, 3)."""
+        moved_m, turn_rad = np.hypot(*step[:, :2].T), np.abs(np.nan_to_num(_short_way(step[:, 2])))
+        return (moved_m > self.fastest[0] * dt_s + self.noise[0]) | (
+            turn_rad > self.fastest[1] * dt_s + self.noise[1]
         )
 
     def possible(self, channel: int, speed: np.ndarray, dt_s: np.ndarray) -> np.ndarray:
@@ -109,7 +123,7 @@ def _beside(speed: np.ndarray) -> np.ndarray:
     return np.maximum(medians[: len(speed)], medians[BESIDE + 1 :])
 
 
-def _jumps(robot: RobotLog, index: np.ndarray, limits: _Limits) -> tuple[np.ndarray, np.ndarray]:
+def _jumps(robot: RobotLog, index: np.ndarray, limits: Limits) -> tuple[np.ndarray, np.ndarray]:
     """(len(index) - 1,) bool each: steps and turns between these poses that no robot makes."""
     dt_s = np.diff(robot.pose_t_s[index])
     step = np.diff(robot.pose[index, :2], axis=0)
@@ -129,22 +143,12 @@ def _short_way(angle_rad: np.ndarray) -> np.ndarray:
 
 
 def _excursions(
-    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
+    robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str]
 ) -> np.ndarray:
-    """(N,) bool: poses between a jump and the jump back, as when markers are mixed up."""
+    """(N,) bool: poses off the way that those around them go, as when markers are mixed up."""
     outlier = np.zeros(len(usable), bool)
     index = np.flatnonzero(usable)
-    jumps = np.flatnonzero(np.logical_or(*_jumps(robot, index, limits)))
-    position = 0
-    while position + 1 < len(jumps):
-        before, after = index[jumps[position]], index[jumps[position + 1] + 1]
-        ends = np.array([before, after])
-        back = robot.pose_t_s[after] - robot.pose_t_s[before] <= _gap_s(robot) and not np.any(
-            _jumps(robot, ends, limits)
-        )
-        if back:
-            outlier[before + 1 : after] = True
-        position += 2 if back else 1
+    outlier[np.setdiff1d(index, index[_longest_way(_links(robot, index, limits))])] = True
     if outlier.any():
         notes.append(
             f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
@@ -153,8 +157,59 @@ def _excursions(
     return outlier
 
 
+def _links(robot: RobotLog, index: np.ndarray, limits: Limits) -> list[np.ndarray]:
+    """Of each reach from 1 pose on to those within a gap: (K - reach,) bool, the way may go so.
+
+    Poses are left out between a jump away and one back alone: a step that lasts is none of these.
+    Over a gap in time a robot may go anywhere.
+    """
+    t_s, pose, links = robot.pose_t_s[index], robot.pose[index], []
+    gap_s = longest_gap_s(robot)
+    for reach in range(1, len(index)):
+        dt_s = t_s[reach:] - t_s[:-reach]
+        far, within = limits.far(dt_s, pose[reach:] - pose[:-reach]), dt_s <= gap_s
+        if links:
+            jumps = ~links[0]
+            links.append(within & ~far & jumps[: 1 - reach] & jumps[reach - 1 :])
+        else:
+            links.append(~(within & far))
+        if links[0].all() or not within.any():
+            break
+    return links
+
+
+def _longest_way(links: list[np.ndarray]) -> np.ndarray:
+    """Poses, by their number, of the way through most of them (Bellman 1957).
+
+    A step that no robot makes costs as much as all poses within a gap, so that as many are left
+    out to spare two of them.
+
+    Args:
+        links: as of `_links`.
+    """
+    count, cut = len(links[0]) + 1 if links else 0, len(links)
+    if not links or links[0].all():
+        return np.arange(count)
+    cost, before, near = list(range(count)), [-1] * count, [link.tolist() for link in links]
+    for k in range(1, count):
+        for reach in range(1, min(k, cut) + 1):
+            j = k - reach
+            linked = near[reach - 1][j]
+            if not linked and reach > 1:
+                continue
+            new = cost[j] + reach - 1 + (0 if linked else cut)
+            if new < cost[k] or before[k] < 0 and new <= cost[k]:
+                cost[k], before[k] = new, j
+    k = min(range(max(0, count - cut), count), key=lambda k: cost[k] + count - 1 - k)
+    way = []
+    while k >= 0:
+        way.append(k)
+        k = before[k]
+    return np.array(way[::-1])
+
+
 def _turned_by_tracker(
-    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str]
+    robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str]
 ) -> np.ndarray:
     """(N,) bool: poses between a turn that no robot makes and the next one, which undoes it.
 
@@ -183,7 +238,7 @@ def _turned_by_tracker(
 
 
 def _cuts(
-    robot: RobotLog, usable: np.ndarray, limits: _Limits, notes: list[str], *, turned: np.ndarray
+    robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str], *, turned: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Usable poses without the margins, and which of them begin a segment: (K,) int, (K,) bool.
 
@@ -193,7 +248,7 @@ def _cuts(
     t = robot.pose_t_s[index]
     moves, turns = _jumps(robot, index, limits)
     jump = moves | turns
-    gap = np.diff(t) > _gap_s(robot)
+    gap = np.diff(t) > longest_gap_s(robot)
     lost = gap & (np.diff(index) > 1)
     keep = np.ones(len(index), bool)
     for k in np.flatnonzero(jump | gap):

@@ -19,6 +19,7 @@ from twinmill.data.checks import (
     of_all_robots,
     own_option,
 )
+from twinmill.data.checks.bodies import give_back
 from twinmill.data.checks.lateness import Lateness
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
@@ -277,8 +278,9 @@ def clean_measurements(
             excluded.append(error)
             continue
         name, count = log.path.name, len(log.robots)
-        of_log: list[InputFinding] = []
-        for robot in log.robots.values():
+        robots, exchanged = give_back(log.robots, name)
+        of_log: list[InputFinding] = [*exchanged]
+        for robot in robots.values():
             own = own_option(robot.robot_id, count)
             wrong = check_commanded(robot, name) or check_poses(robot, name, own)
             of_log += wrong

@@ -24,7 +24,7 @@ COLUMNS = ("robot_id", *INPUTS, "run", "speed_mps", "turn_radps", "note")
 LIMITS = {"robot_id": (0, 99), "speed_input": (-100, 100), "turn_input": (-2, 2)}
 # Half a wheel's turn in a circle, and 3 degrees in a second, pass for "on the spot" and "straight".
 READ_AS_ZERO = (0.05, 0.05)  # m/s, rad/s
-READING = (0.005, 0.02)  # m/s, rad/s: finer no stopwatch tells
+READING = (0.005, 0.02)  # m/s, rad/s: of a single run by stopwatch; repeated ones tell their own
 STILL_MPS = 0.03  # rim speed below which a wheel is said to stand still
 POOLED = 3.0  # cells that the spread of all cells counts for in the spread of one
 
@@ -188,6 +188,7 @@ def _channel(cells: dict[Key, _Cell], k: int) -> tuple[dict[Key, tuple], Spread]
             by_input[inputs].append(value)
     pooled = Spread(_scatter(runs.values()), _scatter(by_input.values()))
     known = np.nan_to_num(pooled.runs), np.nan_to_num(pooled.robots)
+    reading = READING[k] if np.isnan(pooled.runs) else _digit(runs.values()) / np.sqrt(12)
     found = {}
     for key, value in middle.items():
         robots = np.array(by_input[key[1]])
@@ -196,10 +197,17 @@ def _channel(cells: dict[Key, _Cell], k: int) -> tuple[dict[Key, tuple], Spread]
             POOLED + max(len(relative) - 1, 0)
         )
         variance = between + known[0] ** 2 / max(len(runs[key]), 1)
-        floor = READ_AS_ZERO[k] if value == 0 else np.hypot(READING[k], abs(value) * variance**0.5)
+        floor = READ_AS_ZERO[k] if value == 0 else np.hypot(reading, abs(value) * variance**0.5)
         seen = float(relative.std(ddof=1)) if len(relative) else np.nan
         found[key] = (value, floor, seen)
     return found, pooled
+
+
+def _digit(groups: Iterable[list[float]]) -> float:
+    """Unit of the last digit to which values are written."""
+    values = np.concatenate([np.array(group, float) for group in groups])
+    digits = (10.0**-d for d in range(7))
+    return next((d for d in digits if np.allclose(values / d, np.round(values / d))), 1e-6)
 
 
 def _scatter(groups: Iterable[list[float]]) -> float:

@@ -20,6 +20,7 @@ GRID_S, COARSE_S = 0.02, 0.1
 RATES = np.arange(0.8, 1.25, 0.01)  # seconds of capture in one of the log
 OFFSETS_S = 0.25  # step of the coarse search
 OWN_OFFSETS_S = np.arange(-0.3, 0.31, 0.02)  # of a log whose stamps are times
+FAR_OFFSETS_S = np.arange(-12.0, 12.1, OFFSETS_S)  # and of one that was begun at another time
 PARTS = 60  # of a log, between which its offset may change
 LEVER_M = 0.1  # weighs turning (rad/s) against moving (m/s), as in clock.py
 CREEP_MPS = 0.005
@@ -67,7 +68,9 @@ def find_time_base(robot: RobotLog) -> TimeBase | None:
     problem, coarse = _Regression(robot, GRID_S), _Regression(robot, COARSE_S)
     if not problem.moves:
         return None
-    own = min(problem.loss((offset_s, 1.0, 1.0)) for offset_s in OWN_OFFSETS_S)
+    far_s = min(FAR_OFFSETS_S, key=lambda offset_s: coarse.loss((offset_s, 1.0, 1.0)))
+    own_s = np.concatenate([OWN_OFFSETS_S, far_s + OWN_OFFSETS_S])
+    own = min(problem.loss((offset_s, 1.0, 1.0)) for offset_s in own_s)
     reach_s = coarse.reach_s()
     _, offset_s, rate = min(
         (coarse.loss((offset_s, rate, rate)), offset_s, rate)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import twinmill_native as native
 
-from twinmill.data.cuts import find_segments
+from twinmill.data.cuts import USUAL_MPS, USUAL_RADPS, find_segments
 from twinmill.data.log import CommandKind, LogError, RobotLog
 from twinmill.data.lost_commands import lost_commands, words
 
@@ -95,7 +95,9 @@ class Track:
         return self.pose[:, 2] if self.has_heading else np.zeros(len(self.pose))
 
 
-def make_track(robot: RobotLog, usual_mps: float = 1.5, usual_radps: float = 12.0) -> Track:
+def make_track(
+    robot: RobotLog, usual_mps: float = USUAL_MPS, usual_radps: float = USUAL_RADPS
+) -> Track:
     """Cleans one robot's series.
 
     Args:

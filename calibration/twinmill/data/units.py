@@ -15,6 +15,7 @@ UNITS = {  # unit in a name: that of ours, and the factor
     "cmps": ("mps", 1e-2),
     "degps": ("radps", math.pi / 180),
     "rpm": ("radps", math.pi / 30),
+    "rps": ("radps", 2 * math.pi),
     "ms": ("s", 1e-3),
     "us": ("s", 1e-6),
     "ns": ("s", 1e-9),

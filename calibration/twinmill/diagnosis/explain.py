@@ -249,6 +249,7 @@ def _made(
         left_over=_left_over(diagnosis, kept),
         robots={} if own.as_given else _own_values(diagnosis, fit),
         covariance=_with_middles(covariance.of([e.name for e in others]), middle),
+        shares={f.effect: f.share for f in diagnosis.findings},
     )
     child = child_of(model_file, told, Path(out), command)
     after = comparison(child, [o.aligned(child.model) for o in diagnosis.opened])

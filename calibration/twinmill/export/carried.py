@@ -138,13 +138,16 @@ class RobotModel:
     def share_of(self, instance: str) -> tuple[float | None, tuple[str, ...]]:
         """Of the squared error, and the effects that it counts too.
 
-        As a diagnosis told, or from the scores before and after, which a model file keeps of
-        effects that were added at the same time.
+        As a diagnosis told, or as a model file keeps it; else from the scores before and after, of
+        effects that were added at the same time and of the base's refit together.
         """
         if instance in self.shares:
             return self.shares[instance], ()
         tables = tomlkit.parse(self.file.text).get("effect", [])
         names = effect_names(self.model)
+        own = tables[names.index(instance)]
+        if "share" in own:
+            return float(own["share"]), ()
         scores = [(t.get("error_before"), t.get("error_after")) for t in tables]
         before, after = scores[names.index(instance)]
         if not before or after is None:

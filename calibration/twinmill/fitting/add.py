@@ -227,6 +227,7 @@ def add(
             base_told=bool(told),
             robots={} if robot_id is None else {robot_id: own},
             covariance=found.shared_covariance(),
+            shares={name: _takes(*held)},
         ),
         out,
         command,
@@ -241,6 +242,11 @@ def add(
             judged(opened), unsteady_clocks(found), lag_is_kept(judged(opened), told)
         ),
     )
+
+
+def _takes(given: HeldOut, without: HeldOut, found: HeldOut) -> float:
+    """Share of the squared held-out error that is an effect's, not the refit's beside it."""
+    return max(0.0, without.score**2 - found.score**2) / max(given.score**2, 1e-12)
 
 
 def _check_told(effect: str, opened: Sequence[Opened], told: Collection[str]) -> None:
@@ -287,7 +293,8 @@ def _add_to_camera(
     fitted_model = with_estimates(richer, found.estimates)
     before, after = (compare_detections(cameras, m) for m in (model, fitted_model))
     logs = {m.log_name: m.log_sha256 for m in measurements}
-    child = Fitted(fitted_model, found.estimates, logs, before.score, after.score)
+    shares = {effect: _takes(*heldout)}
+    child = Fitted(fitted_model, found.estimates, logs, before.score, after.score, shares=shares)
     write_child(model_file, child, out, command, force=force)
     name = model_file.path.name
     blocks_t = found.against(without)[2]

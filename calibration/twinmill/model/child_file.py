@@ -2,6 +2,7 @@
 """Model files written anew with what was fitted; the rest of the text stays as it is."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -43,6 +44,8 @@ class Fitted:
         left_over: what a diagnosis found that no effect explains; None if there was none.
         robots: what is a robot's own, by its number.
         covariance: of the estimates; None where the fit has none.
+        shares: of the squared error that each new effect takes away, by its name in the model; a
+            refit of the base has its own.
     """
 
     model: native.Model
@@ -56,6 +59,7 @@ class Fitted:
     left_over: dict[str, float] | None = None
     robots: dict[int, list[ParameterEstimate]] = field(default_factory=dict)
     covariance: Covariance | None = None
+    shares: Mapping[str, float] = field(default_factory=dict)
 
 
 def write_child(
@@ -176,6 +180,8 @@ def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
         if i >= len(old):
             table["error_before"] = _short(fitted.score_before)
             table["error_after"] = _short(fitted.score_after)
+            if instance in fitted.shares:
+                table["share"] = _short(fitted.shares[instance])
         tables.append(table)
     if len(tables):
         document["effect"] = tables

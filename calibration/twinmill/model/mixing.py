@@ -25,10 +25,17 @@ def duties_from_vendor_move(speed: float, direction_deg: float, turn: float) -> 
 
     Its rounding is kept: (50, 270, 0) gives (-50, -49, -49, -50).
     """
+    return tuple(_duty(value) for value in asked_by_vendor_move(speed, direction_deg, turn))
+
+
+def asked_by_vendor_move(
+    speed: float, direction_deg: float, turn: float
+) -> tuple[float, float, float, float]:
+    """Duties that such a move asks for, neither rounded nor cut at full duty."""
     vx = speed * math.cos(math.radians(direction_deg))
     vy = speed * math.sin(math.radians(direction_deg))
     vp = -turn * TURN_LEVER_PCT
-    return (_duty(vy + vx - vp), _duty(vy - vx + vp), _duty(vy - vx - vp), _duty(vy + vx + vp))
+    return vy + vx - vp, vy - vx + vp, vy - vx - vp, vy + vx + vp
 
 
 def _duty(value: float) -> int:

@@ -8,13 +8,15 @@ import twinmill_native as native
 
 from twinmill.data.log import LogError
 from twinmill.data.steady_table import STILL_MPS, SteadyTable
-from twinmill.model.mixing import duties_from_vendor_move
+from twinmill.model.mixing import asked_by_vendor_move
 from twinmill.model.parameters import MOTION_STAGES
 from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
 
-TYPING_ERROR = 10.0  # times the floor: beyond it, more likely the table is wrong than the model
+# Times the floor: beyond it the table may be wrong as well as the model. Such an error counts by its
+# logarithm, so that a single one decides little, and many still lead a fit to where they are less.
+TYPING_ERROR = 10.0
 
 
 @dataclass
@@ -92,20 +94,23 @@ class SteadyStates:
         return self._measured() - self.predicted()
 
     def ratios(self) -> np.ndarray:
-        """(U, 3) errors over their floor, for scores: those that no model makes are cut.
+        """(U, 3) errors over their floor, for scores: large ones count by their logarithm.
 
         What was only seen to be zero, and is predicted so, was not measured: NaN.
         """
-        return self._cut(self.errors() / self.floor())
+        return self._robust(self.errors() / self.floor())
 
-    def _cut(self, ratios: np.ndarray) -> np.ndarray:
-        agreed = (self._measured() == 0) & (np.abs(ratios) < 1)
-        return np.where(agreed, np.nan, np.clip(ratios, -TYPING_ERROR, TYPING_ERROR))
+    def _robust(self, ratios: np.ndarray) -> np.ndarray:
+        size = np.abs(ratios)
+        agreed = (self._measured() == 0) & (size < 1)
+        beyond = np.log(np.maximum(size / TYPING_ERROR, 1))
+        robust = np.minimum(size, TYPING_ERROR) + TYPING_ERROR * beyond
+        return np.where(agreed, np.nan, np.copysign(robust, ratios))
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
         """(B, R) errors over floor for B rows of values; squares add up to the score's."""
         predicted = self._predicted(model, names, np.ascontiguousarray(values))
-        ratios = self._cut((self._measured() - predicted) / self.floor())
+        ratios = self._robust((self._measured() - predicted) / self.floor())
         return np.nan_to_num(ratios).reshape(len(values), -1) * np.sqrt(self.judged)
 
     def rows_by_part(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
@@ -155,9 +160,10 @@ def _direction(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _commands(sheet: SteadyTable, model: native.Model) -> np.ndarray:
-    """(U, 4) commands in the unit of the model's drive."""
+    """(U, 4) commands in the unit of the model's drive; whose program rounds them no table says."""
     if model.drive == "duty":
-        return np.array([duties_from_vendor_move(*row) for row in sheet.inputs]) / 100.0
+        asked = np.array([asked_by_vendor_move(*row) for row in sheet.inputs])
+        return np.clip(asked / 100.0, -1, 1)
     if model.drive == "twist":
         forward, left = _direction(sheet.inputs)
         speed = np.abs(sheet.inputs[:, 0]) * model.get("base.speed_per_input_mps")

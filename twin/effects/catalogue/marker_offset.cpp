@@ -23,9 +23,9 @@ constexpr Card kCard = {
 };
 
 constexpr ParameterSpec kParameters[] = {
-    {"x_m", "m", 0, 0.01, -0.5, 0.5, "marker ahead of the robot's centre",
+    {"x_m", "m", 0, 0.01, -3, 3, "marker ahead of the robot's centre",
      "tracked point ahead of the centre", "tracked point behind the centre", 0.03},
-    {"y_m", "m", 0, 0.01, -0.5, 0.5, "marker left of the robot's centre",
+    {"y_m", "m", 0, 0.01, -3, 3, "marker left of the robot's centre",
      "tracked point left of the centre", "tracked point right of the centre", 0.03},
 };
 

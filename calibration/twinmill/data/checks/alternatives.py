@@ -98,6 +98,16 @@ def pose_alternatives() -> list[Alternative]:
     ]
 
 
+def by_pose(
+    alternatives: list[Alternative],
+) -> list[tuple[tuple[int, bool, bool], list[Alternative]]]:
+    """Those that make the same of the poses: sign of headings, mirrored, turned; and they."""
+    groups: dict[tuple[int, bool, bool], list[Alternative]] = {}
+    for a in alternatives:
+        groups.setdefault((a.heading_sign, a.mirrored, a.turned), []).append(a)
+    return list(groups.items())
+
+
 @dataclass(frozen=True)
 class Explained:
     """How well one alternative explains the motion.
@@ -106,7 +116,8 @@ class Explained:
         left: share of the squared motion that it leaves, on stretches not fitted to.
         by_block: (B,) the same summed by stretch, over the whole motion.
         turned_rad: heading offset that went with it.
-        gain: (3,) measured over predicted speed, by channel; 0 where next to none is predicted.
+        gain: (2,) measured over predicted speed, of driving (on both axes together, as a unit scales
+            both) and of turning; 0 where next to none is predicted.
         lag_s, late_s: at which it was found.
     """
 
@@ -120,17 +131,25 @@ class Explained:
 
 
 def far_better(best: Explained, own: Explained) -> bool:
-    """Whether an alternative explains so much more that it is no matter of physics.
-
-    Where it leaves next to nothing, its gain by stretch differs only as the motion does: a robot
-    that turns in a few stretches gains there alone by a sign of the turn.
-    """
+    """Whether an alternative explains so much more that it is no matter of physics."""
     if best.left > CHECKS.far_better * own.left or own.left - best.left < CHECKS.good:
         return False
-    gained = own.by_block - best.by_block
-    clear = best.left < min(CHECKS.good, CHECKS.clear * own.left)
-    sure = CHECKS.clear_sure if clear else CHECKS.sure
-    return gained.sum() > sure * gained.std() * np.sqrt(len(gained))
+    return surely_better(best, own)
+
+
+def surely_better(best: Explained, own: Explained) -> bool:
+    """Whether it is sure that one leaves less than another of the same motion.
+
+    By the standard error, over stretches, of the ratio of what both leave (Cochran 1977, Sampling
+    Techniques, 6.4): that some stretches hold much motion and others none does not widen it.
+    """
+    apart = best.by_block - best.left / max(own.left, 1e-12) * own.by_block
+    return own.left - best.left > CHECKS.sure * np.sqrt(np.sum(apart**2))
+
+
+def alike_left(left: list[float]) -> float:
+    """Share up to which what an explanation leaves is as little as the least."""
+    return CHECKS.alike * min(left) + CHECKS.alike_left
 
 
 @dataclass(frozen=True)
@@ -204,7 +223,7 @@ class Search:
 
         They do not depend on the order or the signs of the columns, nor on a constant angle.
         """
-        speeds = [self._speeds(self.motion.body_mps(*signs), signs[0]) for signs in POSE_SIGNS]
+        speeds = [self.speeds(self.motion.body_mps(*signs), signs[0]) for signs in POSE_SIGNS]
         beside = np.hstack(speeds)  # (K, 3 of each)
         explained: list[dict] = [{} for _ in POSE_SIGNS]
         for lag_s, (begin_s, shapes) in self.felt.items():
@@ -263,12 +282,12 @@ class Search:
     def _summed(self, lag_s: float, lates_s: np.ndarray, rate: float = 0.0) -> np.ndarray:
         """(2, S, B, SHAPES, 3) the same at other shifts, and at a rate of the clocks."""
         motion, (begin_s, shapes) = self.motion, self.felt[lag_s]
-        told = shapes @ self._weighted(self.wheels).T
+        told = shapes @ self.weighted(self.wheels).T
         sums = native.sums_by_shift(
             told.reshape(len(told), -1),
             motion.places(begin_s, rate=rate),
             lates_s / GRID_S,
-            self._speeds(motion.body_mps(), 1),
+            self.speeds(motion.body_mps(), 1),
             self.starts,
         )
         return sums.reshape(*sums.shape[:3], *told.shape[1:])
@@ -276,13 +295,13 @@ class Search:
     @cached_property
     def _total(self) -> np.ndarray:
         """(B,) measured squares, summed over stretches."""
-        return self._sums(np.sum(self._speeds(self.motion.body_mps(), 1) ** 2, axis=1))
+        return self._sums(np.sum(self.speeds(self.motion.body_mps(), 1) ** 2, axis=1))
 
     def beside(self, own: Explained) -> tuple[np.ndarray, np.ndarray]:
         """(K, 3) measured and (K, SHAPES, 3) told velocities, of the columns as they are."""
         begin_s, shapes = self.felt[own.lag_s]
-        told = begin_s, shapes @ self._weighted(self.wheels).T
-        return self._speeds(self.motion.body_mps(), 1), self.motion.at(told, own.late_s)
+        told = begin_s, shapes @ self.weighted(self.wheels).T
+        return self.speeds(self.motion.body_mps(), 1), self.motion.at(told, own.late_s)
 
     def jump(self, own: Explained, fewest: int) -> Jump:
         """The two shifts that explain most, with a jump between two stretches.
@@ -329,18 +348,36 @@ class Search:
             variance += (len(without) - 1) * float(np.var(without))  # Efron and Stein 1981
         return float(np.sqrt(variance))
 
-    def best(self, alternatives: list[Alternative]) -> list[Explained]:
-        """Each at the lag and the shift where it explains most, of those that are likely."""
+    def best(
+        self, alternatives: list[Alternative], keys: list[tuple[float, float]] | None = None
+    ) -> list[Explained]:
+        """Each at the lag and the shift where it explains most, of some; else of the likely ones."""
         found: list[Explained] = []
-        by_pose: dict[tuple, list[Alternative]] = {}
-        for a in alternatives:
-            by_pose.setdefault((a.heading_sign, a.mirrored, a.turned), []).append(a)
-        for (sign, mirrored, turned), group in by_pose.items():
-            keys = self._likely[sign, mirrored]
+        for (sign, mirrored, turned), group in by_pose(alternatives):
             found += self._best_of(
-                group, sign=sign, mirrored=mirrored, turned=turned, keys=[*keys, *self._own_key]
+                group,
+                sign=sign,
+                mirrored=mirrored,
+                turned=turned,
+                keys=keys or self.keys(sign, mirrored),
             )
         return found
+
+    def without(self, e: Explained, lates_s: np.ndarray) -> "Search":
+        """At other shifts, had the mistake that `e` tells of been put right."""
+        a, (mixing,) = e.alternative, self.mixing([e.alternative])
+        motion = self.motion.mended(a.heading_sign, a.mirrored, e.turned_rad)
+        return Search(motion, mixing, self.felt, lates_s)
+
+    def keys(self, sign: int, mirrored: bool) -> list[tuple[float, float]]:
+        """Lags and shifts that are tried where the poses have such signs."""
+        return [*self._likely[sign, mirrored], *self._own_key]
+
+    def mixing(self, group: list[Alternative]) -> np.ndarray:
+        """(A, 3, 4): velocity by column under each alternative."""
+        return np.stack(
+            [self.wheels[:, _inverse(a.place)] * np.array(a.sign)[_inverse(a.place)] for a in group]
+        )
 
     def at_rate(self, own: Explained, rate: float, near_s: np.ndarray = NEAR_S) -> Explained:
         """The columns as they are, with clocks that run apart by `rate` (seconds per second).
@@ -377,17 +414,14 @@ class Search:
         keys: list[tuple[float, float]],
     ) -> list[Explained]:
         body = self.motion.body_mps(sign, mirrored)
-        # (A, 3, 4): velocity by column under each alternative.
-        mixing = np.stack(
-            [self.wheels[:, _inverse(a.place)] * np.array(a.sign)[_inverse(a.place)] for a in group]
-        )
+        mixing = self.mixing(group)
         least = np.full(len(group), np.inf)
         places: list = [None] * len(group)
         for key in keys:
             rows = self.motion.at(self.felt[key[0]], key[1])
             gram = self._by_block(rows, rows)
             angle = self._angle(rows, body) if turned else 0.0
-            speeds = self._speeds(body * np.exp(-1j * angle), sign)
+            speeds = self.speeds(body * np.exp(-1j * angle), sign)
             moment = self._by_block(rows, speeds)
             total = self._sums(np.sum(speeds**2, axis=1))
             left, gain = self._left(mixing, gram, moment, total)
@@ -397,7 +431,7 @@ class Search:
                 places[i] = (left[i], angle, gain[i], *key)
         return [Explained(a, float(least[i]), *places[i]) for i, a in enumerate(group) if places[i]]
 
-    def _speeds(self, body: np.ndarray, sign: int) -> np.ndarray:
+    def speeds(self, body: np.ndarray, sign: int) -> np.ndarray:
         """(K, 3) forward, left, lever_m * turn."""
         return np.column_stack([body.real, body.imag, self.lever_m * sign * self.motion.turn_radps])
 
@@ -406,15 +440,15 @@ class Search:
         told = rows[:, 1] @ self.wheels[:2].T
         return float(np.angle(np.sum(body * np.conj(told[:, 0] + 1j * told[:, 1]))))
 
-    def _weighted(self, mixing: np.ndarray) -> np.ndarray:
+    def weighted(self, mixing: np.ndarray) -> np.ndarray:
         """(..., 3, 4) with the turn as fast as the wheels that make it."""
         return mixing * np.array([1, 1, self.lever_m])[:, None]
 
     def _left(
         self, mixing: np.ndarray, gram: np.ndarray, moment: np.ndarray, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(A, B) share left by stretch; (A, 3) gains; of (B, SHAPES, 4, 4 or 3) sums."""
-        weighted = self._weighted(mixing)
+        """(A, B) share left by stretch; (A, 2) gains; of (B, SHAPES, 4, 4 or 3) sums."""
+        weighted = self.weighted(mixing)
         power = np.einsum("aci,bsij,acj->absc", weighted, gram, weighted, optimize=True)
         along = np.einsum("aci,bsic->absc", weighted, moment, optimize=True)
         return self._judged(power, along, total)
@@ -422,7 +456,7 @@ class Search:
     def _judged(
         self, power: np.ndarray, along: np.ndarray, total: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(A, B) share left by stretch, judged by fits to the other half; (A, 3) gains.
+        """(A, B) share left by stretch, judged by fits to the other half; (A, 2) gains.
 
         Args: power, along (A, B, SHAPES, 3): told times itself and times measured. total (B,).
         """
@@ -436,9 +470,14 @@ class Search:
             p, m = (sums[:, half::2][each, :, shape, channel] for sums in (power, along))
             left[:, half::2] = (best**2 * p - 2 * best * m).sum(axis=1)
         left = (left + total) / max(total.sum(), 1e-12)
-        linear_p, linear_m = power[:, :, 1].sum(axis=1), along[:, :, 1].sum(axis=1)
+        linear_p, linear_m = (_lengths_and_turn(s[:, :, 1].sum(axis=1)) for s in (power, along))
         moves = linear_p > NEGLIGIBLE * linear_p.max(axis=1, keepdims=True)
         return left, np.where(moves, linear_m / np.maximum(linear_p, 1e-12), 0.0)
+
+
+def _lengths_and_turn(sums: np.ndarray) -> np.ndarray:
+    """(A, 2) of (A, 3) sums: forward and left together, and turning."""
+    return np.column_stack([sums[:, 0] + sums[:, 1], sums[:, 2]])
 
 
 def _left_by_first(

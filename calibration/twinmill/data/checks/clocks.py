@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from twinmill.data.checks.alternatives import Explained, Jump, Search, far_better
+from twinmill.data.checks.alternatives import Explained, Jump, Search, far_better, surely_better
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.lateness import Lateness, lateness_of
 from twinmill.data.checks.motion import BLOCK_S
@@ -57,13 +57,30 @@ def shift_s(search: Search, coarse_s: float) -> float:
         search: of the motion, the columns as they are right.
         coarse_s: the shift, to some tenths of a second.
     """
-    near_s, logs, found = coarse_s + ABOUT_S, np.log(ANY_LAG_S), []
-    for lag_s in ANY_LAG_S:
-        felt = {lag_s: search.motion.felt(lag_s)}
-        found.append(Search(search.motion, search.wheels, felt, near_s).best_shift(lag_s))
-    shifts_s, left = np.array(found).T
+    near_s, logs = coarse_s + ABOUT_S, np.log(ANY_LAG_S)
+    shifts_s, left = np.array([s.best_shift(lag_s) for lag_s, s in _by_lag(search, near_s)]).T
     found_s = float(np.interp(place_of_least(logs, left), logs, shifts_s))
     return found_s - search.motion.ahead_s
+
+
+def _by_lag(search: Search, lates_s: np.ndarray) -> list[tuple[float, Search]]:
+    """The same search at other shifts, of each lag alone."""
+    motion, wheels = search.motion, search.wheels
+    return [
+        (lag_s, Search(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)) for lag_s in ANY_LAG_S
+    ]
+
+
+def _is_shifted(search: Search, late_s: float) -> bool:
+    """Whether a lag alone, of any length, surely explains less than one with about that shift.
+
+    In a smooth drive a longer lag and poses that come sooner look alike.
+    """
+    at_s = np.array([0.0, late_s]) + search.motion.ahead_s
+    alone, shifted = (
+        min((s.own() for _, s in _by_lag(search, at_s[[k]])), key=lambda e: e.left) for k in (0, 1)
+    )
+    return surely_better(shifted, alone)
 
 
 def _refined(search: Search, own: Explained, jump: Jump) -> Jump:
@@ -149,9 +166,12 @@ def check_one_clock(
     if not (track.same_clock and track.has_heading) or own.left > CHECKS.drift_left:
         return []
     late_s = shift_s(search, own.late_s)
-    least_s = CHECKS.one_clock_s + track.timing.pose_period_s / 2
+    if abs(late_s) < CHECKS.one_clock_s + track.timing.pose_period_s / 2:
+        return []
+    if not _is_shifted(search, late_s):
+        return []
     without = "import anew without --same-clock"
-    if late_s < -least_s:
+    if late_s < 0:
         told = checked.finding(
             f"the poses come {-late_s:.2f} s before the commands that they follow, so that one "
             "clock did not stamp both, as it is declared (--same-clock)",
@@ -161,7 +181,7 @@ def check_one_clock(
             fatal=False,
         )
         return [replace(told, two_clocks=True)]
-    if not delays or late_s < least_s:
+    if not delays:
         return []
     return [
         checked.finding(

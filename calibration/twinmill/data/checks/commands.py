@@ -7,12 +7,16 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.checks.alternatives import (
+    OWN,
+    Alternative,
     Explained,
     Search,
+    alike_left,
     far_better,
     pose_alternatives,
     wheel_alternatives,
 )
+from twinmill.data.checks.axle import at_axle
 from twinmill.data.checks.clocks import FAR_S, shift_s, stepped
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.foreign import foreign_stretches
@@ -25,13 +29,23 @@ from twinmill.data.track import Track
 
 OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
 DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
-UNITS = (  # measured over commanded speed, what it says, and columns under their right names
-    (
-        (300.0, 3000.0),
-        "the positions are in millimetres",
-        {"x_m": "x_mm", "y_m": "y_mm"},
-    ),
+POSES_IN = (  # measured over commanded speed, what it says, and columns under their right names
+    ((300.0, 3000.0), "the positions are in millimetres", {"x_m": "x_mm", "y_m": "y_mm"}),
     ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
+)
+SMALL_POSES_IN = (
+    (
+        (1 / 300, 1 / 30),
+        "the positions are 100 times too small, as if metres were taken for centimetres",
+        {"x_cm": "x_m", "y_cm": "y_m"},
+    ),
+    (
+        (1 / 3000, 1 / 300),
+        "the positions are 1000 times too small, as if metres were taken for millimetres",
+        {"x_mm": "x_m", "y_mm": "y_m"},
+    ),
+)
+SPEEDS_IN = (
     (
         (1 / 3000, 1 / 300),
         "the commanded speeds are in millimetres per second",
@@ -45,8 +59,9 @@ UNITS = (  # measured over commanded speed, what it says, and columns under thei
 )
 # As above; but a gain of ten may be the robot's own, where shares of its speed are told.
 TENFOLD = ((7.0, 14.0), (1 / 14, 1 / 7))
-TURN_UNITS = (
-    ((25.0, 130.0), "the headings are in degrees", {"theta_rad": "theta_deg"}),
+GAINS = (0.05, 5.0)  # bounds of base.forward_gain: what is beyond them no fit makes good
+HEADINGS_IN = (((25.0, 130.0), "the headings are in degrees", {"theta_rad": "theta_deg"}),)
+TURNS_IN = (
     (
         (1 / 130, 1 / 25),
         "the commanded turns are in degrees per second",
@@ -115,15 +130,23 @@ def check_commands(
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
     if speed_mps < CHECKS.least_mps and np.abs(motion.turn_radps).max() < CHECKS.least_radps:
         return [], search, own
+    if own.left >= CHECKS.good:
+        search = at_axle(search, [OWN, *_alternatives(checked)])
+        own = search.own()
     if own.left < CHECKS.good:
         return _units(checked, own), search, own
     return _mistakes(checked, search, own), search, own
 
 
+def _alternatives(checked: CheckedTrack) -> list[Alternative]:
+    """Mistakes of signs, columns and axes that can be told in one robot's log."""
+    poses = pose_alternatives() if checked.track.has_heading else []
+    return wheel_alternatives(columns_in_use(checked.body)) + poses
+
+
 def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
     track = checked.track
-    poses = pose_alternatives() if track.has_heading else []
-    found = search.best(wheel_alternatives(columns_in_use(checked.body)) + poses)
+    found = search.best(_alternatives(checked))
     found = [e for e in found if not _is_bias(e)]
     best = min(found, key=lambda e: e.left)
     for mistake in (_in_room, _shifted, stepped):
@@ -133,7 +156,7 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
         if min(own.left, best.left) > CHECKS.unrelated:
             return [_unrelated(checked, min(own.left, best.left))]
         return _units(checked, own) if own.left < CHECKS.explained else []
-    alike = [e for e in found if e.left < CHECKS.alike * best.left + CHECKS.alike_left]
+    alike = [e for e in found if e.left < alike_left([best.left])]
     alike.sort(key=lambda e: (e.alternative.steps, e.left))
     most = alike[0].alternative.steps + CHECKS.steps
     simplest = [e for e in alike if e.alternative.steps < most][:3]
@@ -161,7 +184,7 @@ def _in_room(
     if checked.track.command_kind != "twist" or not checked.track.has_heading:
         return None
     room = Search(search.motion.told_in_room(), search.wheels).own()
-    if room.left > CHECKS.alike * best.left + CHECKS.alike_left or not far_better(room, own):
+    if room.left > alike_left([best.left]) or not far_better(room, own):
         return None
     return checked.finding(
         "the velocities are along the room's axes, not the body's",
@@ -185,18 +208,30 @@ def _shifted(
     at_end = own.late_s in (search.lates_s[0], search.lates_s[-1])
     if own.left < CHECKS.poor and not at_end:
         return None
-    far = Search(search.motion, search.wheels, search.felt, FAR_S).own()
-    if far.left > CHECKS.alike * best.left + CHECKS.alike_left or not far_better(far, own):
+    every = [OWN, *_alternatives(checked)]
+    far = at_axle(Search(search.motion, search.wheels, search.felt, FAR_S), every)
+    found = far.best(every)
+    alike = alike_left([e.left for e in found])
+    simplest = min(
+        (e for e in found if e.left < alike), key=lambda e: (e.alternative.steps, e.left)
+    )
+    if search.lates_s[0] < simplest.late_s < search.lates_s[-1] or _is_bias(simplest):
         return None
-    late_s = shift_s(search, far.late_s)
+    if simplest.left > alike_left([best.left]) or not far_better(simplest, own):
+        return None
+    late_s = shift_s(far.without(simplest, far.lates_s), simplest.late_s)
     late = "late" if late_s > 0 else "early"
+    what, options = described(
+        simplest.alternative, checked.track.command_kind, simplest.turned_rad, checked.own
+    )
     return checked.finding(
-        f"the poses come {abs(late_s):.2f} s {late} against the commands",
+        f"the poses come {abs(late_s):.2f} s {late} against the commands"
+        + (f", and {what}" if what else ""),
         f"the commands explain {max(1 - own.left, 0.0):.0%} of the motion as it is stamped, and "
-        f"{1 - far.left:.0%} with that shift",
+        f"{1 - simplest.left:.0%} with that shift" + (" and without that mistake" if what else ""),
         "stamp both with one clock, or import anew with "
-        f"{checked.option('--pose-shift-s')}{-late_s:.3f}; a constant delay of the robot is in "
-        "that shift",
+        f"{checked.option('--pose-shift-s')}{-late_s:.3f}{f' {options}' if options else ''}; a "
+        "constant delay of the robot is in that shift",
     )
 
 
@@ -244,31 +279,48 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     """Speeds that are off by what a unit makes, where the commands explain the motion well."""
     if e.left > CHECKS.explained:
         return []
-    speed = float(e.gain[:2].max())
-    turn = float(e.gain[2]) if checked.track.has_heading else 0.0
-    kind = checked.track.command_kind
-    tried = [(speed, unit) for unit in UNITS[: len(UNITS) if kind == "twist" else 2]]
-    tried += [(turn, unit) for unit in TURN_UNITS[: 2 if kind == "twist" else 1]]
-    (low, high), *_ = TURN_UNITS[0]
-    if low < turn < high:  # speeds along axes of a wrong heading tell nothing
-        speed, tried = 0.0, [(turn, TURN_UNITS[0])]
-    told = [
+    speed, turn = (float(gain) for gain in e.gain)
+    turn = turn if checked.track.has_heading else 0.0
+    (window, what, names), *_ = HEADINGS_IN
+    if window[0] < turn < window[1]:  # speeds along axes of a wrong heading tell nothing
+        return [checked.finding(what, _pace(turn), _anew_with(names, checked))]
+    found = [
         checked.finding(what, _pace(ratio), _anew_with(names, checked))
-        for ratio, ((low, high), what, names) in tried
+        for ratio, units in _ratios(checked.track.command_kind, speed, turn)
+        for (low, high), what, names in units
         if low < ratio < high
     ]
-    if kind == "wheel_speed" and (words := factor_words(speed)):
-        told.append(checked.finding(words[0], _pace(speed), words[1]))
-    if kind == "twist" and any(low < speed < high for low, high in TENFOLD):
-        told.append(
-            checked.finding(
-                "lengths are off by ten, as if of mm and cm one was taken for the other",
-                _pace(speed),
-                "correct the units or the factors of positions and speeds, and import anew",
-                fatal=False,
-            )
+    wheels = turn or speed  # poses of another unit change the drive alone
+    if checked.track.command_kind == "wheel_speed" and (words := factor_words(wheels)):
+        found.append(checked.finding(words[0], _pace(wheels), words[1]))
+    return found or _no_gain(checked, speed)
+
+
+def _ratios(kind: CommandKind, speed: float, turn: float) -> list[tuple[float, tuple]]:
+    """Measured over commanded, with the units that may make it so.
+
+    Wheels that are told too much drive and turn too much; of positions only the drive is off.
+    """
+    if kind == "twist":
+        return [(speed, POSES_IN), (speed, SPEEDS_IN), (turn, TURNS_IN)]
+    drive = speed / turn if turn else speed
+    return [(drive, POSES_IN), (drive, SMALL_POSES_IN)]
+
+
+def _no_gain(checked: CheckedTrack, speed: float) -> list[InputFinding]:
+    """A factor between commands and motion that no unit explains, and no number of a model."""
+    tenfold = checked.track.command_kind == "twist" and any(a < speed < b for a, b in TENFOLD)
+    if not speed or not (tenfold or not GAINS[0] < speed < GAINS[1]):
+        return []
+    as_if = "ten, as if of mm and cm one was taken for the other" if tenfold else "a large factor"
+    return [
+        checked.finding(
+            f"lengths are off by {as_if}",
+            _pace(speed),
+            "correct the units or the factors of positions and speeds, and import anew",
+            fatal=False,
         )
-    return told
+    ]
 
 
 def _anew_with(names: dict[str, str], checked: CheckedTrack) -> str:

@@ -90,6 +90,25 @@ class Motion:
         world = np.conj(self.world_mps) if mirrored else self.world_mps
         return world * np.exp(-1j * heading_sign * self.heading_rad)
 
+    def mended(self, heading_sign: int, mirrored: bool, turned_rad: float) -> "Motion":
+        """The same with other poses, as in `body_mps`, the front to the left by `turned_rad`."""
+        return replace(
+            self,
+            world_mps=np.conj(self.world_mps) if mirrored else self.world_mps,
+            heading_rad=heading_sign * self.heading_rad + turned_rad,
+            turn_radps=heading_sign * self.turn_radps,
+        )
+
+    def at_axle(self, led_m: complex, heading_sign: int = 1, mirrored: bool = False) -> "Motion":
+        """The same of the point that the robot turns about.
+
+        Args:
+            led_m: how a turn to the left leads the tracked point: ahead + i left, m per rad.
+            heading_sign, mirrored: as in `body_mps`, in whose axes that is told.
+        """
+        led = led_m * self.turn_radps * np.exp(1j * heading_sign * self.heading_rad)
+        return replace(self, world_mps=self.world_mps - (np.conj(led) if mirrored else led))
+
     def told_in_room(self) -> "Motion":
         """The same, if the first two columns were velocities along the room's axes."""
         heading_rad = np.interp(self.grid_s, self.t_s, np.unwrap(self.heading_rad))

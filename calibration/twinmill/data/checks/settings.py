@@ -18,9 +18,7 @@ class CheckSettings(Numbers):
     # Signs, columns, axes and clocks: commands against poses.
     good: float = number(0.03, "left at which no mistake is looked for")
     far_better: float = number(0.5, "times what is left: a mistake explains so much more ...")
-    sure: float = number(4.0, "... and surely: standard errors over stretches of the log ...")
-    clear: float = number(0.1, "... or where it leaves so many times less, and little at all, ...")
-    clear_sure: float = number(2.0, "... so many standard errors")
+    sure: float = number(4.0, "... and surely: standard errors over stretches of the log")
     alike: float = number(1.3, "times what the best mistake leaves: another is as good ...")
     alike_left: float = number(0.003, "... and so much beside it")
     steps: float = number(0.6, "simple mistakes more: an alternative is no less simple")

@@ -19,6 +19,7 @@ from twinmill.data.checks import (
     of_all_robots,
     own_option,
 )
+from twinmill.data.checks.bodies import give_back
 from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.corrections import corrected
 from twinmill.data.importers.io_tsv import read_io_tsv
@@ -641,6 +642,8 @@ def _told_of(robots: Sequence[RobotLog]) -> list[str]:
     Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
     model to be judged by.
     """
+    own_bodies, exchanged = give_back({robot.robot_id: robot for robot in robots}, "")
+    robots = list(own_bodies.values())
     found: dict[int, list[InputFinding]] = {robot.robot_id: [] for robot in robots}
 
     def add(findings: list[InputFinding]) -> None:
@@ -656,7 +659,7 @@ def _told_of(robots: Sequence[RobotLog]) -> list[str]:
     cleaned = {r.robot_id: ("", make_track(r)) for r in sound}
     add([f for f in check_recorded(list(cleaned.values()), None) if f.fatal])
     add(check_driven([t for k, t in cleaned.items() if not found[k]], None))
-    said = []
+    said = [str(f) for f in exchanged]
     for robot in robots:
         number, own, notes = robot.robot_id, found[robot.robot_id], []
         if number in cleaned:
