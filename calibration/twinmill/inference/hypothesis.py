@@ -22,6 +22,7 @@ from twinmill.model.parameters import (
 
 ROUNDS = 6  # of Levenberg and Marquardt: most fits need three
 TRIES = 5  # dampings within a round
+RUNS_AWAY = 1e6  # m or rad in a step for a unit of a number: no slope, the motion is unstable there
 SETTLED = 0.1  # units of the log posterior: less decides nothing
 LIMIT_SPREAD = 0.5  # prior of a limit about its start on the grid, relative: twice the grid's step
 MOVES = (1.0, 1.0, 0.4)  # times the reach, in turn, by which a place or a while is moved
@@ -265,7 +266,9 @@ class Fitter:
         names = np.array(h.labels)[h.named].tolist()
         errors = self.steps.errors(h.model, names, points[:, h.named])
         difference = errors[len(fresh) :] - errors[: len(fresh)]
-        out[fresh] = difference / np.where(apart, apart, np.inf)[:, None, None]
+        with np.errstate(over="ignore", invalid="ignore"):
+            out[fresh] = difference / np.where(apart, apart, np.inf)[:, None, None]
+        out[~(np.abs(out).max(axis=(1, 2)) < RUNS_AWAY)] = 0.0
         return out
 
     def _moved(self, h: Hypothesis, c: Candidate, instance: str) -> Hypothesis:
