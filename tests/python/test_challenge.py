@@ -397,6 +397,5 @@ def test_no_base_model_is_kept_of_half_an_explanation(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "write_log", lambda plan, played, path: path.write_text("a log"))
     monkeypatch.setattr(command, "run", stopped)
     with pytest.raises(KeyboardInterrupt):
-        judge = command.Judge.DIAGNOSE
-        command.base_of(tmp_path, 1, ROBOTS[1], SEED, duration_s=SECONDS, judge=judge)
+        command.base_of(tmp_path, 1, ROBOTS[1], SEED, duration_s=SECONDS)
     assert [path.name for path in tmp_path.iterdir()] == ["sheet_1.toml"]

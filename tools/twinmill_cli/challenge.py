@@ -152,7 +152,13 @@ def _exam(
 
 
 def base_of(
-    folder: Path, number: int, robot: Robot, seed: int, *, duration_s: float, judge: Judge
+    folder: Path,
+    number: int,
+    robot: Robot,
+    seed: int,
+    *,
+    duration_s: float,
+    judge: Judge = Judge.DIAGNOSE,
 ) -> Path:
     """The model that a user of the robot has: its sheet, then by turns a fit or an explanation.
 
@@ -182,7 +188,7 @@ def base_of(
     return base
 
 
-def diagnosed(base: Path, case: Case, judge: Judge) -> tuple[dict, float]:
+def diagnosed(base: Path, case: Case, judge: Judge = Judge.DIAGNOSE) -> tuple[dict, float]:
     """Makes the log of a case, diagnoses it, and only then looks at the answer.
 
     Args:

@@ -13,7 +13,7 @@ import pytest
 
 from twinmill.challenge.cases import draw, draw_robots
 from twinmill.challenge.scoring import lost
-from twinmill_cli.challenge import base_of, diagnosed
+from twinmill_cli.challenge import Judge, base_of, diagnosed
 
 SEED, SECONDS, CASES = 1, 45, 30
 LOST = {2, 14, 15}
@@ -26,8 +26,30 @@ def results(tmp_path_factory) -> list[dict]:
     for number in range(CASES):
         case = draw(number, SEED, robots, SECONDS)
         base = base_of(folder, case.robot, robots[case.robot], SEED, duration_s=SECONDS)
-        found.append(diagnosed(folder, base, case)[0])
+        found.append(diagnosed(base, case)[0])
     return found
+
+
+@pytest.fixture(scope="module")
+def inferred(tmp_path_factory) -> list[dict]:
+    """The first case of each robot, by probabilities."""
+    folder, robots = tmp_path_factory.mktemp("inferred"), draw_robots(SEED)
+    found = []
+    for number in range(len(robots)):
+        case, how = draw(number, SEED, robots, SECONDS), {"judge": Judge.INFER}
+        base = base_of(folder, case.robot, robots[case.robot], SEED, duration_s=SECONDS, **how)
+        found.append(diagnosed(base, case, **how)[0])
+    return found
+
+
+def test_what_inference_calls_sure_is_there(inferred):
+    assert not [r["case"] for r in inferred if r["outcome"]["wrong_and_sure"]]
+
+
+def test_inference_names_most_single_effects_first(inferred):
+    """Of half the usual length, so that one may be lost."""
+    single = [r["outcome"]["first"] for r in inferred if r["kind"] in ("one", "cousin")]
+    assert sum(single) >= len(single) - 1
 
 
 def test_what_was_answered_stays_so(results):
