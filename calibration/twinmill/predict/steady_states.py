@@ -15,8 +15,8 @@ from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
 
-# Times the usual error, or the floor: beyond it the table is wrong rather than the model. Such an error
-# counts by its logarithm, so that a single one decides little and still has a slope to follow.
+# Times the usual error, or the floor: beyond it the table is wrong rather than the model. Such an
+# error counts by its logarithm: a single one decides little, and has a slope to follow.
 TYPING_ERROR = 10.0
 
 

@@ -67,8 +67,7 @@ def _by_lag(search: Search, lates_s: np.ndarray) -> list[tuple[float, Search]]:
     """The same search at other shifts, of each lag alone."""
     motion, wheels = search.motion, search.wheels
     return [
-        (lag_s, Search(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s))
-        for lag_s in ANY_LAG_S
+        (lag_s, Search(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)) for lag_s in ANY_LAG_S
     ]
 
 

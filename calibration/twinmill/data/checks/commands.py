@@ -32,16 +32,16 @@ POSES_IN = (  # measured over commanded speed, what it says, and columns under t
     ((300.0, 3000.0), "the positions are in millimetres", {"x_m": "x_mm", "y_m": "y_mm"}),
     ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
 )
-SMALL_POSES_IN = (
+SMALL_POSES_IN = (  # a unit in a name is taken at its word: the name is to change
     (
         (1 / 300, 1 / 30),
         "the positions are 100 times too small, as if metres were taken for centimetres",
-        {"x_cm": "x_m", "y_cm": "y_m"},
+        {},
     ),
     (
         (1 / 3000, 1 / 300),
         "the positions are 1000 times too small, as if metres were taken for millimetres",
-        {"x_mm": "x_m", "y_mm": "y_m"},
+        {},
     ),
 )
 SPEEDS_IN = (
@@ -219,7 +219,9 @@ def _shifted(
     far = at_axle(Search(search.motion, search.wheels, search.felt, FAR_S), every)
     found = far.best(every)
     alike = alike_left([e.left for e in found])
-    simplest = min((e for e in found if e.left < alike), key=lambda e: (e.alternative.steps, e.left))
+    simplest = min(
+        (e for e in found if e.left < alike), key=lambda e: (e.alternative.steps, e.left)
+    )
     if search.lates_s[0] < simplest.late_s < search.lates_s[-1] or _is_bias(simplest):
         return None
     if simplest.left > alike_left([best.left]) or not far_better(simplest, own):
@@ -328,6 +330,8 @@ def _no_gain(checked: CheckedTrack, speed: float) -> list[InputFinding]:
 
 def _anew_with(names: dict[str, str], checked: CheckedTrack) -> str:
     """What to do about columns that have other units or meanings than their names say."""
+    if not names:
+        return "correct it where the log is made, or the unit in the names of its columns"
     options = " ".join(f"--rename {old}={new}" for old, new in names.items())
     return f"correct it where the log is made, or import anew with {of_robot(options, checked.own)}"
 

@@ -104,7 +104,8 @@ class Motion:
 
         Args:
             led_m: how a turn to the left leads the tracked point: ahead + i left, m per rad.
-            heading_sign, mirrored: as in `body_mps`, in whose axes that is told.
+            heading_sign: as in `body_mps`, in whose axes that is told.
+            mirrored: likewise.
         """
         led = led_m * self.turn_radps * np.exp(1j * heading_sign * self.heading_rad)
         return replace(self, world_mps=self.world_mps - (np.conj(led) if mirrored else led))
