@@ -9,14 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import twinmill_native as native
 
+from twinmill.data.checks import check_tracks
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
+
+XY = ("x_m", "y_m")
 
 
 @pytest.fixture(scope="session")
@@ -48,17 +51,17 @@ def _said(measurements):
 
 @pytest.mark.parametrize("commands", ["commands", "wheels"])
 @pytest.mark.parametrize("lever_m", [0.3, 0.5, 1.8])
-def test_a_point_tracked_far_off_the_axle_is_no_mistake_of_the_columns(judged, lever_m, commands):
+def test_a_point_tracked_far_off_the_axle_is_told_with_its_lever(judged, lever_m, commands):
     model = "twist" if commands == "commands" else "diff_wheels"
-    found, _ = judged("lever_as_swap", f"poses_{lever_m}m", commands, model)
-    assert len(found) == 1 and not found.findings
-
-
-def test_a_lever_beyond_half_a_metre_is_found_with_its_length(judged, tmp_path):
-    found, file = judged("lever_as_swap", "poses_1.8m")
-    made = add("marker_offset", found, file, out=tmp_path / "m.toml", command="")
-    (x_m,) = (e.value for e in made.parameters if e.name == "marker_offset.x_m")
-    assert x_m == pytest.approx(1.8, abs=0.002)
+    found, file = judged("lever_as_swap", f"poses_{lever_m}m", commands, model)
+    (said,) = found.findings
+    assert not said.fatal
+    x_m, y_m = (float(said.remedy.split(f"{k} = ")[1].split(",")[0].split(")")[0]) for k in XY)
+    assert (x_m, y_m) == pytest.approx((lever_m, 0), abs=0.02 * lever_m)
+    text = file.text + f'[[effect]]\nname = "marker_offset"\nx_m = {x_m}\ny_m = {y_m}\n'
+    advised = ModelFile(file.path, text, native.Model.from_toml(text, "advised"))
+    assert compare(found, advised).score < compare(found, file).score / 5
+    assert not check_tracks(found.tracks, advised.model)
 
 
 @pytest.mark.parametrize("drive", "abc")

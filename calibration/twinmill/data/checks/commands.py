@@ -340,6 +340,25 @@ def _pace(ratio: float) -> str:
     return f"the robot is {ratio:.3g} times as fast as its commands and its model say"
 
 
+def check_lever(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+    """A tracked point so far from where the robot turns that it was taken out to judge the rest."""
+    led_m = search.motion.led_m
+    if not led_m or own.left > CHECKS.explained:
+        return []
+    x_m, y_m = led_m.imag, -led_m.real  # a turn to the left leads what is ahead to the left
+    return [
+        checked.finding(
+            f"the tracked point is {abs(led_m):.2f} m from the point that the robot turns about, "
+            f"x {x_m:.2f} m and y {y_m:.2f} m",
+            f"the commands explain {1 - own.left:.0%} of the motion with that",
+            'say so in the model (an [[effect]] with name = "marker_offset", '
+            f"x_m = {x_m:.3f}, y_m = {y_m:.3f}), which a fit makes exact, or move the tracked "
+            "body's origin",
+            fatal=False,
+        )
+    ]
+
+
 def check_foreign(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
     """Whiles whose commands are not those of the motion; they are to be cut out."""
     found = foreign_stretches(checked.track, search, own)
