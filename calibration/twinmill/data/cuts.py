@@ -198,7 +198,7 @@ def _longest_way(links: list[np.ndarray]) -> np.ndarray:
             if not linked and reach > 1:
                 continue
             new = cost[j] + reach - 1 + (0 if linked else cut)
-            if new < cost[k] or before[k] < 0 and new <= cost[k]:
+            if new < cost[k] or (before[k] < 0 and new <= cost[k]):
                 cost[k], before[k] = new, j
     k = min(range(max(0, count - cut), count), key=lambda k: cost[k] + count - 1 - k)
     way = []

@@ -14,6 +14,7 @@ from twinmill.diagnosis.apart import apart, runs_with_own, tells_more
 from twinmill.diagnosis.cameras import with_detections
 from twinmill.diagnosis.doubts import (
     acted_on,
+    at_bounds,
     beside_more,
     beside_stale,
     of_another_form,
@@ -386,7 +387,7 @@ def _concluded(
     few = few_commands_notes(known)
     if few:
         findings = beside_stale(findings)
-    findings = without.doubted(undone(undetermined(findings), last), last)
+    findings = at_bounds(without.doubted(undone(undetermined(findings), last), last))
     in_doubt = _doubted(findings, less, known)
     whole = [_with_all_starts(o, opened) for o in known]
     models = zip(whole, last.state.models, strict=True)

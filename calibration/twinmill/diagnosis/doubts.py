@@ -252,6 +252,15 @@ def _sizes(
         yield e, p, abs(e.value - p["neutral"])
 
 
+def at_bounds(findings: Sequence[Finding]) -> list[Finding]:
+    """Findings, in doubt where a number of the base ended at its bound: it would have gone on."""
+    found = []
+    for f in findings:
+        names = [e.name for e in f.parameters if f.effect == REFIT and e.at_bound]
+        found.append(doubted(f, f"{names[0]} is at its bound") if names else f)
+    return found
+
+
 def _at_bound(card: dict, own: Sequence[ParameterEstimate]) -> str:
     """A doubt where an estimate ended at its bound, and a usual one is excluded; else empty."""
     for e, p, away in _sizes(card, own):

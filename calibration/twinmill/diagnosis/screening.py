@@ -43,9 +43,10 @@ class Screened:
 
     Attributes:
         columns: (R, k) of all data sets, weighted, what is free projected out.
-        gain: expected fall of the cost.
+        gain: expected fall of the cost where it is small.
         size: expected fall of the cost if it had its usual strength.
         start: values that the fit begins at, by name; a place, moment or limit is searched.
+        rest: squares that are left to take away.
     """
 
     name: str
@@ -53,6 +54,16 @@ class Screened:
     gain: float
     size: float
     start: dict[str, float] = field(default_factory=dict)
+    rest: float = np.inf
+
+    @property
+    def fall(self) -> float:
+        """Expected fall of the cost, which goes by the logarithm of what is left of the squares.
+
+        Few data, as a table's, have few squares, and yet may lose all of them.
+        """
+        part = self.gain / self.rest
+        return self.gain if part < 1e-6 else -self.rest * float(np.log1p(-min(part, 1 - 1e-6)))
 
 
 def candidates(state: State) -> list[str]:
@@ -189,7 +200,7 @@ def _screened(
             taken = max(float(column @ rest), 0.0) ** 2 / (float(column @ column) + 1)
             if taken > gain:
                 used, gain = column[:, None], taken
-    return Screened(name, used, gain, size, start)
+    return Screened(name, used, gain, size, start, float(rest @ rest))
 
 
 def _stronger(
@@ -285,7 +296,7 @@ def promising(screened: list[Screened], settings: Settings) -> list[Screened]:
     """
     best = sorted(screened, key=lambda s: -s.gain)
     stale = [s for s in best if s.name == REFIT]
-    worth = [s for s in best if s.gain > settings.evidence / 2 and s.gain > 0.02 * best[0].gain]
+    worth = [s for s in best if s.fall > settings.evidence / 2 and s.gain > 0.02 * best[0].gain]
     return [*stale, *(s for s in worth if s.name != REFIT)]
 
 

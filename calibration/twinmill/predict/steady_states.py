@@ -2,6 +2,7 @@
 """A steady-state table with the model that is to explain it, as a data set."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
@@ -14,8 +15,8 @@ from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
 
-# Times the floor: beyond it the table may be wrong as well as the model. Such an error counts by its
-# logarithm, so that a single one decides little, and many still lead a fit to where they are less.
+# Times the usual error, or the floor: beyond it the table is wrong rather than the model. Such an
+# error counts by its logarithm: a single one decides little, and has a slope to follow.
 TYPING_ERROR = 10.0
 
 
@@ -100,11 +101,16 @@ class SteadyStates:
         """
         return self._robust(self.errors() / self.floor())
 
+    @cached_property
+    def _most(self) -> float:
+        """Error over floor from which it is one of typing, by what is usual with the model."""
+        usual = np.nanmedian(np.abs(self.errors() / self.floor()))
+        return TYPING_ERROR * max(1.0, float(np.nan_to_num(usual)))
+
     def _robust(self, ratios: np.ndarray) -> np.ndarray:
         size = np.abs(ratios)
         agreed = (self._measured() == 0) & (size < 1)
-        beyond = np.log(np.maximum(size / TYPING_ERROR, 1))
-        robust = np.minimum(size, TYPING_ERROR) + TYPING_ERROR * beyond
+        robust = np.minimum(size, self._most) * (1 + np.log(np.maximum(size / self._most, 1)))
         return np.where(agreed, np.nan, np.copysign(robust, ratios))
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:

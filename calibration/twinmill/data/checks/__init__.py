@@ -19,6 +19,7 @@ from twinmill.data.checks.commands import (
     check_drive,
     check_exchange,
     check_foreign,
+    check_lever,
 )
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.rolling import check_rolling
@@ -105,6 +106,8 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
             found += wrong
             if any(f.fatal for f in wrong):
                 continue
+            if model is None or "marker_offset" not in model.effects:
+                found += check_lever(checked, search, explained)
             found += check_foreign(checked, search, explained)
             if not wrong:
                 of_time = check_lateness(checked, search, explained)

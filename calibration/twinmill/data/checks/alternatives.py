@@ -116,8 +116,8 @@ class Explained:
         left: share of the squared motion that it leaves, on stretches not fitted to.
         by_block: (B,) the same summed by stretch, over the whole motion.
         turned_rad: heading offset that went with it.
-        gain: (2,) measured over predicted speed, of driving (on both axes together, as a unit scales
-            both) and of turning; 0 where next to none is predicted.
+        gain: (2,) measured over predicted speed, of driving (on both axes together, as a unit
+            scales both) and of turning; 0 where next to none is predicted.
         lag_s, late_s: at which it was found.
     """
 
@@ -351,7 +351,7 @@ class Search:
     def best(
         self, alternatives: list[Alternative], keys: list[tuple[float, float]] | None = None
     ) -> list[Explained]:
-        """Each at the lag and the shift where it explains most, of some; else of the likely ones."""
+        """Each at the lag and shift where it explains most, of some; else of the likely ones."""
         found: list[Explained] = []
         for (sign, mirrored, turned), group in by_pose(alternatives):
             found += self._best_of(

@@ -50,7 +50,7 @@ def _led(
     found = [_at(search, pose, mixing, key) for key in search.keys(*pose[:2])]
     left, led_m = (np.array(values) for values in zip(*found, strict=True))  # (keys, A)
     best = left.argmin(axis=0)
-    return [(float(left[k, i]), led_m[k, i], a) for i, (k, a) in enumerate(zip(best, group))]
+    return [(float(left[k, i]), led_m[k, i], group[i]) for i, k in enumerate(best)]
 
 
 def _at(
@@ -62,7 +62,8 @@ def _at(
     1933).
 
     Args:
-        search, pose: as above.
+        search: of the tracked point's motion.
+        pose: what is made of the poses.
         mixing: (A, 3, 4) velocity by column.
         key: lag and shift.
     """

@@ -33,16 +33,16 @@ POSES_IN = (  # measured over commanded speed, what it says, and columns under t
     ((300.0, 3000.0), "the positions are in millimetres", {"x_m": "x_mm", "y_m": "y_mm"}),
     ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
 )
-SMALL_POSES_IN = (
+SMALL_POSES_IN = (  # a unit in a name is taken at its word: the name is to change
     (
         (1 / 300, 1 / 30),
         "the positions are 100 times too small, as if metres were taken for centimetres",
-        {"x_cm": "x_m", "y_cm": "y_m"},
+        {},
     ),
     (
         (1 / 3000, 1 / 300),
         "the positions are 1000 times too small, as if metres were taken for millimetres",
-        {"x_mm": "x_m", "y_mm": "y_m"},
+        {},
     ),
 )
 SPEEDS_IN = (
@@ -325,12 +325,33 @@ def _no_gain(checked: CheckedTrack, speed: float) -> list[InputFinding]:
 
 def _anew_with(names: dict[str, str], checked: CheckedTrack) -> str:
     """What to do about columns that have other units or meanings than their names say."""
+    if not names:
+        return "correct it where the log is made, or the unit in the names of its columns"
     options = " ".join(f"--rename {old}={new}" for old, new in names.items())
     return f"correct it where the log is made, or import anew with {of_robot(options, checked.own)}"
 
 
 def _pace(ratio: float) -> str:
     return f"the robot is {ratio:.3g} times as fast as its commands and its model say"
+
+
+def check_lever(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
+    """A tracked point so far from where the robot turns that it was taken out to judge the rest."""
+    led_m = search.motion.led_m
+    if not led_m or own.left > CHECKS.explained:
+        return []
+    x_m, y_m = led_m.imag, -led_m.real  # a turn to the left leads what is ahead to the left
+    return [
+        checked.finding(
+            f"the tracked point is {abs(led_m):.2f} m from the point that the robot turns about, "
+            f"x {x_m:.2f} m and y {y_m:.2f} m",
+            f"the commands explain {1 - own.left:.0%} of the motion with that",
+            'say so in the model (an [[effect]] with name = "marker_offset", '
+            f"x_m = {x_m:.3f}, y_m = {y_m:.3f}), which a fit makes exact, or move the tracked "
+            "body's origin",
+            fatal=False,
+        )
+    ]
 
 
 def check_foreign(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:

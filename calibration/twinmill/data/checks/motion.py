@@ -38,6 +38,7 @@ class Motion:
         grid_s, shapes: (G,) and (G, SHAPES, 4) commands on an even grid, robot's clock.
         half_s: of the window.
         block_s: length of a stretch.
+        led_m: how a turn led the tracked point, where that was taken out, as in `at_axle`.
     """
 
     t_s: np.ndarray
@@ -49,6 +50,7 @@ class Motion:
     shapes: np.ndarray
     half_s: float
     block_s: float = BLOCK_S
+    led_m: complex = 0j
 
     @classmethod
     def of(cls, track: Track) -> "Motion":
@@ -104,10 +106,12 @@ class Motion:
 
         Args:
             led_m: how a turn to the left leads the tracked point: ahead + i left, m per rad.
-            heading_sign, mirrored: as in `body_mps`, in whose axes that is told.
+            heading_sign: as in `body_mps`, in whose axes that is told.
+            mirrored: likewise.
         """
         led = led_m * self.turn_radps * np.exp(1j * heading_sign * self.heading_rad)
-        return replace(self, world_mps=self.world_mps - (np.conj(led) if mirrored else led))
+        world_mps = self.world_mps - (np.conj(led) if mirrored else led)
+        return replace(self, world_mps=world_mps, led_m=led_m)
 
     def told_in_room(self) -> "Motion":
         """The same, if the first two columns were velocities along the room's axes."""
