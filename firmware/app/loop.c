@@ -191,7 +191,7 @@ static uint8_t conditions(const struct loop *loop, bool is_fresh)
     uint8_t set = 0;
     for (int i = 0; i < ROBOT_CONDITION_COUNT; ++i)
     {
-        set |= holds[i] ? ROBOT_BIT(i) : 0;
+        set = (uint8_t)(set | (holds[i] ? ROBOT_BIT(i) : 0));
     }
     return set;
 }

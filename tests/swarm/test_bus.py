@@ -24,9 +24,9 @@ import sys, time
 from pathlib import Path
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
-from twinmill.robots.key import load
+from twinmill.robots.key import load_or_make
 
-fleet = Fleet(sys.argv[1], key=load(Path(sys.argv[2])))
+fleet = Fleet(sys.argv[1], key=load_or_make(Path(sys.argv[2])))
 fleet.listen(10, lambda: len(fleet.here()) == 4)
 tell.tell(fleet, tell.make_command(2, "diffusing"), {0, 1, 2, 3}, until_s=time.monotonic() + 5)
 """

@@ -18,7 +18,11 @@ COMMANDS = (
         "guide",
         "Ask what you have, and write the plan from an unknown robot to a named effect.",
     ),
-    ("import", "import_log", "Make a log from motion capture exports and command tables."),
+    (
+        "import",
+        "import_log",
+        "Make a log from motion capture exports and command tables, or of poses alone.",
+    ),
     (
         "export",
         "export",

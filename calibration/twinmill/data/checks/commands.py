@@ -130,7 +130,7 @@ def check_commands(
     speed_mps = float(np.sqrt(np.mean(np.abs(motion.world_mps) ** 2)))
     if speed_mps < CHECKS.least_mps and np.abs(motion.turn_radps).max() < CHECKS.least_radps:
         return [], search, own
-    if own.left >= CHECKS.good:
+    if own.left >= CHECKS.good and track.has_heading:  # else no turn shows a lever
         search = at_axle(search, [OWN, *_alternatives(checked)])
         own = search.own()
     if own.left < CHECKS.good:

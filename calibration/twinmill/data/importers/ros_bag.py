@@ -586,7 +586,8 @@ def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
             kind = connection.msgtype
             if kind in TAGS:
                 for number, row in tag_rows(message):
-                    if own := found.get((f"{name}:{number}", "pose")):
+                    own = found.get((f"{name}:{number}", "pose"))
+                    if own is not None:
                         own.add(message.header.stamp, received_ns, row)
                 continue
             stamp = getattr(getattr(message, "header", None), "stamp", None)
