@@ -77,8 +77,8 @@ def test_of_a_bag_with_tilted_axes_no_pose_is_off_the_floor(bag, tmp_path):
 @pytest.mark.parametrize(
     ("words", "factor"),
     [
-        ("rounds per second, on wheels of 3[23] mm", 2 * math.pi),
-        ("rounds per minute, on wheels of 3[23] mm", 2 * math.pi / 60),
+        ("revolutions per second, on wheels of 3[23] mm", 2 * math.pi),
+        ("revolutions per minute, on wheels of 3[23] mm", 2 * math.pi / 60),
         ("degrees per second, on wheels of 3[23] mm", math.pi / 180),
         ("radians per minute, on wheels of 3[23] mm", 1 / 60),
         ("motors before a gear of 1:12 to 1:262", 1 / 50),
@@ -107,8 +107,8 @@ def test_wheel_speeds_in_radians_of_the_wheels_are_left_alone(bag, tmp_path):
 @pytest.mark.parametrize(
     ("ratio", "words"),
     [
-        (0.95 * math.pi / 30, "rounds per minute"),
-        (1.1 * 2 * math.pi, "rounds per second"),
+        (0.95 * math.pi / 30, "revolutions per minute"),
+        (1.1 * 2 * math.pi, "revolutions per second"),
         (1 / 59, "degrees per second or radians per minute"),
         (1 / 30, "before a gear of about 1:30"),
         (0.5, None),

@@ -140,11 +140,15 @@ def far_better(best: Explained, own: Explained) -> bool:
 def surely_better(best: Explained, own: Explained) -> bool:
     """Whether it is sure that one leaves less than another of the same motion.
 
-    By the standard error, over stretches, of the ratio of what both leave (Cochran 1977, Sampling
-    Techniques, 6.4): that some stretches hold much motion and others none does not widen it.
+    By the standard error of the ratio of what both leave, from leaving out one stretch after the
+    other (the jackknife; Cochran 1977, Sampling Techniques, 6.17): that some stretches hold much
+    motion and others none does not widen it, and a ratio that one stretch makes alone is not sure.
     """
-    apart = best.by_block - best.left / max(own.left, 1e-12) * own.by_block
-    return own.left - best.left > CHECKS.sure * np.sqrt(np.sum(apart**2))
+    without = best.by_block.sum() - best.by_block, own.by_block.sum() - own.by_block
+    ratios = without[0] / np.maximum(without[1], 1e-12)
+    count = len(ratios)
+    error = np.sqrt((count - 1) / count * np.sum((ratios - ratios.mean()) ** 2))
+    return own.left - best.left > CHECKS.sure * own.left * error
 
 
 def alike_left(left: list[float]) -> float:

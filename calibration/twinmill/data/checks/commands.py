@@ -139,22 +139,40 @@ def check_commands(
 
 
 def _alternatives(checked: CheckedTrack) -> list[Alternative]:
-    """Mistakes of signs, columns and axes that can be told in one robot's log."""
+    """Mistakes of signs, columns and axes that are tried on one robot's log."""
     poses = pose_alternatives() if checked.track.has_heading else []
     return wheel_alternatives(columns_in_use(checked.body)) + poses
 
 
+def _shows(a: Alternative, track: Track) -> bool:
+    """Whether a mistake can be told from a robot that is held at an unknown angle.
+
+    Without a heading the turn shows nothing, and velocities that are a quarter or half a turn off
+    are no mistake.
+    """
+    if track.has_heading or track.command_kind != "twist":
+        return True
+    return a.place[2] == 2 and a.sign[2] == 1 and not _is_rotation(a)
+
+
+def _is_rotation(a: Alternative) -> bool:
+    """Whether forward and left are turned together: its determinant is 1 (a mirror's is -1)."""
+    swapped = a.place[:2] == (1, 0)
+    return a.sign[0] * a.sign[1] == (-1 if swapped else 1)
+
+
 def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
     track = checked.track
-    found = search.best(_alternatives(checked))
-    found = [e for e in found if not _is_bias(e)]
+    tried = [e for e in search.best(_alternatives(checked)) if not _is_bias(e)]
+    found = [e for e in tried if _shows(e.alternative, track)]
     best = min(found, key=lambda e: e.left)
     for mistake in (_in_room, _shifted, stepped):
         if mistaken := mistake(checked, search, own, best):
             return [mistaken]
     if not far_better(best, own):
-        if min(own.left, best.left) > CHECKS.unrelated:
-            return [_unrelated(checked, min(own.left, best.left))]
+        least = min(own.left, *(e.left for e in tried))
+        if least > CHECKS.unrelated:
+            return [_unrelated(checked, least)]
         return _units(checked, own) if own.left < CHECKS.explained else []
     alike = [e for e in found if e.left < alike_left([best.left])]
     alike.sort(key=lambda e: (e.alternative.steps, e.left))

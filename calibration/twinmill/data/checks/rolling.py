@@ -10,8 +10,8 @@ from twinmill.data.track import Track, command_at, local_line
 STEADY_S = (-0.5, -0.25, 0.0, 0.25, 0.5)  # about a pose: clocks and lags lie within
 HALF_S = 0.15  # of the line that tells a speed
 UNITS = (  # of a wheel's speed, in rad/s
-    ("rounds per second", 2 * np.pi),
-    ("rounds per minute", np.pi / 30),
+    ("revolutions per second", 2 * np.pi),
+    ("revolutions per minute", np.pi / 30),
     ("degrees per second", np.pi / 180),
     ("radians per minute", 1 / 60),
 )
