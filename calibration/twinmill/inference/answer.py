@@ -57,6 +57,7 @@ class Answer:
             cannot_tell.
         findings: effects, the one worth most first.
         nothing, outside: probabilities that nothing is missing, and that something nameless is.
+        effects: probability of each effect that was fitted, likeliest first.
         depends_on: what is left depends on, likeliest first, each with its probability.
         share: of the excess squared error that the likeliest dependence takes.
     """
@@ -65,6 +66,7 @@ class Answer:
     findings: list[Named]
     nothing: float
     outside: float
+    effects: dict[str, float]
     depends_on: dict[str, float]
     share: float
 
@@ -73,7 +75,11 @@ class Answer:
         return {
             "verdict": self.verdict,
             "findings": [f.to_json() for f in self.findings],
-            "probability": {"nothing": self.nothing, "outside": self.outside},
+            "probability": {
+                "nothing": self.nothing,
+                "outside": self.outside,
+                "effects": self.effects,
+            },
             "rest": {
                 "share": self.share,
                 "depends_on": list(self.depends_on),
@@ -101,7 +107,13 @@ def answer(table: Table) -> Answer:
     else:
         verdict = "ambiguous" if findings[0].certainty == "group" else "effect_missing"
     words, share = _rest(best, every, table) if something else ({}, 0.0)
-    return Answer(verdict, findings, nothing, outside, words, share)
+    return Answer(verdict, findings, nothing, outside, _of_each(every), words, share)
+
+
+def _of_each(every: list[Belief]) -> dict[str, float]:
+    names = dict.fromkeys(name for b in every for name in b.effects)
+    p = {name: sum(b.probability for b in every if name in b.effects) for name in names}
+    return dict(sorted(p.items(), key=lambda item: -item[1]))
 
 
 def _likeliest(every: list[Belief], key):

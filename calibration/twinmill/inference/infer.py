@@ -38,7 +38,10 @@ class Inference:
             **self.answer.to_json(),
             "robot_id": self.measurement.track.robot_id,
             "log": self.measurement.log_name,
-            "always": [{"depends_on": name, "size": size} for name, size in kernels],
+            "always": {
+                "effects": list(self.always.effects) if self.always else [],
+                "depends_on": [{"name": name, "size": size} for name, size in kernels],
+            },
             "settings": {name: value for name, value, _ in PRIORS.listed()},
         }
 

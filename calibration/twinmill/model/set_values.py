@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import tomlkit
 
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import catalogue, catalogue_name, effect_names
 
 SECTIONS = ("robot", "base", "sensor", "noise", "idiosyncrasy", "clock")
 
@@ -41,8 +41,15 @@ def _check(name: str, value: float, bounds: Mapping[str, dict]) -> None:
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
         hint = f"; the nearest known is '{near[0]}'" if near else ""
+        effect = catalogue_name(name)
+        how = (
+            f"; the model has no {effect}: add the lines [[effect]] and name = "
+            f'"{effect}" to its file'
+            if effect in catalogue()
+            else hint
+        )
         raise ModelError(
-            f"{name}: is no quantity of this model{hint} (`twinmill open` shows all with their "
+            f"{name}: is no quantity of this model{how} (`twinmill open` shows all with their "
             "bounds)."
         )
     low, high = bounds[name]["min"], bounds[name]["max"]

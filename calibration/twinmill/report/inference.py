@@ -10,13 +10,15 @@ from twinmill.model.parameters import catalogue
 from twinmill.report import show
 from twinmill.report.tables import Cell, Table, number
 
+SHOWN = 0.01  # probability of an effect that is listed; --json has all
+
 
 def sentence(answer: Answer) -> str:
     """The verdict in one sentence, with its probability."""
     if answer.verdict == "cannot_tell":
         return (
-            f"This log cannot tell: nothing is missing with a probability of "
-            f"{percent(answer.nothing)}, which is too little to say either."
+            f"This log cannot tell: nothing is missing ({percent(answer.nothing)}), or something "
+            f"outside the catalogue ({percent(answer.outside)}), or an effect."
         )
     if answer.verdict in ("model_adequate", "refit_enough"):
         better = ", but the base's numbers are stale: fit it anew" if _stale(answer) else ""
@@ -37,6 +39,8 @@ def terminal(result: Inference) -> RenderableType:
         parts.append(show.table(_effects(answer.findings)))
     if answer.depends_on:
         parts.append(show.table(_dependences(answer)))
+    if others := _others(answer):
+        parts.append(show.table(others))
     if result.always is None:
         parts.append(
             Text(
@@ -44,8 +48,8 @@ def terminal(result: Inference) -> RenderableType:
                 "told as news: give that log with --own."
             )
         )
-    elif result.always.kernels:
-        known = ", ".join(name for name, _ in result.always.kernels)
+    elif result.always.kernels or result.always.effects:
+        known = ", ".join([*result.always.effects, *(name for name, _ in result.always.kernels)])
         parts.append(Text(f"No news, since the model misses it in its own log too: {known}."))
     return Group(*parts)
 
@@ -91,6 +95,17 @@ def _effects(findings: list[Named]) -> Table:
             )
     columns = ["effect", "probability", "number", "value", "std", "what it is"]
     return Table("Missing effects", columns, rows, words=(0, 2, 5))
+
+
+def _others(answer: Answer) -> Table | None:
+    """Effects that are no finding, and not ruled out; None where all are."""
+    found = {f.effect for f in answer.findings}
+    rows = [
+        [Cell(name), Cell(percent(p), bar=p)]
+        for name, p in answer.effects.items()
+        if name not in found and p >= SHOWN
+    ]
+    return Table("Not ruled out", ["effect", "probability"], rows) if rows else None
 
 
 def _dependences(answer: Answer) -> Table:
