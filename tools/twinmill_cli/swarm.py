@@ -379,7 +379,8 @@ def _status(
     fleet = Fleet(lcm_url, channel_prefix, key=operator_key)
     if once or as_json or not sys.stdout.isatty():
         fleet.listen(1.0)
-        fleet.listen(RUN_PERIOD_S - 1, lambda: all(r.run for r in fleet.robots.values()))
+        known = fleet.robots
+        fleet.listen(RUN_PERIOD_S - 1, lambda: known and all(r.run for r in known.values()))
         robots = [fleet.robots[i] for i in sorted(fleet.robots)]
         if as_json:
             print_object({"robots": [r.to_json() for r in robots]})
