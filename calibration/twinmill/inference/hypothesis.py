@@ -81,7 +81,6 @@ class Hypothesis:
             step=np.r_[prior.step, np.ones(more)],
             value=value,
             one_sided=np.zeros(len(prior.mean), bool),
-            slopes=None,
         )
 
     @property

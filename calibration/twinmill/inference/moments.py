@@ -56,13 +56,11 @@ class Found:
         gains: (n + 1,) gain in log evidence with the first so many on, chances left out.
         on: numbers of the moments.
         count: of all moments.
-        fall: of the squares, with all on.
     """
 
     gains: np.ndarray
     on: tuple[int, ...]
     count: int
-    fall: float
 
     def log_evidence(self, rate: Rate) -> float:
         """Gain in log evidence: the best number of moments, and the chance of these at a rate."""
@@ -111,4 +109,4 @@ def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> F
         inverse = np.linalg.inv(own[best])
         push = push - column @ (inverse @ push[place[best]])
         gram = gram - column @ inverse @ column.T
-    return Found(np.array(gains), tuple(on), count, 2 * gains[-1])
+    return Found(np.array(gains), tuple(on), count)
