@@ -1313,9 +1313,10 @@ def infer(
     """Gives the probability of each effect that a model may lack, and of something nameless.
 
     Args:
-        log: a log of one robot, or the path of one.
+        log: of one robot, or the path of one; several logs that were loaded together are judged
+            together.
         model: best one that was fitted to another log; None is TurboPi's.
-        own: the log that the model was fitted to: what it misses there, too, is no news.
+        own: the log (or logs) that the model was fitted to: what it misses there, too, is no news.
         progress: is told in words what is being done.
 
     Returns:

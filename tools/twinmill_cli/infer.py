@@ -29,20 +29,23 @@ def register(app: typer.Typer) -> None:
 
 
 def _infer(
-    log: Annotated[
-        Path,
+    logs: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="LOG", show_default=False, help="Log with commands and poses of one robot."
+            metavar="LOG...",
+            show_default=False,
+            help="Logs with commands and poses of one robot, which are judged together.",
         ),
     ],
     model: Model = DEFAULT_MODEL,
     own: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "--own",
             metavar="LOG",
             show_default=False,
-            help="Log that the model was fitted to: what it misses there, too, is no news.",
+            help="Log that the model was fitted to (once for each): what it misses there, too, "
+            "is no news.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -51,16 +54,16 @@ def _infer(
 
     Effects of the catalogue, dependences without a name (on time, place, heading,
     speed, turns, the past, single moments) and nothing at all compete by their
-    evidence. Sure means 95 % or more.
+    evidence. Sure means 90 % or more.
 
     Example: twinmill infer run.lcmlog --model fitted.toml --own calibration.lcmlog
     """
     native.keep_memory()  # what the work frees it wants again
-    verb = shlex.join(["infer", *(["--own", str(own)] if own else [])])
-    source = provenance(command_line(verb, [log], model), model_file := open_model(model, None))
+    verb = shlex.join(["infer", *(word for path in own or () for word in ("--own", str(path)))])
+    source = provenance(command_line(verb, logs, model), model_file := open_model(model, None))
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
-        measurements = load([log], model_file)
-        before = load([own], model_file) if own else ()
+        measurements = load(logs, model_file)
+        before = load(own, model_file) if own else ()
         result = infer(measurements, model_file, before, progress)
     data = {**result.to_json(), **told(measurements), **source.to_json()}
     if as_json:

@@ -9,6 +9,7 @@ their prior: a function of speed, heading or the past with its weights, one of t
 its size alone (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +27,7 @@ from twinmill.inference.search import Search, evidence
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import WORTH, noise_of
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import catalogue, is_local, with_role
+from twinmill.model.parameters import catalogue, catalogue_name, is_local, with_role
 
 MOST = 8  # kernels: more are parts of each other
 
@@ -48,14 +49,14 @@ class _Grown:
     noise: Noise
 
 
-def always_of(measurement: Measurement, model_file: ModelFile) -> Always:
-    """What a model misses in the log that it was fitted to.
+def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Always:
+    """What a model misses in the logs that it was fitted to.
 
     Args:
-        measurement: one robot in that log.
+        measurements: one robot in those logs.
         model_file: as fitted.
     """
-    p = problem_of(measurement, model_file, sheet=True)
+    p = problem_of(measurements, model_file, sheet=True)
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
     noise = noise_of(h, p)
@@ -68,7 +69,7 @@ def _lasts(effects: tuple[str, ...]) -> bool:
     """Whether all of a set are of the robot: none of a place, a while or the clocks."""
     return not any(
         is_local(name) or with_role(name, "moment") or catalogue()[name]["needs"] == "clocks"
-        for name in effects
+        for name in map(catalogue_name, effects)
     )
 
 

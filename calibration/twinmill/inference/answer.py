@@ -8,7 +8,7 @@ import numpy as np
 from twinmill.inference.posterior import Belief, beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Table
-from twinmill.model.parameters import catalogue_name
+from twinmill.model.parameters import catalogue_name, instance_of
 
 LARGEST_GROUP = 4  # names: more help nobody
 
@@ -99,7 +99,7 @@ def answer(table: Table) -> Answer:
     named = [_named(name, best, every, table) for name in _by_worth(best, table)]
     findings = [f for f in named if f.probability >= PRIORS.member]
     if not something:
-        stale = sum(b.probability for b in every if b.nothing and b.stale)
+        stale = sum(b.probability for b in every if b.nothing and b.entry.stale)
         verdict = "refit_enough" if stale > nothing / 2 else "model_adequate"
         verdict = verdict if nothing >= 0.5 else "cannot_tell"
     elif outside >= 0.5 or not findings:
@@ -162,12 +162,11 @@ def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[f
     weight: dict[tuple[str, ...], float] = {}
     for b in every:
         if name in b.fitted:
-            key = tuple(sorted(b.fitted))
-            weight[key] = weight.get(key, 0.0) + b.probability
-    sets = [e for e in table.numbers if name in e]
-    shares = np.array([weight.get(tuple(sorted(e)), 0.0) for e in sets])
-    shares = shares / shares.sum()
+            weight[b.entry.effects] = weight.get(b.entry.effects, 0.0) + b.probability
+    sets = list(weight)
+    shares = np.array(list(weight.values())) / sum(weight.values())
     own = [k for k in table.numbers[sets[0]] if catalogue_name(k) == name]
+    own = [k for k in own if instance_of(k) == instance_of(own[0])]
     found = {}
     for label in own:
         values, stds = np.array([table.numbers[e][label] for e in sets]).T
@@ -190,5 +189,5 @@ def _rest(
         for word in b.words:
             words[word] = words.get(word, 0.0) + b.probability / whole
     order = sorted((w for w in words if words[w] > PRIORS.member), key=lambda w: -words[w])
-    falls = [b.fall for b in own if b.words[:1] == (order[0],)]
+    falls = [b.entry.fall for b in own if b.words[:1] == (order[0],)]
     return {w: words[w] for w in order}, float(np.clip(max(falls) / table.excess, 0, 1))

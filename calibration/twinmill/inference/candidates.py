@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects of the catalogue that a model may lack, and what each would change in a log."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -15,6 +16,7 @@ from twinmill.model.parameters import (
     MOTION_STAGES,
     WHERE_OR_WHEN,
     Parameter,
+    beginning_at_a_moment,
     catalogue_of,
     drives_sideways,
     effect_parameters,
@@ -62,12 +64,14 @@ class Candidate:
         return np.array([p.min >= p.usual for p in own], bool)
 
 
-def candidates(model: native.Model, track: Track, same_clock: bool, declared: bool) -> list[str]:
-    """Effects that this robot can have and this log can show.
+def candidates(
+    model: native.Model, tracks: Sequence[Track], same_clock: bool, declared: bool
+) -> list[str]:
+    """Effects that this robot can have and these logs can show.
 
     Args:
         model: of the base.
-        track: of the log.
+        tracks: of the logs; what begins or ends at a moment is looked for in a single one.
         same_clock: the offset of the clocks is known, so that a delay shows.
         declared: one clock stamps all, so that no offset can be missing.
     """
@@ -78,10 +82,12 @@ def candidates(model: native.Model, track: Track, same_clock: bool, declared: bo
         excluded |= set(making_late("clock"))
     if model.get(LAG) == 0:
         excluded |= set(making_late("lag"))
-    if np.isnan(track.battery_V).all():
+    if any(np.isnan(track.battery_V).all() for track in tracks):
         excluded |= set(needing("battery"))
-    if not track.has_heading:
+    if not all(track.has_heading for track in tracks):
         excluded |= set(needing("heading"))
+    if len(tracks) > 1:
+        excluded |= set(beginning_at_a_moment())
     names = []
     for name, card in catalogue_of(model).items():
         sideways = {*card["identify"]} and {*card["identify"]} <= {"strafe", "diagonal"}
@@ -167,7 +173,7 @@ def _places(steps: Steps) -> tuple[np.ndarray, np.ndarray]:
 
 def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Masks (G, W) of times from a moment on, or between two, and (G, count) these in s."""
-    t_s, begin_s = steps.t_s, steps.measurement.track.command_t_s[0]
+    t_s, begin_s = steps.t_s, steps.logs[0].measurement.track.command_t_s[0]
     grid_s = np.linspace(t_s[0], t_s[-1], MOMENTS + 2)[1:-1]
     if count == 1:
         return (t_s >= grid_s[:, None]).astype(float), (grid_s - begin_s)[:, None]

@@ -14,6 +14,7 @@ from twinmill.inference.prior import Prior
 from twinmill.inference.steps import Steps
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
+    catalogue_name,
     effect_names,
     instance_of,
     key_of,
@@ -36,7 +37,7 @@ class Hypothesis:
     Numbers are `labels`: the base's, weights of its discrepancy, then those of effects.
 
     Attributes:
-        effects: names, in the order in which they were added.
+        effects: names, in the order in which they were added; a second of a kind is `name#2`.
         model: with them, at the best numbers.
         labels: N of them; `named` (N,) says which are quantities of the model.
         mean, cov: (N,), (N, N) of the prior.
@@ -86,8 +87,15 @@ class Hypothesis:
     @property
     def of_effects(self) -> np.ndarray:
         """(N,) numbers of effects that the hypothesis adds."""
-        added = {newest_instance(self.model, name) for name in self.effects}
+        added = {self.instance(name) for name in self.effects}
         return np.array([instance_of(n) in added for n in self.labels])
+
+    def instance(self, effect: str) -> str:
+        """Instance name in the model of one of the effects; the base may have its kind, too."""
+        kind = catalogue_name(effect)
+        own = [n for n in self.effects if catalogue_name(n) == kind]
+        every = [n for n in effect_names(self.model) if catalogue_name(n) == kind]
+        return every[own.index(effect) - len(own)]
 
     def linear(self, whiten, cov: np.ndarray | None = None) -> Linear:
         """The linear model about the best numbers; `cov` in the place of the prior's."""
@@ -115,6 +123,12 @@ class Hypothesis:
         root, count = np.linalg.cholesky(self.cov if cov is None else cov), len(self.mean)
         spread = root @ linear.covariance[:count, :count] @ root.T
         return self.mean + root @ linear.mean[:count], spread
+
+
+def next_of_kind(effects: tuple[str, ...], name: str) -> str:
+    """Name of one effect more in a set: `name`, or `name#2` where it is the second of its kind."""
+    there = sum(catalogue_name(n) == name for n in effects)
+    return f"{name}#{there + 1}" if there else name
 
 
 @dataclass(frozen=True)
@@ -178,7 +192,7 @@ class Fitter:
         """
         model = h.model.copy()
         model.add_effect(c.name)
-        instance = newest_instance(model, c.name)
+        instance, effect = newest_instance(model, c.name), next_of_kind(h.effects, c.name)
         for p, v in zip(c.parameters, start, strict=True):
             model.set(f"{instance}.{key_of(p.name)}", float(v))
         local = np.array([p.role in WHERE_OR_WHEN for p in c.parameters])
@@ -195,7 +209,7 @@ class Fitter:
         back = np.array([told and not name.startswith("clock.") for name in h.labels])
         base = np.where(back & ~h.of_effects, h.mean, h.value)
         grown = Hypothesis(
-            effects=(*h.effects, c.name),
+            effects=(*h.effects, effect),
             model=model,
             labels=(*h.labels, *(f"{instance}.{key_of(p.name)}" for p in free)),
             named=np.r_[h.named, np.ones(len(free), bool)],
@@ -208,16 +222,15 @@ class Fitter:
             one_sided=np.r_[
                 h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
             ],
-            grid={**h.grid, c.name: grid},
+            grid={**h.grid, effect: grid},
             slopes=h.slopes,
         )
         fitted = self.fit(grown, known=count)
         return self._moved(fitted, c, instance) if local.any() else fitted
 
     def without(self, h: Hypothesis, effect: str) -> Hypothesis:
-        """The hypothesis without one of its effects, fitted anew."""
-        model = h.model.copy()
-        instance = newest_instance(model, effect)
+        """The hypothesis without one of its effects, of several of a kind the last, fitted anew."""
+        model, instance = h.model.copy(), h.instance(effect)
         model.remove_effect(effect_names(model).index(instance))
         keep = np.array([instance_of(n) != instance for n in h.labels])
         part = {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One log, one model: what is missing, with probabilities."""
+"""One robot, one model: what is missing, with probabilities."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,16 +19,16 @@ from twinmill.model.model_file import ModelFile
 
 @dataclass(frozen=True)
 class Inference:
-    """What a log says of a model.
+    """What logs of a robot say of a model.
 
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
-        measurement: of the log.
+        measurements: of the logs.
         always: what the model misses in its own log, too; None where that log was not given.
     """
 
     answer: Answer
-    measurement: Measurement
+    measurements: Sequence[Measurement]
     always: Always | None
 
     def to_json(self) -> dict:
@@ -36,8 +36,9 @@ class Inference:
         kernels = self.always.kernels if self.always else ()
         return {
             **self.answer.to_json(),
-            "robot_id": self.measurement.track.robot_id,
-            "log": self.measurement.log_name,
+            "robot_id": self.measurements[0].track.robot_id,
+            "log": self.measurements[0].log_name,
+            "logs": [m.log_name for m in self.measurements],
             "always": {
                 "effects": list(self.always.effects) if self.always else [],
                 "depends_on": [{"name": name, "size": size} for name, size in kernels],
@@ -52,32 +53,37 @@ def infer(
     own: Sequence[Measurement | SteadyTable] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Inference:
-    """Probabilities of what a model lacks, from one robot in one log.
+    """Probabilities of what a model lacks, from one robot in one log or several.
 
     Args:
-        measurements: of the log.
+        measurements: of the logs, which are judged together.
         model_file: the model.
-        own: of the log that the model was fitted to: what it misses there, too, is no news.
+        own: of the logs that the model was fitted to: what it misses there, too, is no news.
         progress: told in words what is being done.
 
     Raises:
-        LogError: these are several robots or logs, or a table.
+        LogError: these are several robots, or tables.
     """
-    measurement = _single(measurements, "the log")
+    runs = _of_one_robot(measurements, "the logs hold")
     always = None
     if own:
         progress("what the model misses in its own log")
-        always = always_of(_single(own, "the model's own log"), model_file)
-    problem = problem_of(measurement, model_file, always)
+        always = always_of(_of_one_robot(own, "the model's own logs hold"), model_file)
+    problem = problem_of(runs, model_file, always)
     search = Search(problem, progress).run()
-    return Inference(answer(table_of(search)), measurement, always)
+    return Inference(answer(table_of(search)), runs, always)
 
 
-def _single(measurements: Sequence[Measurement | SteadyTable], what: str) -> Measurement:
-    if len(measurements) != 1 or not isinstance(measurements[0], Measurement):
-        of = "a table of steady speeds" if len(measurements) == 1 else f"{len(measurements)} robots"
-        raise LogError(
-            f"infer: {what} holds {of}, and one robot's commands and poses are judged at a time; "
-            "give a log of one robot, or use diagnose, which judges several."
-        )
-    return measurements[0]
+def _of_one_robot(measurements: Sequence[Measurement | SteadyTable], who: str) -> list[Measurement]:
+    runs = [m for m in measurements if isinstance(m, Measurement)]
+    robots = sorted({m.track.robot_id for m in runs})
+    if len(runs) < len(measurements):
+        of = "a table of steady speeds"
+    elif len(robots) > 1:
+        of = f"{len(robots)} robots (R{robots[0]:02d} to R{robots[-1]:02d})"
+    else:
+        return runs
+    raise LogError(
+        f"infer: {who} {of}, and one robot's commands and poses are judged at a time; "
+        "give logs of one robot, or use diagnose, which judges several."
+    )

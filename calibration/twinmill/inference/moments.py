@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Spike and slab over half seconds: something else happens at few moments of a log."""
+"""Spike and slab over short stretches of time: something else happens at few moments of a log."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,12 @@ from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 
 MOMENTS = "moments"  # the word that an answer says
-LENGTH_S = 0.5
+BIN_S = 0.5
+LENGTHS = (1, 2, 4)  # bins that a moment may last
+WAYS = (  # travel and turns alike, or each of four numbers by itself
+    np.array([[1.0], [1.0], [0.0], [0.0]]),
+    np.eye(4),
+)
 MOST = 32  # moments that are let in, one by one: more are no moments
 SPREAD = 10.0  # pseudo-observations behind the expected share of moments: known to a factor of two
 
@@ -38,14 +43,32 @@ class Rate:
 
 
 def columns(m: Motion) -> np.ndarray:
-    """(B, k, W, 3) displacements by a gain or a push of usual size in each half second."""
-    number = np.floor((m.t_s - m.t_s[0]) / LENGTH_S).astype(int)
+    """(B + 1, 4, W, 3) displacements by a gain or a push of usual size up to each of the bins.
+
+    A moment's columns are the difference of two of these.
+    """
+    number = np.floor((m.t_s - m.t_s[0]) / BIN_S).astype(int)
     moves = m.moves[:, None] * m.usual
-    ways = [
+    ways = PRIORS.sudden * np.array([
         m.moved * (1, 1, 0), m.moved * (0, 0, 1), moves * (0, 1, 0), moves * (0, 0, 1),
-    ]  # fmt: skip
-    bins = [(number == n)[:, None] for n in np.unique(number)]
-    return PRIORS.sudden * np.array([[on * way for way in ways] for on in bins])
+    ])  # fmt: skip
+    bins = np.unique(number)
+    before = number[None] < np.r_[bins, bins[-1] + 1][:, None]
+    return before[:, None, :, None] * ways
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One moment that was let in.
+
+    Attributes:
+        begin, end: numbers of its first bin and of the bin after it.
+        white: (k, R) whitened columns.
+    """
+
+    begin: int
+    end: int
+    white: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -53,13 +76,13 @@ class Found:
     """Moments let in, likeliest first.
 
     Attributes:
-        gains: (n + 1,) gain in log evidence with the first so many on, chances left out.
-        on: numbers of the moments.
-        count: of all moments.
+        gains: (n + 1,) gain in log evidence with the first so many on, their chances left out.
+        on: the moments.
+        count: number of bins.
     """
 
     gains: np.ndarray
-    on: tuple[int, ...]
+    on: tuple[Moment, ...]
     count: int
 
     def log_evidence(self, rate: Rate) -> float:
@@ -78,7 +101,12 @@ class Found:
 
     def by_number(self, rate: Rate) -> np.ndarray:
         """(n + 1,) gain in log evidence with so many on."""
-        return self.gains + rate.log_chance(np.arange(len(self.gains)), self.count)
+        return self.gains + self.log_chance(rate)
+
+    def log_chance(self, rate: Rate) -> np.ndarray:
+        """(n + 1,) log prior of just the first so many, each of its length and in its way."""
+        on = np.arange(len(self.gains))
+        return rate.log_chance(on, self.count) - on * np.log(len(LENGTHS) * len(WAYS))
 
 
 def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> Found:
@@ -86,27 +114,43 @@ def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> F
 
     Args:
         linear: the model beside which they are.
-        white: (B, k, R) whitened columns.
-        gram: (B k, B k) their products.
+        white: (B + 1, 4, R) whitened columns, as of `columns`.
+        gram: (4 B + 4, 4 B + 4) their products.
         worth: least gain in log evidence of a further moment.
     """
-    count, k = white.shape[:2]
-    flat = white.reshape(count * k, -1)
-    gram, push = linear.projected(flat, gram)
-    place = np.arange(count)[:, None] * k + np.arange(k)
-    gains, on, every = [0.0], [], np.arange(count)
+    nodes = len(white)
+    gram, push = linear.projected(white.reshape(nodes * 4, -1), gram)
+    gram, push = gram.reshape(nodes, 4, nodes, 4), push.reshape(nodes, 4)
+    gains, on = [0.0], []
     for _ in range(MOST):
-        own = gram.reshape(count, k, count, k)[every, :, every] + np.eye(k)
-        solved = np.linalg.solve(own, push[place][..., None])[..., 0]
-        each = 0.5 * (push[place] * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(own)[1]
-        each[on] = -np.inf
-        best = int(np.argmax(each))
-        if each[best] < worth:
+        each = [
+            (*_best(gram, push, length, way), length, way)
+            for length in LENGTHS
+            if length < nodes
+            for way in WAYS
+        ]
+        gain, begin, length, way = max(each, key=lambda e: e[0])
+        if gain - np.log(len(LENGTHS) * len(WAYS)) < worth:
             break
-        gains.append(gains[-1] + float(each[best]))
-        on.append(best)
-        column = gram[:, place[best]]
-        inverse = np.linalg.inv(own[best])
-        push = push - column @ (inverse @ push[place[best]])
-        gram = gram - column @ inverse @ column.T
-    return Found(np.array(gains), tuple(on), count)
+        end = begin + length
+        gains.append(gains[-1] + gain)
+        on.append(Moment(begin, end, way.T @ (white[end] - white[begin])))
+        column = (gram[:, :, end] - gram[:, :, begin]) @ way
+        own = way.T @ (column[end] - column[begin]) + np.eye(way.shape[1])
+        spread = column @ np.linalg.inv(own)
+        push = push - spread @ (way.T @ (push[end] - push[begin]))
+        gram = gram - np.tensordot(spread, column, (2, 2))
+    return Found(np.array(gains), tuple(on), nodes - 1)
+
+
+def _best(gram: np.ndarray, push: np.ndarray, length: int, way: np.ndarray) -> tuple[float, int]:
+    """Gain in log evidence by the best moment of a length, and its first bin."""
+    a = np.arange(len(push) - length)
+    b = a + length
+    own = gram[b, :, b] - gram[a, :, b] - gram[b, :, a] + gram[a, :, a]
+    own = way.T @ own @ way + np.eye(way.shape[1])
+    pushed = (push[b] - push[a]) @ way
+    solved = np.linalg.solve(own, pushed[..., None])[..., 0]
+    gains = 0.5 * (pushed * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(own)[1]
+    best = int(np.argmax(gains))
+    return float(gains[best]), best

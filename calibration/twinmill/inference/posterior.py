@@ -15,8 +15,10 @@ from scipy.special import logsumexp
 from twinmill.inference.search import log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Entry, Table, subsets
+from twinmill.model.parameters import catalogue_name, lasts_for_a_while
 
 DRAWS = 400  # of blocks
+AGAIN = "time"  # what a thing depends on that comes and goes
 
 
 @dataclass(frozen=True)
@@ -24,20 +26,19 @@ class Belief:
     """One hypothesis and its probability.
 
     Attributes:
-        effects: of the catalogue that are missing.
+        effects: of the catalogue that are missing, each kind once.
         mimicked: effects in whose place one unnamed thing is; empty if none is.
+        entry: of the table.
         stale: the base is known no better than a data sheet.
         words: dependences.
         probability: of it.
-        fall: of the squares by the dependence.
     """
 
     effects: tuple[str, ...]
     mimicked: tuple[str, ...]
-    stale: bool
     words: tuple[str, ...]
+    entry: Entry
     probability: float
-    fall: float
 
     @property
     def nothing(self) -> bool:
@@ -69,17 +70,21 @@ def beliefs(table: Table) -> list[Belief]:
     drawn = np.random.default_rng(0).dirichlet(np.ones(count), DRAWS) * count
     each = blocks @ drawn.T + rest[:, None]
     p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
-    return [
-        Belief(
-            tuple(n for n in e.effects if n not in mimicked),
-            mimicked,
-            e.stale,
-            e.words,
-            float(v),
-            e.fall,
-        )
-        for (mimicked, _, e), v in zip(rows, p, strict=True)
-    ]
+    return [_belief(mimicked, e, float(v)) for (mimicked, _, e), v in zip(rows, p, strict=True)]
+
+
+def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float) -> Belief:
+    """What comes again after a while is no effect of the catalogue, but depends on time."""
+    kinds = [catalogue_name(n) for n in entry.effects]
+    again = {n for n in kinds if kinds.count(n) > 1 and lasts_for_a_while(n)}
+
+    def once(effects) -> tuple[str, ...]:
+        return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in again)
+
+    words = (AGAIN, *entry.words) if again and AGAIN not in entry.words else entry.words
+    real = once(n for n in entry.effects if n not in mimicked)
+    like = tuple(n for n in once(mimicked) if n not in real)
+    return Belief(real, like, words, entry, probability)
 
 
 def _rows(entry: Entry, table: Table) -> list[tuple[tuple[str, ...], float, Entry]]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One robot in one log, ready for inference: errors, prior, noise, and all that may be missing."""
+"""One robot, ready for inference: errors, prior, noise, and all that may be missing."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,11 +19,12 @@ from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Noise, first_noise, fit_noise, weights_of
 from twinmill.inference.prior import Always, Prior, base_prior, with_always
 from twinmill.inference.settings import PRIORS
-from twinmill.inference.steps import Motion, Steps, motion_of
+from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK, LAG
+from twinmill.model.parameters import CLOCK, LAG, is_local
 
 CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between two commands
+FINE_GRID_S = np.arange(-0.05, 0.0501, 0.002)  # about that, where logs are set side by side
 CLOCK_REACH_S = 0.3  # about the best of the grid
 FLEXIBLE = 0.05  # gain error of each kernel while noise is looked for first
 SEEN = 0.5  # information in units of the prior, below which a direction says nothing of the noise
@@ -39,7 +41,7 @@ class View:
         stacked: (sum of K, R) their white columns.
         parts: of each kernel in these.
         grams: of each kernel, (K, K) products.
-        moments: (B, k, R) white columns, and (B k, B k) their products.
+        moments: white columns of moments, and their products, as `moments.find` takes them.
         log_size: of the noise.
         block: (R,) number of the block of time of each white row.
     """
@@ -60,10 +62,10 @@ class View:
 
 @dataclass(frozen=True)
 class Problem:
-    """One robot in one log.
+    """One robot in one log or several.
 
     Attributes:
-        steps: of the log.
+        steps: of the logs.
         motion: as the base predicts it.
         prior: of the base.
         base: fitted, nothing missing.
@@ -102,14 +104,17 @@ class Problem:
         )
 
     def columns(self, h: Hypothesis) -> dict[str, Candidate]:
-        """What each effect that a hypothesis lacks would change; the base at its prior mean."""
+        """What each effect that a hypothesis lacks would change; the base at its prior mean.
+
+        What acts at a place or for a while may be there more than once.
+        """
         model = h.model.copy()
         for label, named, mean in zip(h.labels, h.named, h.mean, strict=True):
             if named and label in self.prior.names and not label.startswith("clock."):
                 model.set(label, float(mean))
         found = {}
         for name in self.names:
-            if name not in h.effects:
+            if name not in h.effects or is_local(name):
                 try:
                     found[name] = candidates.candidate(name, model, self.steps)
                 except ValueError:  # this model cannot have it
@@ -118,33 +123,35 @@ class Problem:
 
 
 def problem_of(
-    measurement: Measurement,
+    measurements: Sequence[Measurement],
     model_file: ModelFile,
     always: Always | None = None,
     sheet: bool = False,
 ) -> Problem:
-    """Prepares a log.
+    """Prepares the logs of a robot.
 
     Args:
-        measurement: of one robot.
+        measurements: of one robot, one for each log.
         model_file: its base model.
         always: what the model misses in the log that it was fitted to.
         sheet: nothing of the base is known but a data sheet.
     """
-    measurement = measurement.punctual()
+    measurements = [m.punctual() for m in measurements]
     whole = model_file.model
     if whole.drive == "duty":
         whole = refined(model_file).model
-    model = whole.for_robot(measurement.track.robot_id)
+    model = whole.for_robot(measurements[0].track.robot_id)
     for name in always.effects if always else ():
         model.add_effect(name)
-    known = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
-    known = known and not measurement.two_clocks
-    if measurement.same_clock and not known:
+    known = model.clock_known and not any(
+        m.two_clocks or m.log_sha256 in model_file.clock_logs for m in measurements
+    )
+    one_clock = all(m.same_clock for m in measurements)
+    if one_clock and not known:
         model.set(CLOCK, 0.0)
-    declared = measurement.same_clock or model.clock_same
-    same_clock = (known or declared) and measurement.lateness is None
-    steps = Steps(measurement)
+    declared = one_clock or model.clock_same
+    same_clock = (known or declared) and all(m.lateness is None for m in measurements)
+    logs = [StepsOfLog(m) for m in measurements]
     prior = base_prior(
         model,
         model_file,
@@ -155,7 +162,8 @@ def problem_of(
     if sheet:
         prior = replace(prior, cov=prior.stale)
     if not same_clock:
-        prior = _with_clock(prior, model, steps)
+        prior, logs = _with_clock(prior, model, logs)
+    steps = Steps(logs)
     if always is not None:
         _set_to(model, prior, always)
     motion = _motion(steps, model, always)
@@ -164,7 +172,7 @@ def problem_of(
         prior = with_always(prior, always, found)
     noise = _begin_noise(steps, model_file, always)
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
-    names = candidates.candidates(model, measurement.track, same_clock, declared)
+    names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always else None
     rough = Problem(steps, motion, prior, base, found, names, rate, noise)
     noise = _flexible_noise(rough)
@@ -180,18 +188,29 @@ def _set_to(model: native.Model, prior: Prior, always: Always) -> None:
             model.set(name, float(np.clip(known[name], low, high)))
 
 
-def _with_clock(prior: Prior, model: native.Model, steps: Steps) -> Prior:
-    """The prior about the offset of the clocks at which the errors are least."""
-    grid = CLOCK_GRID_S + model.get(CLOCK)
-    errors = steps.errors(model, [CLOCK], grid[:, None])
-    size = np.sqrt((errors**2).mean(axis=(0, 1)))
-    size = np.where(size > 0, size, 1.0)
-    best = float(grid[np.argmin(((errors / size) ** 2).sum(axis=(1, 2)))])
+def _with_clock(
+    prior: Prior, model: native.Model, logs: list[StepsOfLog]
+) -> tuple[Prior, list[StepsOfLog]]:
+    """The prior about the offset of the first log's clocks, and each log with its own beside it."""
+    each = [_least_s(model, log, CLOCK_GRID_S + model.get(CLOCK)) for log in logs]
+    best = each[0]
+    if len(logs) > 1:
+        each = [_least_s(model, log, at + FINE_GRID_S) for log, at in zip(logs, each, strict=True)]
+        best = each[0]
+        logs = [StepsOfLog(log.measurement, at - best) for log, at in zip(logs, each, strict=True)]
     k = prior.names.index(CLOCK)
     mean, low, high = prior.mean.copy(), prior.low.copy(), prior.high.copy()
     mean[k], low[k], high[k] = best, best - CLOCK_REACH_S, best + CLOCK_REACH_S
     model.set(CLOCK, best)
-    return replace(prior, mean=mean, low=low, high=high)
+    return replace(prior, mean=mean, low=low, high=high), logs
+
+
+def _least_s(model: native.Model, log: StepsOfLog, grid_s: np.ndarray) -> float:
+    """Offset of the clocks at which the errors of a log are least."""
+    errors = log.errors(model, [CLOCK], grid_s[:, None])
+    size = np.sqrt((errors**2).mean(axis=(0, 1)))
+    size = np.where(size > 0, size, 1.0)
+    return float(grid_s[np.argmin(((errors / size) ** 2).sum(axis=(1, 2)))])
 
 
 def _motion(steps: Steps, model: native.Model, always: Always | None) -> Motion:

@@ -6,7 +6,7 @@ effect more, one exchanged, one left out.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
@@ -14,10 +14,11 @@ from scipy.special import log_ndtr, logsumexp
 from twinmill.inference.candidates import Candidate
 from twinmill.inference.discrepancy import CHANCE, SIZES
 from twinmill.inference.evidence import Linear, gains_by_size
-from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.hypothesis import Hypothesis, next_of_kind
 from twinmill.inference.moments import MOMENTS
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.settings import PRIORS
+from twinmill.model.parameters import catalogue_name
 
 MOST = 4  # effects of a set
 FITTED = 6  # effects that are fitted beside the best set, by what each would gain alone ...
@@ -76,7 +77,7 @@ class Search:
             best = max(grown, key=lambda h: self._log_posterior(h.effects))
             if self._log_posterior(best.effects) < max(map(self._log_posterior, self.fitted)):
                 break
-            frontier = best
+            frontier = self.polished(best.effects)
         self.progress("exchanging effects")
         self._exchange()
         return self
@@ -85,13 +86,18 @@ class Search:
         """Sets of effects that were fitted, likeliest first."""
         return sorted(self.fitted, key=self._log_posterior, reverse=True)
 
+    def polished(self, effects: tuple[str, ...]) -> Hypothesis:
+        """A set fitted anew with all slopes where its numbers are now."""
+        self._keep(self.view.fitter.fit(replace(self.fitted[effects].hypothesis, slopes=None)))
+        return self.fitted[effects].hypothesis
+
     def _exchange(self) -> None:
         asked: set[tuple[tuple[str, ...], str]] = set()
         for _ in range(SETS):
             order = self.likely()
             least = self._log_posterior(order[0]) - NEAR
             for names in [k for k in order if self._log_posterior(k) > least][:SETS]:
-                for name in names if len(names) > 1 else ():
+                for name in _last_of_kinds(names) if len(names) > 1 else ():
                     if (names, name) not in asked:
                         asked.add((names, name))
                         self._grow(self._without(names, name), INSTEAD, 1, never=name)
@@ -124,7 +130,7 @@ class Search:
         grown = []
         for name in order:
             gain, start, grid = gains[name]
-            if gain < WORTH or tuple(sorted((*h.effects, name))) in known:
+            if gain < WORTH or tuple(sorted((*h.effects, next_of_kind(h.effects, name)))) in known:
                 continue
             found = self._fitted(h, columns[name], start, grid)
             self._keep(found)
@@ -142,7 +148,7 @@ class Search:
             for k in ("value", "usual", "min", "max")
         )
         best = found.log_evidence(found.linear(fitter.whiten))
-        for other in [start] if len(value) > 1 else [value, 2 * usual - value]:
+        for other in [start, value] if len(value) > 1 else [value, 2 * usual - value]:
             other = np.clip(other, low, high)
             if np.any(np.abs(other - usual) > 1e-12):
                 again = fitter.with_effect(h, c, other, grid=grid, told=True)
@@ -161,6 +167,12 @@ class Search:
         other = float((own.gains + np.log(CHANCE)).max()) - np.log(forms)
         best = max(np.log(1 - PRIORS.outside), np.log(PRIORS.outside) + other)
         return own.alone + log_prior_of_effects(len(names), len(self.problem.names)) + best
+
+
+def _last_of_kinds(names: tuple[str, ...]) -> list[str]:
+    """Effects that may be left out: of several of a kind the last."""
+    kind = {catalogue_name(name): name for name in names}
+    return list(kind.values())
 
 
 def log_prior_of_effects(count: int, candidates: int) -> float:
@@ -187,9 +199,12 @@ def evidence(
     if beside is not None and len(beside):
         linear = linear.with_columns(beside)
     taken = _taken(h, view)
-    inside = view.stacked @ taken.T
-    cross = view.stacked @ linear.basis.T - inside @ (taken @ linear.basis.T)
-    push = view.stacked @ linear.y - inside @ (taken @ linear.y) - cross @ linear.half
+    # one product: the columns are long, and reading them takes the time
+    rows = np.concatenate([linear.basis, taken, linear.y[None]])
+    products = view.stacked @ rows.T
+    cross, inside, push = np.split(products, [len(linear.basis), len(rows) - 1], axis=1)
+    cross = cross - inside @ (taken @ linear.basis.T)
+    push = push[:, 0] - inside @ (taken @ linear.y) - cross @ linear.half
     each = []
     for part, gram in zip(view.parts, view.grams, strict=True):
         own = np.concatenate([cross[part], inside[part]], axis=1)

@@ -22,7 +22,7 @@ class Priors(Numbers):
     )
     moments: float = number(0.05, "expected share of half seconds in which something happens")
     sudden: float = number(0.5, "gain error at such a moment; push over the usual speed")
-    sure: float = number(0.95, "posterior probability from which an answer is called sure")
+    sure: float = number(0.9, "posterior probability from which an answer is called sure")
     member: float = number(0.05, "posterior probability from which a name belongs to a group")
 
 

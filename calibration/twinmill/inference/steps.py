@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prediction errors over short steps of a log, and what happened during each step."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -19,18 +20,70 @@ class Steps:
     """Displacements over W steps that do not overlap, seen from the pose at each start.
 
     The covariance of their errors can be written down (`noise`): white noise of the poses enters as
-    a difference, a disturbance of the velocity with its memory.
+    a difference, a disturbance of the velocity with its memory. Steps of several logs stand one
+    after the other.
 
     Attributes:
+        logs: of one robot, each with its steps.
         stretches: slices of steps that follow each other without a gap.
-        t_s, step_s: (W,) middle and length of each step, on the capture's clock.
+        t_s, step_s: (W,) middle and length of each step, on the capture's clock; a further log
+            follows the one before it.
         place, heading: (W, 2) m and (W,) rad in the middle of each step.
         block: (W,) number of the block of time.
         observed: (3,) channels (forward, left, turn) that were measured.
     """
 
-    def __init__(self, measurement: Measurement) -> None:
-        self.measurement = measurement
+    def __init__(self, logs: Sequence["StepsOfLog"]) -> None:
+        self.logs = logs
+        self.step_s = np.concatenate([log.step_s for log in logs])
+        self.place = np.concatenate([log.place for log in logs])
+        self.heading = np.concatenate([log.heading for log in logs])
+        self.observed = np.all([log.observed for log in logs], axis=0)
+        first = np.cumsum([0, *(len(log.t_s) for log in logs)])
+        self.stretches = [
+            slice(part.start + begin, part.stop + begin)
+            for log, begin in zip(logs, first, strict=False)
+            for part in log.stretches
+        ]
+        length_s = min(BLOCK_S, sum(np.ptp(log.t_s) for log in logs) / FEWEST_BLOCKS)
+        begin_s, block = logs[0].t_s[0], -1
+        t_s, blocks = [], []
+        for log in logs:
+            span_s = log.t_s - log.t_s[0]
+            t_s.append(span_s + begin_s)
+            number = np.maximum(np.floor(span_s / length_s - 1e-9), 0).astype(int)
+            blocks.append(number + block + 1)
+            begin_s, block = t_s[-1][-1] + BLOCK_S, blocks[-1][-1]
+        self.t_s, self.block = np.concatenate(t_s), np.concatenate(blocks)
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def errors(self, model: native.Model, names=(), values=None) -> np.ndarray:
+        """(B, W, 3) m and rad measured less predicted, for B rows of values of named quantities.
+
+        Without names (1, W, 3) of the model as it stands.
+        """
+        each = [log.errors(model, names, values) for log in self.logs]
+        return np.concatenate(each, axis=1) * self.observed
+
+    def predicted(self, model: native.Model) -> np.ndarray:
+        """(W, 3) displacements in m and rad that a model predicts."""
+        measured = np.concatenate([log.measured[:, 0] for log in self.logs])
+        return measured - self.errors(model)[0]
+
+
+class StepsOfLog:
+    """Steps of one log; see `Steps`.
+
+    Attributes:
+        measurement: of the log.
+        late_s: offset of its clocks over that of the model.
+        measured: (W, 1, 3) displacements in m and rad.
+    """
+
+    def __init__(self, measurement: Measurement, late_s: float = 0.0) -> None:
+        self.measurement, self.late_s = measurement, late_s
         track = measurement.track
         self._starts, self._ends, self.stretches = _cut(track)
         start, end = track.pose[self._starts], track.pose[self._ends]
@@ -41,40 +94,34 @@ class Steps:
         smooth_rad = track.heading_smooth[self._starts]
         self.heading = (start[:, 2] + end[:, 2]) / 2 if track.has_heading else smooth_rad
         self._start = np.column_stack([start[:, :2], smooth_rad])
-        self._measured = np.column_stack([_ahead(end - start, smooth_rad), np.zeros(len(start))])
+        measured = np.column_stack([_ahead(end - start, smooth_rad), np.zeros(len(start))])
         if track.has_heading:  # from reading to reading, so that its noise is a difference as well
-            self._measured[:, 2] = end[:, 2] - start[:, 2]
-        span_s = self.t_s - self.t_s[0]
-        length_s = min(BLOCK_S, span_s[-1] / FEWEST_BLOCKS)
-        self.block = np.maximum(np.floor(span_s / length_s - 1e-9), 0).astype(int)
-
-    def __len__(self) -> int:
-        return len(self.t_s)
+            measured[:, 2] = end[:, 2] - start[:, 2]
+        self.measured = measured[:, None]
 
     def errors(self, model: native.Model, names=(), values=None) -> np.ndarray:
-        """(B, W, 3) m and rad measured less predicted, for B rows of values of named quantities.
-
-        Without names (1, W, 3) of the model as it stands.
-        """
+        """(B, W, 3) as of `Steps`."""
         names = list(names) or [CLOCK]
         values = np.array([[model.get(CLOCK)]]) if values is None else np.atleast_2d(values)
-        measured = self._measured[:, None].copy()
+        values = np.array(values, float)
+        if self.late_s and CLOCK in names:
+            values[:, names.index(CLOCK)] += self.late_s
+        elif self.late_s:
+            model = model.copy()
+            model.set(CLOCK, model.get(CLOCK) + self.late_s)
+        measured = self.measured.copy()
         found = native.window_errors(
             model,
             self.measurement.started,
             self._starts,
             self._ends[:, None].copy(),
             names,
-            np.asarray(values, float),
+            values,
             self._start,
             measured,
             np.ones_like(measured),
         )
-        return found.reshape(len(values), len(self), 3) * self.observed
-
-    def predicted(self, model: native.Model) -> np.ndarray:
-        """(W, 3) displacements in m and rad that a model predicts."""
-        return self._measured - self.errors(model)[0]
+        return found.reshape(len(values), len(self.t_s), 3)
 
 
 def _cut(track) -> tuple[np.ndarray, np.ndarray, list[slice]]:

@@ -15,7 +15,7 @@ from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
-from twinmill.model.parameters import effect_names, newest_instance
+from twinmill.model.parameters import effect_names
 
 COMPARED = 10  # sets of the table ...
 WHOLE = 4  # ... of which so many also with a stale base and with two dependences
@@ -83,15 +83,16 @@ def table_of(search: Search) -> Table:
     kept = list(dict.fromkeys([(), *order[:COMPARED], *inside]))
     whole = {(), *order[:WHOLE]}
     views = [search.view]
-    for h in dict.fromkeys([(), order[0]]):
+    fitted = {names: search.polished(names) for names in kept}
+    for names in dict.fromkeys([(), order[0]]):
         search.progress("noise")
-        views.append(p.view(noise_of(search.fitted[h].hypothesis, p)))
+        views.append(p.view(noise_of(fitted[names], p)))
     entries: dict[tuple, Entry] = {}
     falls: dict[tuple, float] = {}  # under the first noise, as the excess is
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
     for names in kept:
         search.progress("comparing hypotheses")
-        h = search.fitted[names].hypothesis
+        h = fitted[names]
         changes = _changes(p, h)
         within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
         for view in views:
@@ -136,8 +137,8 @@ class _Beside:
         log_relative: (M,) log prior of its size where it is what the form of each of `subsets`
             leaves, over that of a thing of its own.
         cov: prior covariance of a stale base; None for what is known.
-        local: (B,) what moments add to the density of the blocks in which they are, less what
-            the fit of their columns adds: where a block counts less, so does what it cost.
+        local: (B,) what moments cost the evidence, in the blocks in which they are: where a block
+            counts less, so does the price of what happened in it.
     """
 
     words: tuple[str, ...]
@@ -209,25 +210,24 @@ class _Comparison:
         beside = []
         for rate, words in ((self.problem.rate, ()), (Rate(), (MOMENTS,))):
             on = found.on[: found.likeliest(rate)] if rate else ()
-            chance = float(rate.log_chance(np.array(len(on)), found.count)) if rate else 0.0
-            white = self.view.moments[0][list(on)].reshape(-1, len(self.view.block))
+            chance = float(found.log_chance(rate)[len(on)]) if rate else 0.0
+            white = np.concatenate([np.zeros((0, len(bare.y))), *(m.white for m in on)])
             fall = 2 * float(found.gains[len(on)])
             relative = self._log_relative(np.array(fall))
-            local = self._local(bare, white, found, on, chance=chance)
+            local = self._price(bare, white, on, chance)
             beside.append(_Beside(words, white, chance, fall, relative, cov, local))
         return beside[0], beside[1]
 
-    def _local(
-        self, bare: Linear, white: np.ndarray, found: moments.Found, on, *, chance: float
-    ) -> np.ndarray:
-        """(B,) what moments add to the density of their blocks once they are integrated out."""
-        count, block = self.view.block.max() + 1, self.view.block
+    def _price(self, bare: Linear, white: np.ndarray, on, chance: float) -> np.ndarray:
+        """(B,) change of the evidence by moments less that of the density, in their blocks."""
+        block, count = self.view.block, self.view.block.max() + 1
         if not len(on):
             return np.zeros(count)
-        rows = [np.argmax(np.abs(self.view.moments[0][b]).max(axis=0)) for b in on]
-        net = np.diff(found.gains)[: len(on)] + chance / len(on)
-        fitted = bare.with_columns(white).log_densities(block) - bare.log_densities(block)
-        return np.bincount(block[rows], net, minlength=count) - fitted
+        linear = bare.with_columns(white)
+        density = linear.log_densities(block).sum() - bare.log_densities(block).sum()
+        price = linear.log_evidence + chance - bare.log_evidence - density
+        rows = [np.argmax(np.abs(m.white).max(axis=0)) for m in on]
+        return np.bincount(block[rows], minlength=count) * price / len(on)
 
     def _likeliest(self, usual: _Beside, own: Evidence) -> _Beside:
         """The likeliest form and size of a dependence, as something that is there as well."""
@@ -331,6 +331,6 @@ def _changes(p: Problem, h: Hypothesis) -> np.ndarray:
     found = []
     for name in h.effects:
         model = h.model.copy()
-        model.remove_effect(effect_names(model).index(newest_instance(model, name)))
+        model.remove_effect(effect_names(model).index(h.instance(name)))
         found.append(p.steps.errors(model)[0] - p.steps.errors(h.model)[0])
     return np.array(found).reshape(-1, len(p.steps), 3)

@@ -84,21 +84,36 @@ def test_chances_of_all_sets_of_moments_add_up_to_one():
 
 
 def test_two_moments_of_a_shift_are_found_and_no_third():
-    """White errors of unit size, shifted by 8 in two of thirty stretches of five rows."""
+    """White errors of unit size, shifted in bins 4 and 20 to 21 of thirty bins of five rows."""
     random = np.random.default_rng(3)
     y = random.normal(size=150)
-    white = np.zeros((30, 1, 150))
-    for b in range(30):
-        white[b, 0, 5 * b : 5 * b + 5] = 8.0
+    white = np.zeros((31, 4, 150))
+    for b in range(31):
+        white[b, 0, : 5 * b] = 8.0
     y[20:25] += 8.0
-    y[100:105] -= 8.0
-    flat = white.reshape(30, -1)
+    y[100:110] -= 8.0
+    flat = white.reshape(31 * 4, -1)
     found = moments.find(Linear.of(y, np.zeros((1, 150))), white, flat @ flat.T, 1.5)
-    assert set(found.on[: found.likeliest(Rate())]) == {4, 20}
+    on = found.on[: found.likeliest(Rate())]
+    assert {(m.begin, m.end) for m in on} == {(4, 5), (20, 22)}
     assert found.after(0.05).there > 0.95
     quiet = moments.find(Linear.of(random.normal(size=150), np.zeros((1, 150))), white,
                          flat @ flat.T, 1.5)  # fmt: skip
     assert quiet.after(0.05).there < 0.05
+
+
+def test_the_gain_of_moments_is_that_of_their_columns():
+    """What the greedy search adds up is the evidence with all columns at once."""
+    random = np.random.default_rng(5)
+    white = random.normal(size=(31, 4, 150)).cumsum(axis=0)
+    flat = white.reshape(31 * 4, -1)
+    y = random.normal(size=150) + 3 * (white[8, 1] - white[6, 1]) + white[20, 3] - white[19, 3]
+    linear = Linear.of(y, random.normal(size=(2, 150)))
+    found = moments.find(linear, white, flat @ flat.T, 1.5)
+    assert len(found.on) >= 2
+    together = linear.with_columns(np.concatenate([m.white for m in found.on]))
+    gain = together.log_evidence - linear.log_evidence
+    assert found.gains[-1] == pytest.approx(gain)
 
 
 def motion(count=300):
