@@ -10,7 +10,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Model
+from twinmill_cli.options import Force, Model
 from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
@@ -19,7 +19,9 @@ if working():  # not for --help
     import twinmill_native as native
     from threadpoolctl import threadpool_limits
 
+    from twinmill.files import check_new_file
     from twinmill.inference.infer import Inference, infer
+    from twinmill.inference.kept import with_kept
     from twinmill_cli.frame import command_line, load, open_model, provenance, told
 
 
@@ -37,6 +39,7 @@ def _infer(
             help="Logs with commands and poses of one robot, which are judged together.",
         ),
     ],
+    *,
     model: Model = DEFAULT_MODEL,
     own: Annotated[
         list[Path] | None,
@@ -48,6 +51,16 @@ def _infer(
             "is no news.",
         ),
     ] = None,
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            "--keep",
+            metavar="FILE",
+            show_default=False,
+            help="Write the model with what it misses in --own, which later logs then do without.",
+        ),
+    ] = None,
+    force: Force = False,
     as_json: AsJson = False,
 ) -> Inference:
     """Give the probability of each effect that a model may lack, and of something nameless.
@@ -57,14 +70,24 @@ def _infer(
     evidence. Sure means 90 % or more.
 
     Example: twinmill infer run.lcmlog --model fitted.toml --own calibration.lcmlog
+
+    With --keep known.toml the model is written with what it misses in its own
+    log: later, `twinmill infer other.lcmlog --model known.toml` is enough.
     """
     native.keep_memory()  # what the work frees it wants again
-    verb = shlex.join(["infer", *(word for path in own or () for word in ("--own", str(path)))])
+    words = [word for path in own or () for word in ("--own", str(path))]
+    verb = shlex.join(["infer", *words, *(["--keep", str(keep)] if keep else [])])
     source = provenance(command_line(verb, logs, model), model_file := open_model(model, None))
+    if keep is not None and not own:
+        raise ValueError("infer: --keep keeps what --own tells; give the model's own log, too.")
+    if keep is not None:
+        check_new_file(keep, force, [model_file.path, *logs, *own])
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
         measurements = load(logs, model_file)
         before = load(own, model_file) if own else ()
         result = infer(measurements, model_file, before, progress)
+    if keep is not None:
+        with_kept(model_file, result.always, keep, source.command).write(force)
     data = {**result.to_json(), **told(measurements), **source.to_json()}
     if as_json:
         deliver(data, None, as_json)

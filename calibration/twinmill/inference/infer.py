@@ -9,6 +9,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
+from twinmill.inference.kept import kept
 from twinmill.inference.prior import Always
 from twinmill.inference.problem import problem_of
 from twinmill.inference.search import Search
@@ -24,7 +25,7 @@ class Inference:
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
         measurements: of the logs.
-        always: what the model misses in its own log, too; None where that log was not given.
+        always: what the model misses in its own logs, too; None where that is not known.
     """
 
     answer: Answer
@@ -59,13 +60,15 @@ def infer(
         measurements: of the logs, which are judged together.
         model_file: the model.
         own: of the logs that the model was fitted to: what it misses there, too, is no news.
+            Without them its file may tell that.
         progress: told in words what is being done.
 
     Raises:
         LogError: these are several robots, or tables.
+        ModelError: what the file keeps cannot be read.
     """
     runs = _of_one_robot(measurements, "the logs hold")
-    always = None
+    always = kept(model_file)
     if own:
         progress("what the model misses in its own log")
         always = always_of(_of_one_robot(own, "the model's own logs hold"), model_file)

@@ -280,7 +280,8 @@ class _Comparison:
                 mimicked = beside.log_relative
             else:
                 relative = self._log_relative(own.falls[at])
-                mimicked = np.array([logsumexp(gains + r) - total for r in relative])
+                each = (gains + relative).reshape(len(relative), gains.size)
+                mimicked = np.logaddexp.reduce(each, axis=1) - total
             f, s = np.unravel_index(likely.argmax(), likely.shape)
             linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
             out.append(

@@ -157,6 +157,11 @@ class ModelFile:
         return float(self._document.get("fit", {}).get("noise_speed_mps", 0.0))
 
     @property
+    def fit(self) -> dict:
+        """What the last fit told: `logs`, scores, and tables that others keep there."""
+        return dict(self._document.get("fit", {}))
+
+    @property
     def covariance(self) -> Covariance:
         """Of what fits told; empty if there was none, or an older version wrote the file.
 

@@ -45,7 +45,7 @@ def terminal(result: Inference) -> RenderableType:
         parts.append(
             Text(
                 "What the model misses in the log that it was fitted to is not known, so it may be "
-                "told as news: give that log with --own."
+                "told as news: give that log with --own, and keep what it tells with --keep."
             )
         )
     elif result.always.kernels or result.always.effects:

@@ -15,9 +15,10 @@ from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.fit import fit
 from twinmill.inference.infer import infer
+from twinmill.inference.kept import kept, with_kept
 from twinmill.inference.problem import problem_of
 from twinmill.inference.steps import Steps, StepsOfLog
-from twinmill.model.model_file import ModelFile
+from twinmill.model.model_file import ModelError, ModelFile
 
 SURE = 0.9  # what docs/inference.md calls sure
 
@@ -84,9 +85,21 @@ def test_what_the_base_misses_in_its_own_log_is_no_news(
     base = ModelFile.load(str(path))
     news, known = infer([later], base), infer([later], base, [before])
     assert "yaw_lever" in known.always.effects  # its equation is the robot's
+    path = tmp_path_factory.mktemp("kept") / "known.toml"
+    with_kept(base, known.always, path, "").write()
+    from_file = infer([later], ModelFile.load(str(path)))
+    assert from_file.always.effects == known.always.effects
+    assert from_file.answer.nothing == pytest.approx(known.answer.nothing, abs=0.01)
     assert news.answer.nothing < 1e-6
     assert known.answer.nothing > 1e3 * news.answer.nothing
     assert not [f for f in known.answer.findings if f.certainty == "sure"]
+
+
+def test_a_damaged_table_of_what_is_missed_is_told_in_a_sentence(one_clock_base, tmp_path):
+    path = tmp_path / "damaged.toml"
+    path.write_text(one_clock_base.text + '\n[fit.always]\nlabels = ["base.yaw_gain"]\n')
+    with pytest.raises(ModelError, match=r"damaged.toml: \[fit.always\] cannot be read"):
+        kept(ModelFile.load(str(path)))
 
 
 def test_the_same_log_gives_the_same_bytes(measure, one_clock_base, own):

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a model misses in its own logs, kept in its file as [fit.always]."""
+
+from pathlib import Path
+
+import numpy as np
+import tomlkit
+import twinmill_native as native
+
+from twinmill.inference.moments import Rate
+from twinmill.inference.prior import Always
+from twinmill.model.model_file import ModelError, ModelFile
+
+DIGITS = 7  # of each number: the covariance is kept as its Cholesky factor, which stays one
+
+
+def kept(model_file: ModelFile) -> Always | None:
+    """What a file tells of its model; None if it tells nothing.
+
+    Raises:
+        ModelError: the table is not as `with_kept` writes it.
+    """
+    table = model_file.fit.get("always")
+    if table is None:
+        return None
+    try:
+        low = np.zeros((len(table["labels"]),) * 2)
+        for k, row in enumerate(table["cholesky"]):
+            low[k, : k + 1] = row
+        if len(table["mean"]) != len(low) or len(table["cholesky"]) != len(low):
+            raise ValueError(f"{len(low)} labels have {len(table['mean'])} means")
+        return Always(
+            effects=tuple(table["effects"]),
+            labels=tuple(table["labels"]),
+            mean=np.array(table["mean"], float),
+            cov=low @ low.T,
+            kernels=tuple((str(name), float(size)) for name, size in table["kernels"].items()),
+            rate=Rate(**table["rate"]),
+            usual=np.array(table["usual"], float),
+            top=np.array(table["top"], float),
+            noise=np.array(table["noise"], float),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(
+            f"{model_file.path}: [fit.always] cannot be read ({error}); take the table out, and "
+            "give the model's own log with --own."
+        ) from error
+
+
+def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -> ModelFile:
+    """A model's file with what it misses, as another file that is not written yet."""
+    document = tomlkit.parse(model_file.text)
+    document["parent"] = model_file.hash
+    document["created_by"] = command
+    low = np.linalg.cholesky(always.cov)
+    document.setdefault("fit", tomlkit.table())["always"] = {
+        "effects": list(always.effects),
+        "kernels": dict(always.kernels),
+        "rate": {k: _short([getattr(always.rate, k)])[0] for k in ("there", "on", "off")},
+        "usual": _short(always.usual),
+        "top": _short(always.top),
+        "noise": [_short(row) for row in always.noise],
+        "labels": list(always.labels),
+        "mean": _short(always.mean),
+        "cholesky": [_short(row[: k + 1]) for k, row in enumerate(low)],
+    }
+    text = tomlkit.dumps(document)
+    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+
+
+def _short(values) -> list[float]:
+    return [float(f"{value:.{DIGITS}g}") for value in values]
