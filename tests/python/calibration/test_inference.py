@@ -20,11 +20,13 @@ from twinmill.inference.problem import problem_of
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile
 
+from .conftest import STEP_S
+
 SURE = 0.9  # what docs/inference.md calls sure
 
 
 def number(found, effect, name):
-    (named,) = [f for f in found.answer.findings if f.effect == effect]
+    (named,) = [f for f in found.findings if f.effect == effect]
     return named.numbers[name]
 
 
@@ -63,9 +65,31 @@ def test_a_marker_beside_the_axle_is_named_with_its_place(measure, one_clock_bas
     assert first.effect == "marker_offset"
     assert first.probability > SURE
     for name, truth in (("x_m", 8e-3), ("y_m", 5e-3)):
-        value, std = number(found, "marker_offset", name)
+        value, std = number(found.answer, "marker_offset", name)
         assert abs(value - truth) < 3 * std
         assert std < 1e-3
+
+
+@pytest.mark.parametrize("begins_s", [(12.0,), (6.0, 24.0)], ids=["once", "again"])
+def test_a_loss_is_named_and_one_that_comes_again_depends_on_time(
+    measure, tanh_robot, one_clock_base, own, begins_s
+):
+    """15 % slower for 7 s, once or twice in 40 s."""
+
+    class Slower(tanh_robot):
+        def hindered(self, motion):
+            t_s = np.arange(len(motion)) * STEP_S
+            away = sum((t_s > begin) & (t_s < begin + 7.0) for begin in begins_s)
+            return motion * (1 - 0.15 * away)[:, None]
+
+    found = infer([measure(Slower(), 13)], one_clock_base, [own]).answer
+    if len(begins_s) == 1:
+        assert found.findings[0].effect == "transient_loss"
+        value, std = number(found, "transient_loss", "loss")
+        assert abs(value - 0.15) < 3 * std
+    else:
+        assert found.verdict == "outside_catalogue"
+        assert next(iter(found.depends_on)) == "time"
 
 
 def test_what_the_base_misses_in_its_own_log_is_no_news(
