@@ -133,3 +133,8 @@ def test_a_failure_that_quotes_a_file_cannot_rewrite_the_terminal(twinmill, tmp_
     table.write_text(f"{text},t_s\n1,2\n")
     code, out, err = twinmill("import", "--poses", table, "--commands", table, "-o", "x.lcmlog")
     assert code == 1 and not forbidden(out + err)
+
+
+def test_a_name_that_no_output_can_hold_is_refused(twinmill):
+    code, _, err = twinmill("compare", "run\udcff.lcmlog", "--model", "turbopi.toml")
+    assert code == 1 and "rename" in err and not forbidden(err)

@@ -32,6 +32,7 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     begin_telling()
     words = sys.argv[1:] or ["--help"]
     try:
+        _check_encoding(words)
         result = run(words)
         code = result if isinstance(result, int) else 0
     except KeyboardInterrupt:  # before the command, or after it
@@ -44,6 +45,13 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     if code == STOPPED and stopped:
         say(stopped, program)
     sys.exit(code)
+
+
+def _check_encoding(words: list[str]) -> None:
+    """Raises ValueError for a name that no page, model file, table or JSON could hold."""
+    for word in words:
+        if word != word.encode(errors="replace").decode():
+            raise ValueError(f"'{word}': this name is not in UTF-8; rename the file or folder.")
 
 
 def _told(error: Exception) -> tuple[int, str]:
