@@ -109,6 +109,28 @@ FAULTS = {
         ("there is no key here", "NOT ALL STAND: R01, R02: no stop was confirmed."),
         1,
     ),
+    "stop_without_standard_files": Fault(
+        "`swarm stop` without standard input, output and error (from its first packet)",
+        (),
+        0,
+        is_brief=True,
+    ),
+    "stop_of_a_host_that_is_not_there": Fault(
+        "`swarm stop --host` with a wrong address (from its first packet)",
+        ("NOT ALL STAND: Nothing was heard from 10.0.1.77",),
+        1,
+    ),
+    "stop_of_another_robot": Fault(
+        "`swarm stop --robots 1` while R02 drives, too (R01; from its first packet)",
+        ("R01 stands. R02 drives, and was not asked.",),
+        0,
+    ),
+    "untethered_and_one_hangs": Fault(
+        "R02 hangs in the countdown of `swarm start --untethered`, and goes on later",
+        ("Started at", "but not all: R02 did not in time, told to stop", "NOT ALL STAND: R02"),
+        1,
+        NEVER,
+    ),
     "markup_in_names": Fault(
         "a stranger says names with unfinished markup and escape sequences; Ctrl-C",
         ("Started at", "All stand."),

@@ -37,13 +37,17 @@ FAULTY = answer(6, mode="fault", alarms=["camera lost"])
 DOUBLE = answer(7, mode="stopped", stands=True, is_double=True)
 
 
-def begun(*answers: Answer, stopped=()) -> Start:
-    return Start(0, list(answers), {}, list(stopped))
+def begun(*answers: Answer, stopped=(), late=()) -> Start:
+    return Start(0, list(answers), {}, list(stopped), list(late))
 
 
 # What is said begins so, and the command ends with that code.
 SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
+    (of_stop([STANDS], is_of_some=True), "R02 stands.", 0),
+    (of_stop([STANDS], unheard=["robot9"]), "NOT ALL STAND: Nothing was heard from robot9", 1),
+    (of_stop([], unheard=["robot9"]), "No robot was heard in 10 s", 1),
+    (of_stop([STANDS], is_of_some=True).beside(["R01"]), "R02 stands. R01 drives, and was", 0),
     (of_stop([]), "No robot was heard in 10 s", 1),
     (of_stop([STANDS, GOOD]), "NOT ALL STAND: R01: no stop was confirmed.", 1),
     (of_stop([UNSIGNED, STANDS]), "NOT ALL STAND: R04: no stop was confirmed.", 1),
@@ -57,6 +61,7 @@ SENTENCES = [
     (of_start(begun(GOOD), untethered=True), "Started at", 0),
     (of_start(begun(REFUSED, GOOD), untethered=False), "Started at", 1),
     (of_start(begun(FAULTY, GOOD), untethered=False), "Started at", 1),
+    (of_start(begun(GOOD, STANDS, late=[STANDS]), untethered=True), "Started at", 1),
     (of_start(begun(REFUSED), untethered=False), "NOBODY STARTED: R03 refused", 1),
     (of_start(begun(REFUSED, stopped=[STANDS]), untethered=False), "Called off: R03 refused", 1),
     (

@@ -33,7 +33,7 @@ class State:
 
 
 DRIVES = State("drives", is_meant=True)
-WAITS = State("has accepted the start, and has not driven yet: is its clock behind?")
+WAITS = State("has accepted the start, and has not driven yet: its clock may be behind")
 DRIVES_ANEW = State("drives, though its program was started anew: it has autostart")
 SILENT = State("is not heard any more: nobody knows whether it stands")
 DOUBLE = State("is two robots of one number, or hears another: nobody knows which does what")
