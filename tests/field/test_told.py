@@ -68,7 +68,7 @@ FAULTS = {
     ),
     "driver_dies": Fault(
         "one robot's driver dies; then Ctrl-C",
-        ("R01 stands: its program was started anew.", "All stand, but R01: its program"),
+        ("R01 stands: its program was started anew.", "All stand; R01 stood before: its program"),
         1,
         is_brief=True,
     ),

@@ -55,8 +55,8 @@ def _take_standard_files() -> None:
     while (handle := os.open(os.devnull, os.O_RDWR)) <= STDERR:
         os.set_inheritable(handle, True)
     os.close(handle)
-    sys.stdout = sys.stdout or open(STDOUT, "w", closefd=False)
-    sys.stderr = sys.stderr or open(STDERR, "w", closefd=False)
+    sys.stdout = sys.stdout or io.TextIOWrapper(io.FileIO(STDOUT, "w", closefd=False))
+    sys.stderr = sys.stderr or io.TextIOWrapper(io.FileIO(STDERR, "w", closefd=False))
 
 
 def _check_encoding(words: list[str]) -> None:

@@ -45,7 +45,7 @@ if working():  # not for --help
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 
 Robots = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--robots", metavar="IDS", help="Only these, as 1,2,5; without, all that are there."
     ),
@@ -67,14 +67,14 @@ def register(app: typer.Typer) -> None:
     app.add_typer(swarm, name="swarm")
 
 
-def parse_robots(text: str) -> set[int]:
-    """Robots as a user writes them.
+def parse_robots(text: str | None) -> set[int]:
+    """Robots as a user writes them; none where nothing was written, which means all.
 
     Raises:
         ValueError: it is no list of numbers in 0..99.
     """
     try:
-        robots = {int(word) for word in text.split(",")} if text else set()
+        robots = set() if text is None else {int(word) for word in text.split(",")}
     except ValueError:
         robots = {-1}
     if not robots <= set(range(100)):
@@ -84,7 +84,7 @@ def parse_robots(text: str) -> set[int]:
 
 def _start(
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     behavior: Behavior = "",
     in_s: Annotated[
         float, typer.Option("--in-s", min=0.5, max=600, help="From now to the common start.")
@@ -213,7 +213,7 @@ def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[None]:
 
 def _arm(
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
@@ -232,7 +232,7 @@ def _arm(
 
 def _stop(
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.5, help="Give up after.")] = 10.0,
     host: Annotated[
         list[str] | None,
@@ -254,7 +254,7 @@ def _stop(
 
     Example: twinmill swarm stop
     """
-    asked = parse_robots(robots)
+    asked = parse_robots(robots or None)  # an empty list is no reason to stop nobody
     operator_key, fault = _key_if_there(key)
     with saying_nothing() as say:
         hosts, fleet = tell.Hosts(host or ()), Fleet(lcm_url, channel_prefix, key=operator_key)
@@ -327,7 +327,7 @@ def _waiting_words(left: set[int], unheard: list[str], timeout_s: float) -> str:
 def _select(
     behavior: Annotated[str, typer.Argument(metavar="BEHAVIOR", help="As milling.")],
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",

@@ -103,10 +103,11 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     going_on = "They drive on by themselves." if untethered else "Ctrl-C stops them."
     at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
     faulty = [a for a in given if a.mode == "fault"]
+    standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
+    if len(standing) == len(given):
+        return Verdict(False, _of_nobody(begun, at))
     late = {a.robot_id for a in begun.late}
-    idle = [a for a in given if a.mode not in (*DRIVING, "fault") and a.robot_id not in late]
-    if len(idle) == len(_disobeyed(given)) == len(given):
-        return Verdict(False, f"NOBODY STARTED: {_why(given)}.")
+    idle = [a for a in standing if a.robot_id not in late]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING]
     told = [
         f"{_names(faulty)} with a fault, and will drive once it is over" if faulty else "",
@@ -123,6 +124,16 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     return Verdict(False, words)
 
 
+def _of_nobody(begun: Start, at: str) -> str:
+    """Why none drives though its instant has come."""
+    if begun.late:
+        stopped = of_stop(begun.late, is_of_some=True).sentence
+        return f"NOBODY STARTED: {_names(begun.late)} did not in time. Told to stop: {stopped}"
+    if len(_disobeyed(begun.answers)) == len(begun.answers):
+        return f"NOBODY STARTED: {_why(begun.answers)}."
+    return f"NOBODY DRIVES, though it is {at}: see above. Ctrl-C stops them."
+
+
 def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | None) -> Verdict:
     """What came of robots that were held.
 
@@ -137,7 +148,8 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
     for name, state in states.items():
         if state.stands and not (stopped and state.is_meant):
             early.setdefault(state, []).append(name)
-    told = [f"{', '.join(names)}: {state.words}" for state, names in early.items()]
+    before = " stood before" if stopped else ""
+    told = [f"{', '.join(names)}{before}: {state.words}" for state, names in early.items()]
     if begun is None:
         told.append("the start was ended before all had confirmed it")
     elif not begun.ok:
@@ -145,7 +157,7 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
     ok = begun is not None and begun.ok and all(state.is_meant for state in early)
     if not told:
         return Verdict(ok, "All stand.")
-    return Verdict(ok, f"All stand{', but' if stopped else ':'} {'; '.join(told)}.")
+    return Verdict(ok, f"All stand{';' if stopped else ':'} {'; '.join(told)}.")
 
 
 def _disobeyed(given: list[Answer]) -> list[Answer]:
