@@ -312,9 +312,9 @@ def start(
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
     From then on they are held: as long as the fleet listens, they hear that the operator is there.
-    Where this raises, as the fleet's watch does, they may drive: who calls it stops them. One that is
-    to drive on by itself, and does not begin with the others, is stopped: by a clock that is
-    behind it would when nobody expects it.
+    Where this raises, as the fleet's watch does, they may drive: who calls it stops them. One that
+    is to drive on by itself, and does not begin with the others, is stopped: by a clock that is
+    behind it would begin when nobody expects it.
 
     Args:
         fleet: where they are.
