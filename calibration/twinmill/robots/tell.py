@@ -238,7 +238,7 @@ def _says_that_it_stands(robot: Robot, seq: int) -> bool:
 
 
 class Hosts:
-    """Machines by name, looked up in threads of their own: a name server may take seconds to answer.
+    """Machines by name, looked up in threads of their own: a name server may take seconds.
 
     Args:
         names: or addresses.
