@@ -57,20 +57,27 @@ void config_default(struct app_config *config)
     };
 }
 
-static const struct config_key *find_key(const char *key)
+static const char *text_after(const char *text)
 {
+    return text + strlen(text) + 1;
+}
+
+static const struct config_key *find_key(const char *name)
+{
+    const char *of_key = config_texts;
     for (size_t i = 0; i < config_key_count; ++i)
     {
-        if (strcmp(config_keys[i].key, key) == 0)
+        if (strcmp(of_key, name) == 0)
         {
             return &config_keys[i];
         }
+        of_key = text_after(text_after(of_key));
     }
     return NULL;
 }
 
-static bool set_integer(const struct config_key *key, const char *value, int32_t *field,
-                        char *error)
+static bool set_integer(const struct config_key *key, const char *name, const char *value,
+                        int32_t *field, char *error)
 {
     char *end;
     errno = 0;
@@ -78,7 +85,7 @@ static bool set_integer(const struct config_key *key, const char *value, int32_t
     if (errno != 0 || end == value || *end != '\0' || number < key->min || number > key->max)
     {
         (void)snprintf(error, CONFIG_ERROR_MAX,
-                       "%s: '%s': must be a whole number in %" PRId32 "..%" PRId32, key->key, value,
+                       "%s: '%s': must be a whole number in %" PRId32 "..%" PRId32, name, value,
                        key->min, key->max);
         return false;
     }
@@ -86,11 +93,11 @@ static bool set_integer(const struct config_key *key, const char *value, int32_t
     return true;
 }
 
-static bool set_bool(const struct config_key *key, const char *value, bool *field, char *error)
+static bool set_bool(const char *name, const char *value, bool *field, char *error)
 {
     if (strcmp(value, "true") != 0 && strcmp(value, "false") != 0)
     {
-        (void)snprintf(error, CONFIG_ERROR_MAX, "%s: '%s': must be true or false", key->key, value);
+        (void)snprintf(error, CONFIG_ERROR_MAX, "%s: '%s': must be true or false", name, value);
         return false;
     }
     *field = strcmp(value, "true") == 0;
@@ -98,20 +105,20 @@ static bool set_bool(const struct config_key *key, const char *value, bool *fiel
 }
 
 // Texts that a TOML string could not hold as they are, are refused.
-static bool set_text(const struct config_key *key, const char *value, char *field, char *error)
+static bool set_text(const char *name, const char *value, char *field, char *error)
 {
     for (const char *c = value; *c != '\0'; ++c)
     {
         if ((unsigned char)*c < ' ' || *c == '"' || *c == '\\')
         {
             (void)snprintf(error, CONFIG_ERROR_MAX,
-                           "%s: must hold no quote, backslash or control character", key->key);
+                           "%s: must hold no quote, backslash or control character", name);
             return false;
         }
     }
     if (strlen(value) >= CONFIG_TEXT_MAX)
     {
-        (void)snprintf(error, CONFIG_ERROR_MAX, "%s: too long: at most %d characters", key->key,
+        (void)snprintf(error, CONFIG_ERROR_MAX, "%s: too long: at most %d characters", name,
                        CONFIG_TEXT_MAX - 1);
         return false;
     }
@@ -132,9 +139,9 @@ bool config_set(struct app_config *config, const char *key, const char *value,
     char *field = (char *)config + found->offset;
     switch ((enum key_kind)found->kind)
     {
-        case KEY_INTEGER: return set_integer(found, value, (int32_t *)(void *)field, error);
-        case KEY_BOOL: return set_bool(found, value, (bool *)field, error);
-        case KEY_TEXT: return set_text(found, value, field, error);
+        case KEY_INTEGER: return set_integer(found, key, value, (int32_t *)(void *)field, error);
+        case KEY_BOOL: return set_bool(key, value, (bool *)field, error);
+        case KEY_TEXT: return set_text(key, value, field, error);
     }
     return false;
 }
@@ -178,19 +185,18 @@ bool config_load_what_can_be(struct app_config *config, const char *path)
     return is_whole;
 }
 
-static int print_value(const struct app_config *config, const struct config_key *key, char *text,
-                       size_t size)
+static int print_value(const struct app_config *config, const struct config_key *key,
+                       const char *name, char *text, size_t size)
 {
     const char *field = (const char *)config + key->offset;
     switch ((enum key_kind)key->kind)
     {
         case KEY_INTEGER:
-            return snprintf(text, size, "%s = %" PRId32 "\n", key->key,
+            return snprintf(text, size, "%s = %" PRId32 "\n", name,
                             *(const int32_t *)(const void *)field);
         case KEY_BOOL:
-            return snprintf(text, size, "%s = %s\n", key->key,
-                            *(const bool *)field ? "true" : "false");
-        case KEY_TEXT: return snprintf(text, size, "%s = \"%s\"\n", key->key, field);
+            return snprintf(text, size, "%s = %s\n", name, *(const bool *)field ? "true" : "false");
+        case KEY_TEXT: return snprintf(text, size, "%s = \"%s\"\n", name, field);
     }
     return 0;
 }
@@ -198,13 +204,14 @@ static int print_value(const struct app_config *config, const struct config_key 
 size_t config_print(const struct app_config *config, bool with_docs, char *text, size_t size)
 {
     size_t used = 0;
-    for (size_t i = 0; i < config_key_count; ++i)
+    const char *doc, *name = config_texts;
+    for (size_t i = 0; i < config_key_count; ++i, name = text_after(doc))
     {
         char entry[CONFIG_ERROR_MAX];
-        const char *doc = config_keys[i].key + strlen(config_keys[i].key) + 1;
+        doc = text_after(name);
         int length = with_docs ? snprintf(entry, sizeof entry, "# %s\n", doc) : 0;
-        length +=
-            print_value(config, &config_keys[i], entry + length, sizeof entry - (size_t)length);
+        length += print_value(config, &config_keys[i], name, entry + length,
+                              sizeof entry - (size_t)length);
         if (used + (size_t)length >= size)
         {
             break;

@@ -14,8 +14,6 @@ enum key_kind
 
 struct config_key
 {
-    // Followed by its final 0 and what it means: one pointer takes less room than two.
-    const char *key;
     // One of key_kind.
     uint8_t kind;
     // Of the field in struct app_config.
@@ -26,5 +24,8 @@ struct config_key
 
 extern const struct config_key config_keys[];
 extern const size_t config_key_count;
+// For each of them its name and what it means, both ended by a 0: on the robot a pointer to each
+// would take 36 bytes of the program's file.
+extern const char config_texts[];
 
 #endif

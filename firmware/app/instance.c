@@ -18,7 +18,7 @@
 
 // Words of the command lines of programs that drive a TurboPi: the vendor's, GMU-ASRC's, and the
 // ROS packages.
-static const char *const vendor_words[] = {
+static const char vendor_words[][sizeof "ros_robot_controller"] = {
     "TurboPi.py", "hw_button_scan", "HiwonderSDK",          "buttonman",
     "hiwonder",   "RPCServer.py",   "ros_robot_controller", "turbopi_ros"};
 

@@ -32,13 +32,14 @@ static bool write_down(const struct latch *latch, bool is_stopped)
     {
         return true;
     }
-    // To read: what is there already is enough, though nothing can be written.
+    // To read: a stop that is there already is enough, though nothing can be written. That there is
+    // none holds only where one could be.
     const int fd = open(to.text, O_RDONLY | O_CREAT | O_CLOEXEC, 0644);
     if (fd >= 0)
     {
         (void)close(fd);
     }
-    return fd >= 0;
+    return fd >= 0 && (is_stopped || access(latch->folder, W_OK) == 0);
 }
 
 bool latch_open(struct latch *latch, const char *folder, int64_t now_us)

@@ -15,8 +15,8 @@ int64_t loop_now_us(const struct loop *loop)
     return hal_clock_monotonic_us(&loop->devices.clock);
 }
 
-static const char *const part_names[LOOP_PART_COUNT] = {"camera", "motor board", "battery",
-                                                        "panel"};
+static const char part_names[LOOP_PART_COUNT][sizeof "motor board"] = {"camera", "motor board",
+                                                                       "battery", "panel"};
 
 // The watchers know it before the board does.
 static void set_may_move(struct loop *loop, bool may_move, bool needs_help)

@@ -129,7 +129,7 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     }
     if (!reporter_stop(&reporter))
     {
-        say("rows of a log are lost: is the disk full?");
+        say("rows of a log are lost, see above");
         code = code == 0 ? SUPERVISOR_EXIT_LOG_LOST : code;
     }
     return code;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tests of firmware/app/loop_link.c
+#include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mount.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -130,6 +132,25 @@ static void test_stop_is_kept_where_there_is_no_room(void)
     TEST_ASSERT_NOT_EQUAL(0, access(path, F_OK));
 }
 
+// As a card that gave up: what was written before is there, and nothing more can be.
+static void test_no_stop_can_be_kept_where_nothing_can_be_written(void)
+{
+    snprintf(robot.config.run_dir, sizeof robot.config.run_dir, "%s", folder);
+    robot_boot();
+    TEST_ASSERT_TRUE(latch_works(&robot.loop.operator_link.latch));
+    if (unshare(CLONE_NEWNS) != 0 || mount(NULL, "/", NULL, MS_REC | MS_PRIVATE, NULL) != 0)
+    {
+        TEST_IGNORE_MESSAGE("a folder can be made read-only here by root alone");
+    }
+    TEST_ASSERT_EQUAL(0, mount(folder, folder, NULL, MS_BIND, NULL));
+    TEST_ASSERT_EQUAL(0, mount(NULL, folder, NULL, MS_BIND | MS_REMOUNT | MS_RDONLY, NULL));
+    robot_boot();
+    TEST_ASSERT_FALSE(latch_works(&robot.loop.operator_link.latch));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_NOT_NULL(strstr(robot.ack.reason, "run_dir"));
+    TEST_ASSERT_EQUAL(0, umount(folder));
+}
+
 // A folder that is not there yet.
 static void test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later(void)
 {
@@ -235,6 +256,7 @@ int main(void)
     RUN_TEST(test_button_starts_a_robot_that_was_stopped);
     RUN_TEST(test_stop_outlives_the_program);
     RUN_TEST(test_stop_is_kept_where_there_is_no_room);
+    RUN_TEST(test_no_stop_can_be_kept_where_nothing_can_be_written);
     RUN_TEST(test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later);
     RUN_TEST(test_robot_that_loses_its_operator_stops);
     RUN_TEST(test_robot_that_hears_its_operator_goes_on);

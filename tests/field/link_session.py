@@ -132,7 +132,7 @@ def by_unicast(robot: Robot, key: bytes) -> dict:
         time.sleep(0.01)
     time.sleep(0.5)
     never_heard = Fleet(URL, key=key)
-    (by_name,) = tell.stop(never_heard, {ID}, hosts=["10.0.1.2"])
+    (by_name,) = tell.stop(never_heard, {ID}, hosts=tell.Hosts(["10.0.1.2"]))
     return {
         "stands": answer.stands,
         "started": robot.duties() == LEFT,

@@ -90,11 +90,11 @@ def test_numbers_of_commands_cannot_be_guessed():
     assert min(numbers) < 2**30 < max(numbers)
 
 
-@pytest.mark.parametrize("text", ["a", "1,,2", "100", "-1", "1.5"])
+@pytest.mark.parametrize("text", ["a", "", "1,,2", "100", "-1", "1.5"])
 def test_robots_that_cannot_be_are_refused(text):
     with pytest.raises(ValueError, match=r"0\.\.99"):
         parse_robots(text)
 
 
 def test_robots_are_numbers_with_commas():
-    assert parse_robots("3,1,99") == {1, 3, 99} and parse_robots("") == set()
+    assert parse_robots("3,1,99") == {1, 3, 99} and parse_robots(None) == set()

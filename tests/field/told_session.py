@@ -314,10 +314,10 @@ class Field:
         code = operator.end()
         return self._unmoved(begin_s, code)
 
-    def _unmoved(self, begin_s: float, code: int) -> dict:
+    def _unmoved(self, begin_s: float, code: int, robots=IDS) -> dict:
         """A row of robots that never drove."""
         time.sleep(0.3)
-        moved = any(self.moved(i, begin_s) for i in IDS)
+        moved = any(self.moved(i, begin_s) for i in robots)
         said = [line.strip() for line in self.operator.plain.splitlines() if line.strip()]
         return {"said": said, "code": code, "after_s": None if not moved else float("inf")}
 
@@ -346,12 +346,85 @@ class Field:
         """On a machine that never commanded a robot."""
         operator = self.held(terminal=False)
         key = self.folder / "no" / "such.key"
-        fault_s = time.monotonic()
-        stopping = Operator(key, "stop", "--timeout-s", "2", terminal=False)
-        code = stopping.end()
+        with self.hearing_stops() as stops_s:
+            stopping = Operator(key, "stop", "--timeout-s", "2", terminal=False)
+            code = stopping.end()
         operator.end()
         self.operator = stopping
-        return self.row(fault_s, code) | {"made_a_key": key.exists()}
+        return self.row(stops_s[0], code) | {"made_a_key": key.exists()}
+
+    def stop_without_standard_files(self) -> dict:
+        """As from a program that closed them, with which what is opened first has their numbers."""
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s:
+            self.operator = Operator(
+                self.key_file, "stop", terminal=False, preexec_fn=lambda: os.closerange(0, 3)
+            )
+            code = self.operator.end()
+        operator.end()
+        return self.row(stops_s[0], code)
+
+    def stop_of_a_host_that_is_not_there(self) -> dict:
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s:
+            self.operator = Operator(
+                self.key_file, "stop", "--host", "10.0.1.77", "--timeout-s", "2", terminal=False
+            )
+            code = self.operator.end()
+        operator.end()
+        return self.row(stops_s[0], code)
+
+    def stop_of_another_robot(self) -> dict:
+        """By its number: R02 goes on, and that is said."""
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s:
+            self.operator = Operator(self.key_file, "stop", "--robots", "1", terminal=False)
+            code = self.operator.end()
+        drove = self.robots[2].duties() != ZERO
+        after_s = self.stood_after(stops_s[0], [1])
+        operator.process.send_signal(signal.SIGINT)
+        operator.end()
+        return self.row(stops_s[0], code) | {"after_s": after_s, "drove": drove}
+
+    def untethered_and_one_hangs(self) -> dict:
+        """In the countdown: it must not begin by itself once nobody expects it."""
+        begin_s, robot, fleet = time.monotonic(), self.robots[2], Fleet(URL, key=self.key)
+        self.operator = operator = Operator(
+            self.key_file, *START, "--untethered", "--in-s", "3", terminal=False
+        )
+        fleet.listen(20, lambda: 2 in fleet.robots and len(fleet.robots[2].acks) > 1)
+        hung = [robot.process.pid, *robot.children(), *robot.guards()]
+        for pid in hung:
+            os.kill(pid, signal.SIGSTOP)
+        code = operator.end(40)
+        for pid in hung:
+            os.kill(pid, signal.SIGCONT)
+        fleet.listen(1.5)
+        row = self._unmoved(begin_s, code, [2])
+        tell.stop(fleet, set())
+        return row
+
+    @contextmanager
+    def hearing_stops(self):
+        """When stops are said; how long a tool takes to begin is the machine's business."""
+        over, stops_s, bus = threading.Event(), [], UdpBus(URL)
+
+        def on_command(_: str, data: bytes) -> None:
+            if turbopi.swarm_command_t.decode(data).verb == turbopi.swarm_command_t.VERB_STOP:
+                stops_s.append(time.monotonic())
+
+        def hear():
+            bus.subscribe("SWARM_COMMAND", on_command)
+            while not over.is_set():
+                bus.handle_timeout(50)
+
+        thread = threading.Thread(target=hear)
+        thread.start()
+        try:
+            yield stops_s
+        finally:
+            over.set()
+            thread.join()
 
     def markup_in_names(self) -> dict:
         """Somebody says names with an unfinished tag and control characters."""

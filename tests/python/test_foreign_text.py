@@ -16,6 +16,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from twinmill.data.log import read_log
 from twinmill.foreign_text import LINE_MAX, plain_line, printable
 from twinmill.robots.fleet import Fleet
 from twinmill.robots.remote import _step_failure
@@ -133,3 +134,15 @@ def test_a_failure_that_quotes_a_file_cannot_rewrite_the_terminal(twinmill, tmp_
     table.write_text(f"{text},t_s\n1,2\n")
     code, out, err = twinmill("import", "--poses", table, "--commands", table, "-o", "x.lcmlog")
     assert code == 1 and not forbidden(out + err)
+
+
+def test_a_name_that_no_output_can_hold_is_refused(twinmill):
+    code, _, err = twinmill("compare", "run\udcff.lcmlog", "--model", "turbopi.toml")
+    assert code == 1 and "rename" in err and not forbidden(err)
+
+
+def test_brackets_without_end_are_no_settings(write_log, message):
+    """A parser that calls itself for each of them gives up."""
+    run = message("run", utime_us=1, robot_id=3, config_toml="a = " + "[" * 20_000)
+    told = message("telemetry", utime_us=2, robot_id=3)
+    assert list(read_log(write_log(("R03_RUN", run), ("R03_TELEMETRY", told))).robots) == [3]

@@ -107,9 +107,17 @@ def test_two_of_one_number_are_said_once(held):
 
 
 def test_silence_is_said(held, monkeypatch):
-    robots, _, words = held
+    robots, robot, words = held
     monkeypatch.setattr(hold, "SILENT_S", -1.0)
+    robot.heard_s = 0.0
     assert "not heard any more" in words(TABLE) and not robots.is_over
+
+
+def test_a_robot_with_another_key_is_heard_and_not_believed(held, monkeypatch):
+    robots, robot, words = held
+    monkeypatch.setattr(hold, "SILENT_S", -1.0)
+    robot.heard_s = time.monotonic()
+    assert "signs nothing with this operator's key" in words(TABLE) and not robots.is_over
 
 
 def test_a_camera_that_stutters_is_no_flood_of_words(held, monkeypatch):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill plot`: what is drawn is what was driven."""
 
+import shutil
 from dataclasses import replace
 
 import matplotlib.colors
@@ -113,3 +114,8 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(log, write_log, messag
         with pytest.raises(ValueError, match=sentence):
             run(["plot", str(tmp_path / name), "-o", str(tmp_path / out)])
     assert set(tmp_path.iterdir()) == before
+
+
+def test_a_name_is_no_formula(log, tmp_path, twinmill):
+    named = shutil.copy(log, tmp_path / r"a$\frac{$.lcmlog")
+    assert twinmill("plot", named, "-o", tmp_path / "sheet.svg")[0] == 0

@@ -37,13 +37,17 @@ FAULTY = answer(6, mode="fault", alarms=["camera lost"])
 DOUBLE = answer(7, mode="stopped", stands=True, is_double=True)
 
 
-def begun(*answers: Answer, stopped=()) -> Start:
-    return Start(0, list(answers), {}, list(stopped))
+def begun(*answers: Answer, stopped=(), late=()) -> Start:
+    return Start(0, list(answers), {}, list(stopped), list(late))
 
 
 # What is said begins so, and the command ends with that code.
 SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
+    (of_stop([STANDS], is_of_some=True), "R02 stands.", 0),
+    (of_stop([STANDS], unheard=["robot9"]), "NOT ALL STAND: Nothing was heard from robot9", 1),
+    (of_stop([], unheard=["robot9"]), "No robot was heard in 10 s", 1),
+    (of_stop([STANDS], is_of_some=True).beside(["R01"]), "R02 stands. R01 drives, and was", 0),
     (of_stop([]), "No robot was heard in 10 s", 1),
     (of_stop([STANDS, GOOD]), "NOT ALL STAND: R01: no stop was confirmed.", 1),
     (of_stop([UNSIGNED, STANDS]), "NOT ALL STAND: R04: no stop was confirmed.", 1),
@@ -57,6 +61,9 @@ SENTENCES = [
     (of_start(begun(GOOD), untethered=True), "Started at", 0),
     (of_start(begun(REFUSED, GOOD), untethered=False), "Started at", 1),
     (of_start(begun(FAULTY, GOOD), untethered=False), "Started at", 1),
+    (of_start(begun(STANDS), untethered=False), "NOBODY DRIVES, though it is", 1),
+    (of_start(begun(STANDS, late=[STANDS]), untethered=True), "NOBODY STARTED: R02 did not in", 1),
+    (of_start(begun(GOOD, STANDS, late=[STANDS]), untethered=True), "Started at", 1),
     (of_start(begun(REFUSED), untethered=False), "NOBODY STARTED: R03 refused", 1),
     (of_start(begun(REFUSED, stopped=[STANDS]), untethered=False), "Called off: R03 refused", 1),
     (
@@ -66,9 +73,9 @@ SENTENCES = [
     ),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),
-    (of_end(ILL, {"R01": DRIVES}, WELL), "All stand, but not all had started.", 1),
-    (of_end(None, {}, WELL), "All stand, but the start was ended before", 1),
-    (of_end(WELL, {"R01": RESTARTED, "R02": DRIVES}, WELL), "All stand, but R01: its program", 1),
+    (of_end(ILL, {"R01": DRIVES}, WELL), "All stand; not all had started.", 1),
+    (of_end(None, {}, WELL), "All stand; the start was ended before", 1),
+    (of_end(WELL, {"R01": RESTARTED, "R02": DRIVES}, WELL), "All stand; R01 stood before: its", 1),
     (of_end(WELL, {"R01": BY_BUTTON, "R02": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": BY_COMMAND, "R02": BY_BUTTON}, None), "All stand: R01: stopped", 0),
     (of_end(WELL, {"R01": BY_COMMAND, "R02": LINK_LOST}, None), "All stand: R01: stopped", 1),

@@ -114,5 +114,5 @@ def test_a_name_that_is_looked_up_for_long_keeps_no_stop_waiting(monkeypatch):
     monkeypatch.setattr("socket.gethostbyname", lambda _: time.sleep(2))
     fleet = Fleet("", connect=SilentBus)
     begin_s = time.monotonic()
-    tell.stop(fleet, {1}, timeout_s=0.5, hosts=["robot03.local"])
+    tell.stop(fleet, {1}, timeout_s=0.5, hosts=tell.Hosts(["robot03.local"]))
     assert time.monotonic() - begin_s < 1.5 and fleet.bus.said > 5

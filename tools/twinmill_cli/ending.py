@@ -3,6 +3,7 @@
 
 import errno
 import io
+import os
 import re
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ import typer
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill_cli.output import STOPPED, begin_telling, has_told, print_object, say
 
+STDOUT, STDERR = 1, 2
 QUOTED = 80  # letters of what a sentence quotes
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
@@ -29,9 +31,11 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
+    _take_standard_files()
     begin_telling()
     words = sys.argv[1:] or ["--help"]
     try:
+        _check_encoding(words)
         result = run(words)
         code = result if isinstance(result, int) else 0
     except KeyboardInterrupt:  # before the command, or after it
@@ -44,6 +48,22 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     if code == STOPPED and stopped:
         say(stopped, program)
     sys.exit(code)
+
+
+def _take_standard_files() -> None:
+    """Else what is opened first has a number of theirs, and gets what is printed."""
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= STDERR:
+        os.set_inheritable(handle, True)
+    os.close(handle)
+    sys.stdout = sys.stdout or io.TextIOWrapper(io.FileIO(STDOUT, "w", closefd=False))
+    sys.stderr = sys.stderr or io.TextIOWrapper(io.FileIO(STDERR, "w", closefd=False))
+
+
+def _check_encoding(words: list[str]) -> None:
+    """Raises ValueError for a name that no page, model file, table or JSON could hold."""
+    for word in words:
+        if word != word.encode(errors="replace").decode():
+            raise ValueError(f"'{word}': this name is not in UTF-8; rename the file or folder.")
 
 
 def _told(error: Exception) -> tuple[int, str]:

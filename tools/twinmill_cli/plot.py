@@ -19,6 +19,7 @@ if working():  # not for --help
     from twinmill.data.log import LogError
     from twinmill.data.multi_log import MultiLog, read_multi_log
     from twinmill.files import replacing
+    from twinmill.foreign_text import plain_line
     from twinmill.report import Figure, Provenance, Section, render_page
     from twinmill.report.canvas import STYLE, draw
     from twinmill.report.log_figures import Drawing
@@ -100,7 +101,8 @@ def _sheet(log: Path, panels: list[tuple], path: Path, kind: str) -> None:
     heights = [height_in for _, height_in, _, _ in panels]
     with matplotlib.rc_context(STYLE):
         canvas = Canvas(figsize=(WIDTH_IN, sum(heights)), layout="constrained", dpi=DPI)
-        canvas.suptitle(log.name, x=0.01, ha="left", fontsize=10, fontweight="bold")
+        title = plain_line(log.name)
+        canvas.suptitle(title, x=0.01, ha="left", size=10, weight="bold", parse_math=False)
         rows = canvas.subplots(nrows=len(panels), height_ratios=heights, squeeze=False)[:, 0]
         for axes, (paint, *_) in zip(rows, panels, strict=True):
             paint(axes)

@@ -31,6 +31,7 @@ if working():  # not for --help
     from twinmill.terminal import PlainConsole
     from twinmill_cli.swarm_screen import CLOCK_WARN_S, answer_table, status_table
     from twinmill_cli.swarm_verdict import (
+        DRIVING,
         Verdict,
         of_arm,
         of_end,
@@ -44,7 +45,7 @@ if working():  # not for --help
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 
 Robots = Annotated[
-    str,
+    str | None,
     typer.Option(
         "--robots", metavar="IDS", help="Only these, as 1,2,5; without, all that are there."
     ),
@@ -66,14 +67,14 @@ def register(app: typer.Typer) -> None:
     app.add_typer(swarm, name="swarm")
 
 
-def parse_robots(text: str) -> set[int]:
-    """Robots as a user writes them.
+def parse_robots(text: str | None) -> set[int]:
+    """Robots as a user writes them; none where nothing was written, which means all.
 
     Raises:
         ValueError: it is no list of numbers in 0..99.
     """
     try:
-        robots = {int(word) for word in text.split(",")} if text else set()
+        robots = set() if text is None else {int(word) for word in text.split(",")}
     except ValueError:
         robots = {-1}
     if not robots <= set(range(100)):
@@ -83,7 +84,7 @@ def parse_robots(text: str) -> set[int]:
 
 def _start(
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     behavior: Behavior = "",
     in_s: Annotated[
         float, typer.Option("--in-s", min=0.5, max=600, help="From now to the common start.")
@@ -154,10 +155,11 @@ def _drive(
             fleet.watch()  # the last that ends it, while robots drive on
             return begun
         _hold(fleet, held, voice)
-        ended = of_end(begun, held.states, None)
+        ended = of_end(begun, held.states, None).beside(_driving(fleet, asked))
     except BaseException as error:
         given = tell.stop(fleet, asked)
         ended = of_end(begun, held.states if held else {}, of_stop(given))
+        ended = ended.beside(_driving(fleet, asked))
         if begun is None:
             data = {"start_utime_us": None, "called_off": False}
             voice.tell(lambda: _finish("start", given, ended, data, as_json=as_json))
@@ -211,7 +213,7 @@ def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[None]:
 
 def _arm(
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
@@ -230,7 +232,7 @@ def _arm(
 
 def _stop(
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.5, help="Give up after.")] = 10.0,
     host: Annotated[
         list[str] | None,
@@ -252,19 +254,29 @@ def _stop(
 
     Example: twinmill swarm stop
     """
-    asked = parse_robots(robots)
+    asked = parse_robots(robots or None)  # an empty list is no reason to stop nobody
     operator_key, fault = _key_if_there(key)
     with saying_nothing() as say:
-        fleet = Fleet(lcm_url, channel_prefix, key=operator_key)
+        hosts, fleet = tell.Hosts(host or ()), Fleet(lcm_url, channel_prefix, key=operator_key)
         given = tell.stop(
             fleet,
             asked,
             timeout_s,
-            host or (),
-            waiting=lambda left: say(_waiting_words(left, timeout_s)),
+            hosts=hosts,
+            waiting=lambda left: say(_waiting_words(left, hosts.unheard(fleet), timeout_s)),
         )
+        if asked:
+            fleet.listen(tell.OTHERS_S)
+    verdict = of_stop(given, timeout_s, is_of_some=bool(asked), unheard=hosts.unheard(fleet))
     _tell_fault(fault)
-    return _finish("stop", given, of_stop(given, timeout_s), {}, as_json=as_json)
+    verdict = verdict.beside(_driving(fleet, asked))
+    return _finish("stop", given, verdict, {}, as_json=as_json)
+
+
+def _driving(fleet: Fleet, asked: set[int]) -> list[str]:
+    """Robots that drive and were not asked; nobody was asked where all were."""
+    others = [fleet.robots[i] for i in sorted(set(fleet.robots) - asked)] if asked else []
+    return [f"R{r.robot_id:02d}" for r in others if r.mode in DRIVING and r.is_here]
 
 
 @contextmanager
@@ -293,7 +305,9 @@ def _key_if_there(path: Path | None) -> tuple[bytes | None, str]:
     """The key, or why there is none: then a stop is said all the same, and nobody is believed."""
     try:
         return load(path), ""
-    except (ValueError, OSError) as error:
+    except OSError as error:
+        return None, f"--key {error.filename}: {error.strerror}, so no robot's answer is believed."
+    except ValueError as error:
         return None, str(error)
 
 
@@ -302,17 +316,18 @@ def _tell_fault(fault: str) -> None:
         say(fault)
 
 
-def _waiting_words(left: set[int], timeout_s: float) -> str:
+def _waiting_words(left: set[int], unheard: list[str], timeout_s: float) -> str:
     """What a stop waits for."""
     names = ", ".join(f"R{i:02d}" for i in sorted(left))
-    whom = f"{names} to sign that they stand" if names else "a robot to be heard"
+    where = f" from {', '.join(unheard)}" if unheard else ""
+    whom = f"{names} to sign that they stand" if names else f"a robot to be heard{where}"
     return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
 
 
 def _select(
     behavior: Annotated[str, typer.Argument(metavar="BEHAVIOR", help="As milling.")],
     *,
-    robots: Robots = "",
+    robots: Robots = None,
     key: KeyFile = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: Prefix = "",
@@ -354,11 +369,15 @@ def warn_of_clocks(fleet: Fleet, robots: set[int]) -> None:
 def _finish(
     verb: str, given: list[tell.Answer], verdict: Verdict, data: dict, *, as_json: bool
 ) -> int:
-    """Prints what came of a command. Returns its exit code."""
+    """Prints what came of a command, if need be on stderr alone. Returns its exit code."""
     robots = [answer.to_json() for answer in given]
     data = {"verb": verb, "ok": verdict.ok, "sentence": verdict.sentence, **data, "robots": robots}
     text = Group(*([answer_table(given)] if given else []), verdict.sentence)
-    deliver(data, text, as_json)
+    try:
+        deliver(data, text, as_json)
+    except OSError:
+        say(verdict.sentence)
+        raise
     return verdict.code
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -29,22 +30,48 @@ class Verdict:
         """The command's exit code."""
         return 0 if self.ok else 1
 
+    def beside(self, driving: list[str]) -> Verdict:
+        """The same, said beside robots that nobody asked, and that drive."""
+        if not driving:
+            return self
+        verb = "drives" if len(driving) == 1 else "drive"
+        return Verdict(self.ok, f"{self.sentence} {', '.join(driving)} {verb}, and was not asked.")
 
-def of_stop(given: list[Answer], timeout_s: float = 10.0) -> Verdict:
-    """All stand, or which robots must be stopped by hand."""
+
+def of_stop(
+    given: list[Answer],
+    timeout_s: float = 10.0,
+    *,
+    is_of_some: bool = False,
+    unheard: Sequence[str] = (),
+) -> Verdict:
+    """All stand, or which robots must be stopped by hand.
+
+    Args:
+        given: what they answered.
+        timeout_s: for how long it was said.
+        is_of_some: these alone were asked, and others may be there.
+        unheard: machines that were told by name, and from which no robot spoke.
+    """
     hint = "Where the network carries no multicast, give a robot's address: swarm stop --host."
+    if unheard:
+        hint = f"Nothing was heard from {', '.join(unheard)}: is the name or address right?"
     if not given:
         words = f"No robot was heard in {timeout_s:g} s; stop was said all the time. {hint}"
         return Verdict(False, words)
     double = [a for a in given if a.is_double]
     unconfirmed = [a for a in given if not ((a.accepted and a.signed and a.stands) or a.is_double)]
     if not double and not unconfirmed:
-        return Verdict(True, "All stand.")
+        if unheard:
+            return Verdict(False, f"NOT ALL STAND: {hint} Whoever was heard stands.")
+        verb = "stands" if len(given) == 1 else "stand"
+        return Verdict(True, f"{_names(given)} {verb}." if is_of_some else "All stand.")
     told = [f"{_names(unconfirmed)}: no stop was confirmed"] if unconfirmed else []
     told += [f"{_names(double)}: two robots have this number, one may drive"] if double else []
     words = f"NOT ALL STAND: {'; '.join(told)}. SWITCH OFF BY HAND what still drives."
-    unheard = [a for a in unconfirmed if a.reason == NEVER_HEARD]
-    return Verdict(False, f"{words} {_names(unheard)}: {NEVER_HEARD}. {hint}" if unheard else words)
+    silent = [a for a in unconfirmed if a.reason == NEVER_HEARD]
+    words += f" {_names(silent)}: {NEVER_HEARD}." if silent else ""
+    return Verdict(False, f"{words} {hint}" if silent or unheard else words)
 
 
 def of_arm(given: list[Answer]) -> Verdict:
@@ -76,19 +103,35 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     going_on = "They drive on by themselves." if untethered else "Ctrl-C stops them."
     at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
     faulty = [a for a in given if a.mode == "fault"]
-    idle = [a for a in given if a.mode not in (*DRIVING, "fault")]
-    if len(idle) == len(_disobeyed(given)) == len(given):
-        return Verdict(False, f"NOBODY STARTED: {_why(given)}.")
+    standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
+    if len(standing) == len(given):
+        return Verdict(False, _of_nobody(begun, at))
+    late = {a.robot_id for a in begun.late}
+    idle = [a for a in standing if a.robot_id not in late]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING]
     told = [
         f"{_names(faulty)} with a fault, and will drive once it is over" if faulty else "",
         f"{_names(idle)} did not" if idle else "",
+        f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
         f"{_names(unsure)} drive without having confirmed it" if unsure else "",
     ]
     if not any(told):
         return Verdict(True, f"Started at {at}. {going_on}")
     missing = "; ".join(filter(None, told))
-    return Verdict(False, f"Started at {at}, but not all: {missing}, see above. {going_on}")
+    words = f"Started at {at}, but not all: {missing}, see above. {going_on}"
+    if begun.late:
+        words = f"{words} {of_stop(begun.late, is_of_some=True).sentence}"
+    return Verdict(False, words)
+
+
+def _of_nobody(begun: Start, at: str) -> str:
+    """Why none drives though its instant has come."""
+    if begun.late:
+        stopped = of_stop(begun.late, is_of_some=True).sentence
+        return f"NOBODY STARTED: {_names(begun.late)} did not in time. Told to stop: {stopped}"
+    if len(_disobeyed(begun.answers)) == len(begun.answers):
+        return f"NOBODY STARTED: {_why(begun.answers)}."
+    return f"NOBODY DRIVES, though it is {at}: see above. Ctrl-C stops them."
 
 
 def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | None) -> Verdict:
@@ -105,7 +148,8 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
     for name, state in states.items():
         if state.stands and not (stopped and state.is_meant):
             early.setdefault(state, []).append(name)
-    told = [f"{', '.join(names)}: {state.words}" for state, names in early.items()]
+    before = " stood before" if stopped else ""
+    told = [f"{', '.join(names)}{before}: {state.words}" for state, names in early.items()]
     if begun is None:
         told.append("the start was ended before all had confirmed it")
     elif not begun.ok:
@@ -113,7 +157,7 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
     ok = begun is not None and begun.ok and all(state.is_meant for state in early)
     if not told:
         return Verdict(ok, "All stand.")
-    return Verdict(ok, f"All stand{', but' if stopped else ':'} {'; '.join(told)}.")
+    return Verdict(ok, f"All stand{';' if stopped else ':'} {'; '.join(told)}.")
 
 
 def _disobeyed(given: list[Answer]) -> list[Answer]:

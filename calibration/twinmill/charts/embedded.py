@@ -15,6 +15,7 @@ import twinmill_native as native
 from twinmill.charts.arrays import RobotView, measured_path
 from twinmill.charts.packed import pack_log, pack_prediction, pack_robot
 from twinmill.charts.stage import STATIC, stage_html
+from twinmill.foreign_text import printable
 from twinmill.predict.detections import Detections
 from twinmill.predict.regimes import Regime
 
@@ -73,7 +74,7 @@ def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -
         "first": first,
         "view": {"t": span_s[0], "span": span_s},
     }
-    names = "".join(f"<option>{html.escape(r.name)}</option>" for r in robots)
+    names = "".join(f"<option>{html.escape(printable(r.name))}</option>" for r in robots)
     choices = f'<select id="robot" aria-label="Robot">{names}</select>'
     choices += '<select id="where" aria-label="Where it fails"></select>'
     data = "".join(

@@ -361,7 +361,7 @@ def _says_same_clock(config_toml: str) -> bool:
     """What `twinmill import --same-clock` noted; robots write other things, or no TOML at all."""
     try:
         table = tomllib.loads(config_toml).get("import")
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return False
     return isinstance(table, dict) and table.get("same_clock") is True
 

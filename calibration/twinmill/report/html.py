@@ -9,6 +9,7 @@ from pathlib import Path
 from markupsafe import Markup, escape
 
 from twinmill.files import REPORT, check_report, made_folder
+from twinmill.foreign_text import printable
 from twinmill.model.model_file import write_whole
 from twinmill.provenance import Provenance
 from twinmill.report.tables import Table, Tone
@@ -93,7 +94,12 @@ def write_report(
 
 def coded(text: str) -> Markup:
     """HTML of a text in which commands stand between back quotes."""
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(printable(text)))))
+
+
+def _shown(value: object) -> object:
+    """A text without what would turn it round or hide it: names of files may be anybody's."""
+    return printable(value) if type(value) is str else value
 
 
 def render_page(title: str, source: Provenance, sections: list[Section], note: str) -> str:
@@ -103,6 +109,7 @@ def render_page(title: str, source: Provenance, sections: list[Section], note: s
     environment = Environment(
         loader=PackageLoader("twinmill.report", "."),
         autoescape=True,
+        finalize=_shown,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -33,9 +33,10 @@ class State:
 
 
 DRIVES = State("drives", is_meant=True)
-WAITS = State("has accepted the start, and has not driven yet: is its clock behind?")
+WAITS = State("has accepted the start, and has not driven yet: its clock may be behind")
 DRIVES_ANEW = State("drives, though its program was started anew: it has autostart")
 SILENT = State("is not heard any more: nobody knows whether it stands")
+UNSIGNED = State("signs nothing with this operator's key any more: nobody knows whether it stands")
 DOUBLE = State("is two robots of one number, or hears another: nobody knows which does what")
 UNCONFIRMED = State("says that it stands, but not that its motor board took zero")
 RESTARTED = State("its program was started anew", stands=True)
@@ -69,7 +70,7 @@ class Held:
         if robot.is_double:
             return DOUBLE
         if time.monotonic() - robot.link_s > SILENT_S:
-            return SILENT
+            return UNSIGNED if robot.is_here else SILENT
         if robot.link_s < self._begin_s:
             return self._told[robot.robot_id]
         is_anew = link.session != self._sessions[robot.robot_id]

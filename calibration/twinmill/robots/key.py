@@ -43,6 +43,8 @@ def load(path: Path | None = None) -> bytes:
             f"--key {file}: there is no key here, so no robot's answer is believed; copy the "
             "operator's, or make one: `twinmill flash`."
         )
+    if not file.is_file():
+        raise ValueError(f"--key {file}: is no file; name the file of a key.")
     if file.stat().st_mode & 0o077:
         raise ValueError(
             f"--key {file}: others may read it; make a new one (remove it, and flash the robots "

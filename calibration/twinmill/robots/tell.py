@@ -23,7 +23,9 @@ ALL = -1
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
 # Before the common instant: time to call a start off that not all have acknowledged.
 CALL_OFF_S = 0.3
+OTHERS_S = 0.3  # in which who was not asked is heard: robots speak 10 times a second or more
 BEGUN_S = 0.5  # after the instant: all that start have said that they drive
+LATE_S = 2.0  # the same where nobody goes on watching; as late a start robots still obey
 TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
@@ -159,8 +161,8 @@ def stop(
     fleet: Fleet,
     robots: set[int],
     timeout_s: float = 10.0,
-    hosts: Sequence[str] = (),
     *,
+    hosts: "Hosts | None" = None,
     waiting: Callable[[set[int]], None] = lambda _: None,
 ) -> list[Answer]:
     """Says stop until all robots have signed that they stand.
@@ -173,7 +175,7 @@ def stop(
         fleet: where they are; robots that it held are held no more.
         robots: whom to stop; empty: all that are, or come to be, there.
         timeout_s: gives up after.
-        hosts: machines to be told besides, by name or address.
+        hosts: machines to be told besides; each has to be heard.
         waiting: told once, soon after stop was first said, which of the robots that were asked or
             heard have not signed; it must not block.
 
@@ -184,20 +186,19 @@ def stop(
         OSError: it could never be said.
     """
     with fleet.unwatched():
-        return _stop(fleet, robots, timeout_s, hosts, waiting=waiting)
+        return _stop(fleet, robots, timeout_s, hosts or Hosts(()), waiting=waiting)
 
 
 def _stop(
     fleet: Fleet,
     robots: set[int],
     timeout_s: float,
-    hosts: Sequence[str],
+    hosts: "Hosts",
     *,
     waiting: Callable[[set[int]], None],
 ) -> list[Answer]:
     command = make_command(VERBS.VERB_STOP)
     fleet.held -= robots or set(fleet.held)
-    addresses = Addresses(hosts)
     begin_s = time.monotonic()
     error: OSError | None = None
     was_said = was_told = False
@@ -210,7 +211,7 @@ def _stop(
         }
 
     def stopped() -> bool:
-        return bool(robots or fleet.robots) and not open_robots()
+        return bool(robots or fleet.robots) and not open_robots() and not hosts.unheard(fleet)
 
     while (passed_s := time.monotonic() - begin_s) < timeout_s:
         if stopped() and (robots or passed_s > STOP_LEAST_S):
@@ -224,7 +225,7 @@ def _stop(
             was_said = True
         except OSError as failure:
             error = failure
-        _say_to_hosts(fleet, command, robots, addresses.known)
+        _say_to_hosts(fleet, command, robots, hosts.addresses)
         fleet.listen(REPEAT_S)
     if error and not was_said:
         raise error
@@ -236,21 +237,31 @@ def _says_that_it_stands(robot: Robot, seq: int) -> bool:
     return robot.confirms(seq) or (not robot.link and seq in robot.acks and robot.stands)
 
 
-class Addresses:
-    """Looks names of machines up in threads of their own: a name server may take seconds to answer.
+class Hosts:
+    """Machines by name, looked up in threads of their own: a name server may take seconds.
 
-    Attributes:
-        known: addresses found so far.
+    Args:
+        names: or addresses.
     """
 
-    def __init__(self, hosts: Sequence[str]):
-        self.known: set[str] = set()
-        for host in hosts:
-            threading.Thread(target=self._look_up, args=(host,), daemon=True).start()
+    def __init__(self, names: Sequence[str]):
+        self._address_of = dict.fromkeys(names, "")
+        for name in names:
+            threading.Thread(target=self._look_up, args=(name,), daemon=True).start()
 
-    def _look_up(self, host: str) -> None:
-        with suppress(OSError, UnicodeError):  # no such machine: it will not answer
-            self.known |= {socket.gethostbyname(host)}
+    def _look_up(self, name: str) -> None:
+        with suppress(OSError, UnicodeError):  # no such machine: it will not be heard
+            self._address_of[name] = socket.gethostbyname(name)
+
+    @property
+    def addresses(self) -> set[str]:
+        """Those found so far."""
+        return set(self._address_of.values()) - {""}
+
+    def unheard(self, fleet: Fleet) -> list[str]:
+        """Names of those from which no robot has spoken."""
+        heard = {host for robot in fleet.robots.values() for host in robot.senders.hosts}
+        return [name for name, address in self._address_of.items() if address not in heard]
 
 
 def _say_to_hosts(fleet: Fleet, command, robots: set[int], hosts: set[str]) -> None:
@@ -272,12 +283,15 @@ class Start:
         sessions: that the start was meant for, by robot; of those that have signed it.
         stopped: what they answered to the stop where the start was called off, as not all had
             acknowledged in time; else empty.
+        late: what those answered to a stop that had accepted, were to drive on by themselves, and
+            had not begun.
     """
 
     utime_us: int
     answers: list[Answer]
     sessions: dict[int, int]
     stopped: list[Answer]
+    late: list[Answer] = field(default_factory=list)
 
     @property
     def called_off(self) -> bool:
@@ -298,7 +312,9 @@ def start(
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
     From then on they are held: as long as the fleet listens, they hear that the operator is there.
-    Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
+    Where this raises, as the fleet's watch does, they may drive: who calls it stops them. One that
+    is to drive on by itself, and does not begin with the others, is stopped: by a clock that is
+    behind it would begin when nobody expects it.
 
     Args:
         fleet: where they are.
@@ -317,10 +333,14 @@ def start(
         fleet, command, robots, until_s=instant_s - CALL_OFF_S, link_timeout_ms=link_timeout_ms
     )
     stopped: list[Answer] = []
+    late: list[Answer] = []
     if partial or all(a.accepted and a.signed for a in given):
         fleet.listen(instant_s - time.monotonic())
         accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-        fleet.listen(BEGUN_S, lambda: not any(robot.mode == "stopped" for robot in accepted))
+        patience_s = BEGUN_S if link_timeout_ms else LATE_S
+        fleet.listen(patience_s, lambda: not any(robot.mode == "stopped" for robot in accepted))
+        waiting = {robot.robot_id for robot in accepted if robot.mode == "stopped"}
+        late = stop(fleet, waiting) if waiting and not link_timeout_ms else []
     else:
         stopped = stop(fleet, robots)
     sessions = {
@@ -330,7 +350,7 @@ def start(
     }
     # An answer that came after the start was called off does not tell why it was.
     final = given if stopped else answers(fleet, command, robots)
-    return Start(command.start_utime_us, final, sessions, stopped)
+    return Start(command.start_utime_us, final, sessions, stopped, late)
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:

@@ -22,7 +22,7 @@ def read_tables(path: Path) -> dict[str, str]:
     """
     try:
         tables = tomllib.loads(path.read_text())
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ValueError(f"{path}: cannot be read as TOML ({error}).") from error
     for name, table in tables.items():
         if not isinstance(table, str):

@@ -20,6 +20,7 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse, Response
 
 from twinmill.charts.stage import STATIC as CHARTS
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.model.model_file import ModelError
 from twinmill.workbench.address_file import address_file
 from twinmill.workbench.bench import Bench
@@ -83,7 +84,7 @@ def serve(bench: Bench, port: int, show: bool, say: Callable[[str], None]) -> No
             await bench.open()
         except (ValueError, OSError) as error:
             failed.append(error)
-            bench.failure = " ".join(str(error).split())
+            bench.failure = plain_line(str(error), MESSAGE_MAX)
             bench.changed("work")
             with suppress(TimeoutError):
                 await asyncio.wait_for(bench.told.wait(), TOLD_S)

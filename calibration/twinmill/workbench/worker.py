@@ -13,6 +13,8 @@ from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any
 
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
+
 PATH_S = 0.1  # between points of a path that is drawn
 YIELDS = 2  # niceness: what the user's hands do goes before
 
@@ -140,7 +142,7 @@ def _serve(pipe: Connection, logs: list[Path]) -> None:
         except BrokenPipeError:  # the server was killed
             return
         except (ValueError, OSError) as error:
-            pipe.send(Done(work, {}, failure=" ".join(str(error).split())))
+            pipe.send(Done(work, {}, failure=plain_line(str(error), MESSAGE_MAX)))
 
 
 def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None]) -> Done:

@@ -9,6 +9,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill.report import Figure, Provenance, Section, render_page
+from twinmill.report.tables import Cell, Table
 from twinmill.workbench.panel import commands_html, escaped
 from twinmill.workbench.screen import _in_script
 
@@ -21,19 +23,25 @@ class Seen(HTMLParser):
 
     def __init__(self, text: str):
         super().__init__()
-        self.tags, self.text = [], ""
+        self.tags, self.attributes, self.text = [], set(), ""
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag, attributes):
         self.tags.append(tag)
+        self.attributes |= dict(attributes).keys()
 
     def handle_data(self, data):
         self.text += data
 
 
-@settings(max_examples=EXAMPLES, deadline=None)
-@given(st.lists(st.text() | st.sampled_from(["<", ">", '"', "'", "&lt;", "<b", "{}"])).map("".join))
+PARTS = ("<", ">", '"', "'", "&lt;", "<b", "{}", "`", "</title>", "</style>", "\u202e", "\udcff")
+texts = st.lists(st.text() | st.sampled_from(PARTS)).map("".join)
+fuzzed = settings(max_examples=EXAMPLES, deadline=None)
+
+
+@fuzzed
+@given(texts)
 @example(FOREIGN)
 def test_texts_are_texts_in_pages(text):
     seen = Seen(escaped('<b title="{}">{}</b>', text, text))
@@ -42,6 +50,32 @@ def test_texts_are_texts_in_pages(text):
     assert set(Seen(commands_html([text])).tags) == {"pre", "span"}
 
 
+def report_page(text: str) -> Seen:
+    """A report that has a text wherever one can be."""
+    table = Table(text, [text], [[Cell(text)]], note=text)
+    section = Section(
+        text, [(text, text, "good")], text, [(text, text)], [Figure("<svg/>", text, text)], [table],
+        next_step=text, commands=[(text, text)], transcript=[(text, text)], notes=[text],
+        warnings=[text], folded=[table],
+    )  # fmt: skip
+    return Seen(render_page(text, Provenance(text, text, text), [section, section], text))
+
+
+def fixed(page: Seen) -> list[str]:
+    """Its elements, without those of lines, and of commands between back quotes."""
+    return [tag for tag in page.tags if tag not in ("p", "code")]
+
+
+@fuzzed
+@given(texts.map(lambda text: f"x{text}"))
+@example(f"x{FOREIGN}")
+def test_texts_add_nothing_but_text_to_reports(text):
+    page, plain = report_page(text), report_page("x")
+    assert (fixed(page), page.attributes) == (fixed(plain), plain.attributes)
+    assert page.text.replace("\n", "").isprintable()
+
+
+@fuzzed
 @given(st.dictionaries(st.text(), st.text()))
 @example({"behavior": "</script><script>window.owned=1</script>"})
 def test_a_text_ends_no_script(value):

@@ -96,7 +96,7 @@ class Plan:
             points, swept, draws = (np.array(data[k]) for k in ("points", "swept", "draws"))
             request = Request.from_json(json.dumps(data["request"]))
             rest = {k: data[k] for k in ("cells", "bits", "repeats", "order", "seed")}
-        except (OSError, EOFError, ValueError, KeyError, TypeError) as error:
+        except (OSError, EOFError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise ValueError("is no file of sealed probabilities, or not a whole one.") from error
         return cls(request=request, expected=Forecast(points, swept, draws), **rest)
 
