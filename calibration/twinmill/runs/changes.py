@@ -17,6 +17,7 @@ from twinmill.model.parameters import drives_sideways
 
 SHARE_95 = 0.975  # quantile of both ends of a 95 % interval
 RIVAL_CHI2 = t_quantile(SHARE_95, 1e6) ** 2  # a rival that explains this much less is ruled out
+AXIS_M = 1e-6  # a wheel so near an axis is to neither side of it
 DRAWS = 20_000  # of runs without a change: a rate of 5 % is known to 0.15 %
 
 
@@ -63,6 +64,19 @@ class Change:
         """95 %."""
         reach = t_quantile(SHARE_95, self.free) * self.std
         return self.value - reach, self.value + reach
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        low, high = self.interval
+        return {
+            "name": self.kind.key,
+            "value": self.value,
+            "std": self.std,
+            "low": low,
+            "high": high,
+            "unit": self.kind.unit,
+            "score": self.score,
+        }
 
 
 @dataclass(frozen=True)
@@ -178,10 +192,10 @@ def _groups(wheels: list[dict], one_to_a_side: bool) -> list[tuple[str, str, lis
     """
     found = [(w["name"], f"the {w['words']} is", [w]) for w in wheels]
     sides = {
-        "left": [w for w in wheels if w["y_m"] > 0],
-        "right": [w for w in wheels if w["y_m"] < 0],
-        "front": [w for w in wheels if w["x_m"] > 0],
-        "rear": [w for w in wheels if w["x_m"] < 0],
+        "left": [w for w in wheels if w["y_m"] > AXIS_M],
+        "right": [w for w in wheels if w["y_m"] < -AXIS_M],
+        "front": [w for w in wheels if w["x_m"] > AXIS_M],
+        "rear": [w for w in wheels if w["x_m"] < -AXIS_M],
     }
     several = {n: own for n, own in sides.items() if 1 < len(own) < len(wheels)}
     if one_to_a_side:

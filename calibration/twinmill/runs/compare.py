@@ -11,13 +11,14 @@ from twinmill.chance import f_above, t_quantile
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.defaults import ALARM_RATE
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.runs.changes import SHARE_95, Change, Judged, kinds_of, rivals
-from twinmill.runs.difference import Difference, difference
+from twinmill.runs.difference import Difference, difference, mean_V
 from twinmill.runs.onset import Onset, onset
-from twinmill.runs.rate import USUAL_RATE, promised, rank_p, runs_for
-from twinmill.runs.reference import Day, charge_matters, day_of, judged, mean_V
+from twinmill.runs.rate import promised, rank_p, runs_for
+from twinmill.runs.reference import Day, day_of, judged
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,14 @@ class Named:
     rivals: tuple[Change, ...]
     onset: Onset
 
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {
+            **self.change.to_json(),
+            "rivals": [r.to_json() for r in self.rivals],
+            "onset": self.onset.to_json(),
+        }
+
 
 @dataclass(frozen=True)
 class RunComparison:
@@ -43,6 +52,7 @@ class RunComparison:
         first, second: the runs.
         whole: all differences of the second run from the first, the marker's included.
         tested: what may be an alarm of the second run, against the healthy runs.
+        tested_keys: of the differences that it is of.
         healthy: scores of the healthy runs, the first run's first: each against all others.
         left_out: sentences on healthy runs that could not be used.
         rate: of false alarms that is asked for.
@@ -54,6 +64,7 @@ class RunComparison:
     second: Opened
     whole: Difference
     tested: Judged
+    tested_keys: tuple[str, ...]
     healthy: tuple[float, ...]
     left_out: tuple[str, ...]
     rate: float
@@ -102,8 +113,7 @@ class RunComparison:
     @property
     def volts(self) -> tuple[float, float]:
         """Mean of the battery in each run; NaN where it was not recorded."""
-        first, second = (o.measurement.track.battery_V for o in (self.first, self.second))
-        return mean_V(first), mean_V(second)
+        return mean_V(self.first), mean_V(self.second)
 
     def size_of(self, key: str) -> tuple[float, float]:
         """A difference and half of its 95 % interval."""
@@ -121,13 +131,55 @@ class RunComparison:
         return max([by_errors, *(self.healthy if self.calibrated else ())])
 
 
+    def to_json(self) -> dict:
+        """The interface's object."""
+        marker = [k for k in self.whole.keys if k.startswith("marker.")]
+        return {
+            "verdict": "changed" if self.changed else "unchanged",
+            "changes": [n.to_json() for n in self.changes],
+            "remounted": self.remounted,
+            "marker": {k.removeprefix("marker."): self._with_interval(k) for k in marker},
+            "late_s": self._with_interval("late_s"),
+            "one_clock": "late_s" in self.tested_keys,
+            "battery_V": list(self.volts),
+            "numbers": [self._number(c) for c in self.tested.changes()],
+            "score": self.score,
+            "alarm_above": self.least_shown,
+            "alarm_rate": self.rate,
+            "p_errors": self.p_errors,
+            "p_rank": self.p_rank,
+            "healthy_runs": len(self.healthy),
+            "promised_rate": self.promised,
+            "first_is_odd": self.first_is_odd,
+            "left_out": list(self.left_out),
+            "runs": [_run_json(o) for o in (self.first, self.second)],
+        }
+
+    def _with_interval(self, key: str) -> dict[str, float]:
+        value, reach = self.size_of(key)
+        return {"value": value, "low": value - reach, "high": value + reach}
+
+    def _number(self, change: Change) -> dict:
+        return {**change.to_json(), "smallest_shown": self.least_shown * change.std}
+
+
+def _run_json(opened: Opened) -> dict:
+    run = opened.measurement
+    return {
+        "log": run.log_name,
+        "log_sha256": run.log_sha256,
+        "robot_id": run.track.robot_id,
+        "recorded_utime_us": run.recorded_utime_us,
+    }
+
+
 def compare_runs(
     first: Measurement,
     second: Measurement,
     model_file: ModelFile,
     *,
     healthy: Sequence[Measurement] = (),
-    rate: float = USUAL_RATE,
+    rate: float = ALARM_RATE,
     tell: Callable[[str], None] = lambda _: None,
 ) -> RunComparison:
     """Compares two runs of one robot.
@@ -147,35 +199,50 @@ def compare_runs(
         LogError: one of the two cannot be judged.
     """
     tell(first.label)
-    opened = _opened(first, model_file)
+    opened = open_run(first, model_file)
     pairs, left_out = [], []
     for run in healthy:
         tell(run.label)
         try:
-            pairs.append(difference(opened, _opened(run, model_file)))
+            pairs.append(difference(opened, open_run(run, model_file)))
         except LogError as error:
             left_out.append(f"Healthy run left out: {error}")
     tell(second.label)
-    other = _opened(second, model_file)
-    whole = difference(opened, other)
-    keys = _may_alarm(whole, opened.one_clock and other.one_clock)
-    kinds, charged = kinds_of(opened.model, keys), charge_matters(opened)
-    told = [pair.only(keys) for pair in (whole, *pairs)]
-    days = [*(day_of(pair, 1) for pair in told), day_of(told[0], 0)]
-    against = [judged(d, _without(days, k), kinds, charged) for k, d in enumerate(days)]
+    other = open_run(second, model_file)
+    result = compared(opened, other, pairs, rate)
+    return replace(result, left_out=tuple(left_out))
+
+
+def compared(
+    first: Opened, second: Opened, healthy: Sequence[Difference], rate: float
+) -> RunComparison:
+    """Compares two opened runs; see `compare_runs`.
+
+    Args:
+        first, second: the runs.
+        healthy: differences of healthy runs from the first one.
+        rate: of false alarms.
+    """
+    whole = difference(first, second)
+    keys = _may_alarm(whole, first.one_clock and second.one_clock)
+    kinds = kinds_of(first.model, keys)
+    pairs = [pair.only(keys) for pair in (whole, *healthy)]
+    days = [*(day_of(pair, 1) for pair in pairs), day_of(pairs[0], 0)]
+    against = [judged(d, _without(days, k), kinds) for k, d in enumerate(days)]
     scores = [a.score for a in against]
     result = RunComparison(
-        first=opened,
-        second=other,
+        first=first,
+        second=second,
         whole=whole,
         tested=against[0],
+        tested_keys=tuple(keys),
         healthy=(scores[-1], *scores[1:-1]),
-        left_out=tuple(left_out),
+        left_out=(),
         rate=rate,
         score=scores[0],
         changes=(),
     )
-    return replace(result, changes=_named(result, told[0]))
+    return replace(result, changes=_named(result, pairs[0]))
 
 
 def of_robot(
@@ -204,7 +271,12 @@ def of_robot(
     return chosen[0]
 
 
-def _opened(run: Measurement, model_file: ModelFile) -> Opened:
+def open_run(run: Measurement, model_file: ModelFile) -> Opened:
+    """A run with its noise floor.
+
+    Raises:
+        LogError: it has none.
+    """
     (opened,) = open_measurements([run], model_file)
     if opened.data is None:
         raise LogError(f"{run.label}: cannot be compared: {opened.floor.reason}.")

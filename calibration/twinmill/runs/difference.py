@@ -93,14 +93,17 @@ def difference(first: Opened, second: Opened) -> Difference:
     Args:
         first, second: runs of one robot, opened with one model, each with a noise floor.
     """
-    model, fresh = _with_changes(first.model)
+    charged = charge_is_known(first, second)
+    model, fresh = _with_changes(first.model, charged)
     quantities = _quantities(model, fresh, first)
     of_each = [q.name for q in quantities if q.paired and q.name != CLOCK]
     changed = [p for instance in fresh.values() for p in effect_parameters(model, instance)]
     changed = [_wide(replace(p, value=0.0)) for p in changed]
     late = [] if _clock_is_free(second) else [_wide(*base_parameters(second.model, [CLOCK]))]
     kept = {p.name for p in changed}
-    opened = [_extended(o, fresh) for o in (first, second)]
+    opened = [
+        o.with_fitted(_with_changes(o.model, charged)[0]) for o in (first, second)
+    ]
     own = [[_wide(p) for p in base_parameters(o.model, of_each)] for o in opened]
     own[1] += [*changed, *late]
     data = [
@@ -113,14 +116,36 @@ def difference(first: Opened, second: Opened) -> Difference:
     return _found(quantities, _fitted(data, [o.model for o in opened], shared))
 
 
-def _with_changes(model: native.Model) -> tuple[native.Model, dict[str, str]]:
+def charge_is_known(*runs: Opened) -> bool:
+    """Whether all runs recorded the battery's voltage, so that speeds may follow it."""
+    return all(np.isfinite(mean_V(o)) for o in runs)
+
+
+def mean_V(opened: Opened) -> float:
+    """Of the battery in a run; NaN where it was not recorded."""
+    volts = opened.measurement.track.battery_V
+    known = volts[np.isfinite(volts) & (volts > 0)]
+    return float(known.mean()) if known.size else float("nan")
+
+
+def follows_charge(model: native.Model) -> bool:
+    """Whether the battery's charge changes speeds; a controller that keeps them makes up for it."""
+    return model.drive == "duty"
+
+
+def _with_changes(model: native.Model, charged: bool) -> tuple[native.Model, dict[str, str]]:
     """The model with how markers sit, and a fresh instance of each effect that may have changed.
+
+    Args:
+        model: of the robot.
+        charged: with what the battery's voltage does, too.
 
     Returns:
         The model, and names of the fresh instances by effect.
     """
     model, fresh = model.copy(), {}
-    for effect in MOUNTING:
+    kept = [*MOUNTING, *([BATTERY] if charged and follows_charge(model) else [])]
+    for effect in kept:
         if effect not in effect_names(model):
             _add_neutral(model, effect)
     for effect in (*(["wheel_gain"] if model.wheel_kind != "none" else []), *MOUNTING):
@@ -135,13 +160,6 @@ def _add_neutral(model: native.Model, effect: str) -> str:
     for p in effect_parameters(model, instance):
         model.set(p.name, p.usual)
     return instance
-
-
-def _extended(opened: Opened, fresh: dict[str, str]) -> Opened:
-    """A run with the same effects in its model as `_with_changes` gives them."""
-    model, same = _with_changes(opened.model)
-    assert same == fresh
-    return opened.with_fitted(model)
 
 
 def _quantities(model: native.Model, fresh: dict[str, str], first: Opened) -> tuple[Quantity, ...]:

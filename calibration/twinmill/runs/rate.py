@@ -10,8 +10,6 @@ Algorithmic learning in a random world, section 2.2).
 import math
 from collections.abc import Sequence
 
-USUAL_RATE = 0.05
-
 
 def rank_p(score: float, healthy: Sequence[float]) -> float:
     """Share of the runs, the new one included, whose score is no less than the new one's."""

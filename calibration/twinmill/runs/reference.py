@@ -9,13 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import twinmill_native as native
 
-from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import catalogue_name
 from twinmill.runs.changes import Judged, Kind
-from twinmill.runs.difference import Difference
+from twinmill.runs.difference import BATTERY, Difference, follows_charge
 
-BATTERY = "battery_sag"
 # A lithium cell between full and empty: charges drawn evenly from that range spread the logarithm
 # of the voltage by this standard deviation.
 FULL_V, EMPTY_V = 4.2, 3.3
@@ -31,14 +30,14 @@ class Day:
         errors: (K, K) their covariance, without the first run's part.
         metric: (K, K) likewise, by the curvature.
         blocks: of time that count as independent.
-        log_volts: logarithm of its battery's mean voltage; NaN where that is unknown.
+        charge_std: of the logarithm of all speeds, due to a charge that is not known.
     """
 
     values: np.ndarray
     errors: np.ndarray
     metric: np.ndarray
     blocks: int
-    log_volts: float
+    charge_std: float
 
 
 def day_of(pair: Difference, run: int) -> Day:
@@ -55,63 +54,40 @@ def day_of(pair: Difference, run: int) -> Day:
         share * pair.covariance,
         share * pair.by_curvature,
         len(np.unique(own.block)),
-        float(np.log(mean_V(own.measurement.track.battery_V))),
+        CHARGE_STD if _charge_is_missed(pair.fit.models[run]) else 0.0,
     )
 
 
-def mean_V(volts: np.ndarray) -> float:
-    """Of what was recorded; NaN if nothing was."""
-    known = volts[np.isfinite(volts) & (volts > 0)]
-    return float(known.mean()) if known.size else float("nan")
+def _charge_is_missed(model: native.Model) -> bool:
+    return follows_charge(model) and BATTERY not in map(catalogue_name, model.effects)
 
 
-def judged(day: Day, others: Sequence[Day], kinds: Sequence[Kind], charged: bool) -> Judged:
+def judged(day: Day, others: Sequence[Day], kinds: Sequence[Kind]) -> Judged:
     """A day against the mean of others.
 
     Args:
         day: it is not among the others.
         others: one at least.
         kinds: of changes that the robot may have.
-        charged: the battery's charge changes all speeds.
     """
     count = len(others)
-    common = np.zeros(len(day.values))
-    if charged:
-        common = next((k.direction for k in kinds if k.key == "wheels.all"), common)
+    nothing = np.zeros(len(day.values))
+    common = next((k.direction for k in kinds if k.key == "wheels.all"), nothing)
     mean = np.mean([o.values for o in others], axis=0)
-    usual_volts = np.mean([o.log_volts for o in others])
-    natural = _between_days(others, mean, usual_volts, common)
-    charge = _charge(day, usual_volts) * np.outer(common, common)
+    natural = _between_days(others, mean, common)
+
+    def own(of: Day, name: str) -> np.ndarray:
+        return getattr(of, name) + of.charge_std**2 * np.outer(common, common)
 
     def summed(name: str) -> np.ndarray:
-        mean_error = sum(getattr(o, name) for o in others) / count**2
-        return getattr(day, name) + mean_error + natural * (1 + 1 / count) + charge
+        mean_error = sum(own(o, name) for o in others) / count**2
+        return own(day, name) + mean_error + natural * (1 + 1 / count)
 
     free = day.blocks + sum(o.blocks for o in others) - 1 - count
     return Judged(day.values - mean, summed("errors"), summed("metric"), max(free, 1), kinds)
 
 
-def charge_matters(first: Opened) -> bool:
-    """Whether speeds depend on the battery's charge in a way that the model does not have.
-
-    A controller that keeps speeds makes up for it.
-    """
-    model = first.model
-    return model.drive == "duty" and BATTERY not in map(catalogue_name, model.effects)
-
-
-def _charge(day: Day, usual_volts: float) -> float:
-    """Variance of the logarithm of all speeds due to the charge.
-
-    Wheels turn faster or more slowly by no more than the share by which voltages differ.
-    """
-    apart = day.log_volts - usual_volts
-    return apart**2 if np.isfinite(apart) else CHARGE_STD**2
-
-
-def _between_days(
-    others: Sequence[Day], mean: np.ndarray, usual_volts: float, common: np.ndarray
-) -> np.ndarray:
+def _between_days(others: Sequence[Day], mean: np.ndarray, common: np.ndarray) -> np.ndarray:
     """(K, K) variances between days beyond what errors and charges explain.
 
     By moments, no less than zero (DerSimonian and Laird 1986).
@@ -119,5 +95,5 @@ def _between_days(
     if len(others) < 2:
         return np.zeros((len(mean), len(mean)))
     squares = sum((o.values - mean) ** 2 for o in others) / (len(others) - 1)
-    explained = [np.diag(o.errors) + _charge(o, usual_volts) * common**2 for o in others]
+    explained = [np.diag(o.errors) + o.charge_std**2 * common**2 for o in others]
     return np.diag(np.maximum(squares - np.mean(explained, axis=0), 0.0))
