@@ -25,10 +25,14 @@ from twinmill.challenge.robots import Robot, draw_robot
 from twinmill.challenge.run import Plan, play, write_log
 from twinmill.data.measurement import load_measurements
 from twinmill.defaults import ALARM_RATE
+from twinmill.files import plain
 from twinmill.fitting.opening import Opened
 from twinmill.model.model_file import ModelFile
-from twinmill.runs.compare import RunComparison, compared, open_run
+from twinmill.runs.alarm import Alarm, alarm
+from twinmill.runs.changes import kinds_of
+from twinmill.runs.compare import may_alarm, open_run
 from twinmill.runs.difference import difference
+from twinmill.runs.reference import Day, day_of
 
 HEALTHY = 19  # runs that calibrate the alarm, the first one included
 TESTS, WEAK_TESTS = 12, 6  # of each robot
@@ -106,23 +110,22 @@ def _with(form: Hidden, **values: float) -> Hidden:
     return replace(form, values=values)
 
 
-def examined(number: int, duration_s: float) -> dict:
-    """All runs of one robot, calibrated and not."""
+def recorded(number: int, duration_s: float) -> dict:
+    """What all runs of one robot tell: healthy ones, then those with a weak wheel."""
     with TemporaryDirectory() as folder:
         drawn = draw(number, Path(folder))
         random = np.random.default_rng([number, 1])
         first = day(drawn, random, duration_s)
-        healthy = [difference(first, day(drawn, random, duration_s)) for _ in range(HEALTHY - 1)]
         names = [w["name"] for w in first.model.wheels()]
         names = names[:2] if drawn.robot.wheels == "differential" else names
         has_wheels = drawn.robot.drive != "twist"
         weak = [str(random.choice(names)) for _ in range(WEAK_TESTS * has_wheels)]
-        tests = []
-        for wheel in [""] * TESTS + weak:
-            second = day(drawn, random, duration_s, wheel)
-            for pairs in ((), healthy):
-                result = compared(first, second, pairs, ALARM_RATE)
-                tests.append(_told(result, wheel, drawn.robot) | {"calibrated": bool(pairs)})
+        days = []
+        for wheel in [""] * (HEALTHY - 1 + TESTS) + weak:
+            pair = difference(first, day(drawn, random, duration_s, wheel))
+            keys = may_alarm(pair, first.one_clock)
+            runs = [day_of(pair.only(keys), k) for k in (0, 1)]
+            days.append({"weak": wheel, "days": [plain(vars(d)) for d in runs]})
     robot = drawn.robot
     return {
         "robot": number,
@@ -130,33 +133,50 @@ def examined(number: int, duration_s: float) -> dict:
         "drive": robot.drive,
         "wheels": robot.wheels,
         "duration_s": duration_s,
-        "tests": tests,
+        "keys": keys,
+        "runs": days,
     }
 
 
-def _told(result: RunComparison, wheel: str, robot: Robot) -> dict:
-    names = {"fl": "wheels.left", "fr": "wheels.right"} if robot.wheels == "differential" else {}
-    true = names.get(wheel, f"wheel.{wheel}")
-    own = next((n.change for n in result.changes if n.change.kind.key == true), None)
-    rivals = [r.kind.key for n in result.changes for r in n.rivals]
+def examined(line: dict) -> list[dict]:
+    """Each test run of a robot against the first run, and against all its healthy runs."""
+    with TemporaryDirectory() as folder:
+        model = draw(line["robot"], Path(folder)).model.model
+    kinds = kinds_of(model, line["keys"])
+    pairs = [[_day(d) for d in run["days"]] for run in line["runs"]]
+    healthy = [own for _, own in pairs[: HEALTHY - 1]]
+    told = []
+    for run, (first, own) in zip(line["runs"][HEALTHY - 1 :], pairs[HEALTHY - 1 :], strict=True):
+        for others in ([], healthy):
+            found = alarm([first, *others, own], kinds, ALARM_RATE)
+            told.append(_told(found, run["weak"], line["wheels"]) | {"calibrated": bool(others)})
+    return told
+
+
+def _day(told: dict) -> Day:
+    arrays = {k: np.array(v) if isinstance(v, list) else v for k, v in told.items()}
+    return Day(**arrays)
+
+
+def _told(found: Alarm, wheel: str, wheels: str) -> dict:
+    sides = {"fl": "wheels.left", "fr": "wheels.right"} if wheels == "differential" else {}
+    true = sides.get(wheel, f"wheel.{wheel}")
+    own = next((c for c, _ in found.found if c.kind.key == true), None)
     return {
         "weak": wheel,
-        "score": result.score,
-        "least_shown": result.least_shown,
-        "changed": result.changed,
-        "told": [n.change.kind.key for n in result.changes],
-        "named": bool(result.changes) and result.changes[0].change.kind.key == true,
-        "rival": true in rivals,
+        "changed": bool(found.found),
+        "named": bool(found.found) and found.found[0][0].kind.key == true,
+        "rival": any(r.kind.key == true for _, rest in found.found for r in rest),
         "covered": own and bool(own.interval[0] <= -WEAKER <= own.interval[1]),
     }
 
 
-def rates(lines: list[dict]) -> list[str]:
+def rates(tests: list[dict]) -> list[str]:
     """What came of it, in sentences."""
     told = []
     for calibrated in (False, True):
-        tests = [t for line in lines for t in line["tests"] if t["calibrated"] == calibrated]
-        still, weak = [t for t in tests if not t["weak"]], [t for t in tests if t["weak"]]
+        same = [t for t in tests if t["calibrated"] == calibrated]
+        still, weak = [t for t in same if not t["weak"]], [t for t in same if t["weak"]]
         covered = [t["covered"] for t in weak if t["covered"] is not None]
         how = f"{HEALTHY} healthy runs" if calibrated else "two runs alone"
         told.append(
@@ -180,11 +200,14 @@ def main() -> None:
         first, _, last = options.robots.partition("-")
         for number in range(int(first), int(last or first) + 1):
             with threadpool_limits(1, "blas"):
-                line = examined(number, options.duration_s)
+                line = recorded(number, options.duration_s)
             with options.out.open("a") as file:
                 file.write(json.dumps(line) + "\n")
     lines = [json.loads(line) for line in options.out.read_text().splitlines()]
-    print(*rates(lines), sep="\n")
+    by_robot = [examined(line) for line in lines]
+    for line, tests in zip(lines, by_robot, strict=True):
+        print(line["robot"], line["plant"], line["drive"], line["wheels"], *rates(tests), sep="; ")
+    print(*rates([t for tests in by_robot for t in tests]), sep="\n")
 
 
 if __name__ == "__main__":

@@ -41,8 +41,8 @@ def verdict(result: RunComparison) -> list[str]:
     if not result.changed:
         return [
             f"Nothing changed from {first} to {second}: the largest difference has "
-            f"{number(result.score)} standard errors, and an alarm takes more than "
-            f"{number(result.least_shown)}."
+            f"{number(result.alarm.score)} standard errors, and an alarm takes more than "
+            f"{number(result.alarm.above)}."
         ]
     return [_told(named, second) for named in result.changes]
 
@@ -50,7 +50,7 @@ def verdict(result: RunComparison) -> list[str]:
 def _told(named: Named, log: str) -> str:
     change = named.change
     begin = "all the time" if named.onset.from_start else _since(named)
-    same = [f"{r.kind.what.split(' is')[0].split(' are')[0]} ({sized(r)})" for r in named.rivals]
+    same = [f"the {label(r)} ({sized(r)})" for r in named.rivals]
     rest = f" As well explained by: {', '.join(same)}." if same else ""
     return f"Changed in {log}: {change.kind.what} {sized(change)} ({interval(change)}), {begin}.{rest}"
 
@@ -58,6 +58,11 @@ def _told(named: Named, log: str) -> str:
 def _since(named: Named) -> str:
     at = named.onset
     return f"since {at.at_s:.0f} s after its start (95 %: {at.low_s:.0f} to {at.high_s:.0f} s)"
+
+
+def label(change: Change) -> str:
+    """Its name without article and verb: `front left wheel`."""
+    return change.kind.what.removeprefix("the ").removesuffix(" is").removesuffix(" are")
 
 
 def sized(change: Change) -> str:
@@ -89,7 +94,7 @@ def apart(result: RunComparison) -> list[str]:
         )
     if follows_charge(result.first.model):
         said.append(_charge(*result.volts))
-    if result.first_is_odd:
+    if result.alarm.first_is_odd:
         said.append(
             f"{result.first.measurement.log_name} is itself the least like all other runs: compare "
             "with another first run."
@@ -125,22 +130,22 @@ def _charge(first_V: float, second_V: float) -> str:
 
 def calibration(result: RunComparison) -> str:
     """How often such an alarm is false."""
-    wanted, needed = f"{100 * result.rate:g} %", runs_for(result.rate)
-    if not result.calibrated:
+    wanted, needed = f"{100 * result.alarm.rate:g} %", runs_for(result.alarm.rate)
+    if not result.alarm.calibrated:
         return (
             f"By the standard errors alone, so large a difference has a chance of "
-            f"{number(result.p_errors, 2)} without a change. That is not calibrated on this robot: "
+            f"{number(result.alarm.p_errors, 2)} without a change. That is not calibrated on this robot: "
             f"what else varies between its days is not known. Give healthy runs with --healthy; "
             f"{needed}, the first one included, promise false alarms in {wanted} of comparisons."
         )
-    count = len(result.healthy)
-    rank = f"{sum(h >= result.score for h in result.healthy)} of {count} healthy runs are as unlike"
+    count = len(result.alarm.healthy)
+    rank = f"{sum(h >= result.alarm.score for h in result.alarm.healthy)} of {count} healthy runs are as unlike"
     if count < needed:
         return (
             f"{rank}. With {count} healthy runs, the first one included, false alarms can be "
             f"promised in no less than one of {count + 1} comparisons; {needed} promise {wanted}. "
             "Until then the standard errors must say so, too (chance "
-            f"{number(result.p_errors, 2)})."
+            f"{number(result.alarm.p_errors, 2)})."
         )
     return f"{rank}: calibrated on this robot, with false alarms in {wanted} of comparisons."
 
@@ -162,14 +167,14 @@ def numbers(result: RunComparison) -> Table:
     """Each kind of change by itself."""
     named = {n.change.kind.key for n in result.changes}
     rows = []
-    for change in result.tested.changes():
+    for change in result.alarm.tested.changes():
         factor, unit = SHOWN[change.kind.unit]
         low, high = change.interval
         tone = "bad" if change.kind.key in named else ""
-        reach = result.least_shown * change.std
+        reach = result.alarm.above * change.std
         rows.append(
             [
-                Cell(change.kind.what.removeprefix("the ").removesuffix(" is").removesuffix(" are"), tone),
+                Cell(label(change), tone),
                 Cell(f"{factor * change.value:+.2f} {unit}", tone),
                 Cell(f"{factor * low:+.2f} to {factor * high:+.2f}"),
                 Cell(f"{abs(change.score):.1f}", tone),
@@ -187,8 +192,8 @@ def section(result: RunComparison) -> Section:
     return Section(
         f"{second.log_name} against {first.log_name}",
         [
-            ("largest difference, standard errors", number(result.score), tone),
-            ("an alarm takes more than", number(result.least_shown), ""),
+            ("largest difference, standard errors", number(result.alarm.score), tone),
+            ("an alarm takes more than", number(result.alarm.above), ""),
         ],
         "\n".join(verdict(result)),
         figures=[intervals(result)],
@@ -201,7 +206,7 @@ def section(result: RunComparison) -> Section:
 
 def intervals(result: RunComparison) -> Figure:
     """All differences with their intervals, and from where on each is an alarm."""
-    changes = result.tested.changes()
+    changes = result.alarm.tested.changes()
     named = {n.change.kind.key for n in result.changes}
     units = [u for u in SHOWN if any(c.kind.unit == u for c in changes)]
     counts = [sum(c.kind.unit == u for c in changes) for u in units]
@@ -211,13 +216,13 @@ def intervals(result: RunComparison) -> Figure:
             own = [c for c in changes if c.kind.unit == unit][::-1]
             factor, words = SHOWN[unit]
             for row, change in enumerate(own):
-                reach = factor * result.least_shown * change.std
+                reach = factor * result.alarm.above * change.std
                 color = PREDICTED if change.kind.key in named else MEASURED
                 axes.barh(row, 2 * reach, left=-reach, color="#efefef", height=0.8)
                 ends = [factor * end for end in change.interval]
                 axes.plot(ends, [row, row], color=color)
                 axes.plot(factor * change.value, row, "o", color=color, ms=4)
-            names = [c.kind.what.removeprefix("the ").rsplit(" ", 1)[0] for c in own]
+            names = [label(c) for c in own]
             axes.set_yticks(range(len(own)), names)
             axes.axvline(0, color="#888888", lw=0.8)
             axes.set_xlabel(f"difference ({words})")
@@ -272,8 +277,8 @@ def _charts(result: RunComparison) -> str:
     return (
         f'<div id="runs" tabindex="0"></div><p class="note">{HINT} Both begin when the robot is '
         "first told to move. Lower curves: what the first run's numbers predict wrongly, with each "
-        "run's own marker and clock. Shaded: where what changed moves a prediction of the second "
-        f"run by more than its noise.</p><script>const RUNS={text};\n{script}</script>"
+        "run's own marker and clock. Shaded: where the change shows; these stretches hold half of "
+        f"what tells it.</p><script>const RUNS={text};\n{script}</script>"
     )
 
 
@@ -322,18 +327,17 @@ def _model(result: RunComparison, run: int, changed: bool):
 
 
 def _marks(result: RunComparison) -> np.ndarray:
-    """(M, 2) s: stretches of the second run in which a prediction moves by more than its noise."""
+    """(M, 2) s: the shortest stretches of the second run that hold half of what tells the change."""
     if not result.changed:
         return np.zeros((0, 2))
     data = result.whole.fit.datasets[1]
     without, with_it = (data.errors(_model(result, 1, changed=c))[:, HORIZON] for c in (False, True))
-    over = np.nan_to_num((with_it - without) / data.floor[HORIZON])  # nothing where not judged
-    moved = np.sqrt((over**2).sum(axis=1) / np.isfinite(data.floor[HORIZON]).sum()) > 1
-    begin = float(data.start_s[0]) + min(n.onset.at_s for n in result.changes)
-    at_s = data.start_s[moved & (data.start_s >= begin)]
-    if not len(at_s):
-        return np.zeros((0, 2))
+    square = (np.nan_to_num((with_it - without) / data.floor[HORIZON]) ** 2).sum(axis=1)
+    begin_s = float(data.start_s[0]) + min(n.onset.at_s for n in result.changes)
+    square *= data.keep & (data.start_s >= begin_s)
+    order = np.argsort(-square)
+    count = int(np.searchsorted(np.cumsum(square[order]), square.sum() / 2)) + 1
+    at_s = np.sort(data.start_s[order[:count]])
     apart = np.flatnonzero(np.diff(at_s) > 1.5 * data.every_s)
-    ends = HORIZONS_S[HORIZON]
-    firsts, lasts = at_s[[0, *(apart + 1)]], at_s[[*apart, len(at_s) - 1]] + ends
-    return np.column_stack([firsts, lasts])
+    firsts, lasts = at_s[[0, *(apart + 1)]], at_s[[*apart, len(at_s) - 1]]
+    return np.column_stack([firsts, lasts + HORIZONS_S[HORIZON]])

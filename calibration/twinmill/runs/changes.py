@@ -86,14 +86,12 @@ class Judged:
     Attributes:
         values: (K,) differences.
         scatter: (K, K) their covariance without a change.
-        metric: (K, K) a covariance with a safe inverse, by which differences are weighted.
         free: degrees of freedom of the standard errors.
         kinds: of the robot.
     """
 
     values: np.ndarray
     scatter: np.ndarray
-    metric: np.ndarray
     free: float
     kinds: Sequence[Kind]
 
@@ -112,7 +110,7 @@ class Judged:
     def _weights(self, kind: Kind, beside: Sequence[Kind] = ()) -> np.ndarray:
         """(K,) of the differences in the size of a kind."""
         directions = np.column_stack([kind.direction, *(k.direction for k in beside)])
-        weighted = np.linalg.pinv(self.metric) @ directions
+        weighted = np.linalg.pinv(self.scatter) @ directions
         return (np.linalg.pinv(directions.T @ weighted) @ weighted.T)[0]
 
     @property
@@ -176,7 +174,7 @@ def kinds_of(model: native.Model, keys: Sequence[str]) -> list[Kind]:
         ("sideways_gain", "the sideways speed is", speed, "1"),
         ("yaw_gain", "the rate of turn is", speed, "1"),
         ("lag_s", "the motors' lag is", ("shorter", "longer"), "s"),
-        ("late_s", "the robot acts", ("earlier", "later"), "s"),
+        ("late_s", "the robot's response is", ("earlier", "later"), "s"),
     ):
         if key in keys:
             found.append(Kind(key, what, *ways, unit, direction(**{key: 1.0})))

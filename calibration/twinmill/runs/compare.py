@@ -3,7 +3,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -14,11 +13,11 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.defaults import ALARM_RATE
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
-from twinmill.runs.changes import SHARE_95, Change, Judged, kinds_of, rivals
+from twinmill.runs.alarm import Alarm, alarm
+from twinmill.runs.changes import SHARE_95, Change, kinds_of
 from twinmill.runs.difference import Difference, difference, mean_V
 from twinmill.runs.onset import Onset, onset
-from twinmill.runs.rate import promised, rank_p, runs_for
-from twinmill.runs.reference import Day, day_of, judged
+from twinmill.runs.reference import day_of
 
 
 @dataclass(frozen=True)
@@ -51,56 +50,24 @@ class RunComparison:
     Attributes:
         first, second: the runs.
         whole: all differences of the second run from the first, the marker's included.
-        tested: what may be an alarm of the second run, against the healthy runs.
-        tested_keys: of the differences that it is of.
-        healthy: scores of the healthy runs, the first run's first: each against all others.
+        tested_keys: of the differences that may be an alarm.
+        alarm: of these, with the healthy runs.
+        changes: what changed, the surest first; empty if nothing did.
         left_out: sentences on healthy runs that could not be used.
-        rate: of false alarms that is asked for.
-        score: of the second run.
-        changes: what changed, largest first; empty if nothing did.
     """
 
     first: Opened
     second: Opened
     whole: Difference
-    tested: Judged
     tested_keys: tuple[str, ...]
-    healthy: tuple[float, ...]
-    left_out: tuple[str, ...]
-    rate: float
-    score: float
+    alarm: Alarm
     changes: tuple[Named, ...]
+    left_out: tuple[str, ...] = ()
 
     @property
     def changed(self) -> bool:
         """Whether there is an alarm."""
         return bool(self.changes)
-
-    @cached_property
-    def p_errors(self) -> float:
-        """Chance of such a score by the standard errors alone."""
-        return self.tested.chance(self.score)
-
-    @property
-    def calibrated(self) -> bool:
-        """Whether there are healthy runs beside the first one."""
-        return len(self.healthy) > 1
-
-    @property
-    def p_rank(self) -> float | None:
-        """Its rank among the healthy runs; None where the first one is the only one."""
-        return rank_p(self.score, self.healthy) if self.calibrated else None
-
-    @property
-    def promised(self) -> float | None:
-        """Rate of false alarms that the healthy runs promise; None where there is but one."""
-        return promised(self.rate, len(self.healthy)) if self.calibrated else None
-
-    @property
-    def first_is_odd(self) -> bool:
-        """Whether the first run is less like all others than any of them."""
-        first, *others = self.healthy
-        return self.calibrated and first > max([self.score, *others])
 
     @property
     def remounted(self) -> bool:
@@ -108,7 +75,7 @@ class RunComparison:
         marker = self.whole.only([k for k in self.whole.keys if k.startswith("marker.")])
         size = len(marker.values)
         square = marker.values @ np.linalg.pinv(marker.covariance) @ marker.values
-        return f_above(square / size, size, self.tested.free) <= self.rate
+        return f_above(square / size, size, self.alarm.tested.free) <= self.alarm.rate
 
     @property
     def volts(self) -> tuple[float, float]:
@@ -118,18 +85,8 @@ class RunComparison:
     def size_of(self, key: str) -> tuple[float, float]:
         """A difference and half of its 95 % interval."""
         own = self.whole.only([key])
-        reach = t_quantile(SHARE_95, self.tested.free) * np.sqrt(own.covariance[0, 0])
+        reach = t_quantile(SHARE_95, self.alarm.tested.free) * np.sqrt(own.covariance[0, 0])
         return float(own.values[0]), float(reach)
-
-    @property
-    def least_shown(self) -> float:
-        """Score from which on there is an alarm."""
-        if len(self.healthy) >= runs_for(self.rate):
-            above = int(self.rate * (len(self.healthy) + 1) + 1e-9)
-            return sorted(self.healthy)[-above]
-        by_errors = float(np.quantile(self.tested.by_errors, 1 - self.rate))
-        return max([by_errors, *(self.healthy if self.calibrated else ())])
-
 
     def to_json(self) -> dict:
         """The interface's object."""
@@ -142,15 +99,15 @@ class RunComparison:
             "late_s": self._with_interval("late_s"),
             "one_clock": "late_s" in self.tested_keys,
             "battery_V": list(self.volts),
-            "numbers": [self._number(c) for c in self.tested.changes()],
-            "score": self.score,
-            "alarm_above": self.least_shown,
-            "alarm_rate": self.rate,
-            "p_errors": self.p_errors,
-            "p_rank": self.p_rank,
-            "healthy_runs": len(self.healthy),
-            "promised_rate": self.promised,
-            "first_is_odd": self.first_is_odd,
+            "numbers": [self._number(c) for c in self.alarm.tested.changes()],
+            "score": self.alarm.score,
+            "alarm_above": self.alarm.above,
+            "alarm_rate": self.alarm.rate,
+            "p_errors": self.alarm.p_errors,
+            "p_rank": self.alarm.p_rank,
+            "healthy_runs": len(self.alarm.healthy),
+            "promised_rate": self.alarm.promised,
+            "first_is_odd": self.alarm.first_is_odd,
             "left_out": list(self.left_out),
             "runs": [_run_json(o) for o in (self.first, self.second)],
         }
@@ -160,7 +117,7 @@ class RunComparison:
         return {"value": value, "low": value - reach, "high": value + reach}
 
     def _number(self, change: Change) -> dict:
-        return {**change.to_json(), "smallest_shown": self.least_shown * change.std}
+        return {**change.to_json(), "smallest_shown": self.alarm.above * change.std}
 
 
 def _run_json(opened: Opened) -> dict:
@@ -224,25 +181,15 @@ def compared(
         rate: of false alarms.
     """
     whole = difference(first, second)
-    keys = _may_alarm(whole, first.one_clock and second.one_clock)
-    kinds = kinds_of(first.model, keys)
-    pairs = [pair.only(keys) for pair in (whole, *healthy)]
-    days = [*(day_of(pair, 1) for pair in pairs), day_of(pairs[0], 0)]
-    against = [judged(d, _without(days, k), kinds) for k, d in enumerate(days)]
-    scores = [a.score for a in against]
-    result = RunComparison(
-        first=first,
-        second=second,
-        whole=whole,
-        tested=against[0],
-        tested_keys=tuple(keys),
-        healthy=(scores[-1], *scores[1:-1]),
-        left_out=(),
-        rate=rate,
-        score=scores[0],
-        changes=(),
-    )
-    return replace(result, changes=_named(result, pairs[0]))
+    keys = may_alarm(whole, first.one_clock and second.one_clock)
+    pairs = [pair.only(keys) for pair in (*healthy, whole)]
+    days = [day_of(pairs[-1], 0), *(day_of(pair, 1) for pair in pairs)]
+    found = alarm(days, kinds_of(first.model, keys), rate)
+    named = []
+    for change, others in found.found:
+        beside = [c for c, _ in found.found if c is not change]
+        named.append(Named(change, others, onset(change, beside, pairs[-1], rate)))
+    return RunComparison(first, second, whole, tuple(keys), found, tuple(named))
 
 
 def of_robot(
@@ -283,28 +230,7 @@ def open_run(run: Measurement, model_file: ModelFile) -> Opened:
     return opened
 
 
-def _may_alarm(whole: Difference, one_clock: bool) -> list[str]:
+def may_alarm(whole: Difference, one_clock: bool) -> list[str]:
     """Keys of differences that no new mounting of the marker and no other clock explains."""
     told = [k for k in whole.keys if not k.startswith("marker.")]
     return [k for k in told if k != "late_s" or one_clock]
-
-
-def _without(days: Sequence[Day], k: int) -> list[Day]:
-    return [*days[:k], *days[k + 1 :]]
-
-
-def _named(result: RunComparison, own: Difference) -> tuple[Named, ...]:
-    """What changed: the largest, then beside it what still is larger than healthy runs allow."""
-    tested, found, others = result.tested, [], []
-    while len(found) < len(tested.values):
-        changes = tested.changes(found)
-        best = max(changes, key=lambda c: abs(c.score))
-        if abs(best.score) <= result.least_shown:
-            break
-        found.append(best.kind)
-        others.append(tuple(rivals(best, changes)))
-    sizes = [tested.sized(kind, [k for k in found if k is not kind]) for kind in found]
-    return tuple(
-        Named(c, rest, onset(c, [s for s in sizes if s is not c], own, result.rate))
-        for c, rest in zip(sizes, others, strict=True)
-    )

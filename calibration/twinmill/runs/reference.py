@@ -27,15 +27,15 @@ class Day:
 
     Attributes:
         values: (K,) its differences from the first run; zeros of that itself.
-        errors: (K, K) their covariance, without the first run's part.
-        metric: (K, K) likewise, by the curvature.
+        variances: (K,) of their errors by leaving out blocks, without the first run's part.
+        by_curvature: (K, K) covariance of their errors likewise, by the curvature of the cost.
         blocks: of time that count as independent.
         charge_std: of the logarithm of all speeds, due to a charge that is not known.
     """
 
     values: np.ndarray
-    errors: np.ndarray
-    metric: np.ndarray
+    variances: np.ndarray
+    by_curvature: np.ndarray
     blocks: int
     charge_std: float
 
@@ -51,7 +51,7 @@ def day_of(pair: Difference, run: int) -> Day:
     share = other.covered_s / (own.covered_s + other.covered_s)
     return Day(
         run * pair.values,
-        share * pair.covariance,
+        share * np.diag(pair.covariance),
         share * pair.by_curvature,
         len(np.unique(own.block)),
         CHARGE_STD if _charge_is_missed(pair.fit.models[run]) else 0.0,
@@ -62,38 +62,51 @@ def _charge_is_missed(model: native.Model) -> bool:
     return follows_charge(model) and BATTERY not in map(catalogue_name, model.effects)
 
 
-def judged(day: Day, others: Sequence[Day], kinds: Sequence[Kind]) -> Judged:
-    """A day against the mean of others.
+def judged(days: Sequence[Day], k: int, kinds: Sequence[Kind]) -> Judged:
+    """One of several days against the mean of the others.
 
     Args:
-        day: it is not among the others.
-        others: one at least.
+        days: two at least; the order of the others has no part in it.
+        k: place of the day.
         kinds: of changes that the robot may have.
     """
-    count = len(others)
-    nothing = np.zeros(len(day.values))
-    common = next((k.direction for k in kinds if k.key == "wheels.all"), nothing)
+    day, others = days[k], [*days[:k], *days[k + 1 :]]
+    count, nothing = len(others), np.zeros(len(days[k].values))
+    common = next((kind.direction for kind in kinds if kind.key == "wheels.all"), nothing)
+    wider = _wider(days)
+    errors = [_errors(d, wider, common) for d in days]
+    own = errors.pop(k)
     mean = np.mean([o.values for o in others], axis=0)
-    natural = _between_days(others, mean, common)
-
-    def own(of: Day, name: str) -> np.ndarray:
-        return getattr(of, name) + of.charge_std**2 * np.outer(common, common)
-
-    def summed(name: str) -> np.ndarray:
-        mean_error = sum(own(o, name) for o in others) / count**2
-        return own(day, name) + mean_error + natural * (1 + 1 / count)
-
-    free = day.blocks + sum(o.blocks for o in others) - 1 - count
-    return Judged(day.values - mean, summed("errors"), summed("metric"), max(free, 1), kinds)
+    between = _between_days(others, mean, errors) * (1 + 1 / count)
+    scatter = own + sum(errors) / count**2 + np.diag(between)
+    free = sum(d.blocks for d in days) - len(days)
+    return Judged(day.values - mean, scatter, max(free, 1), kinds)
 
 
-def _between_days(others: Sequence[Day], mean: np.ndarray, common: np.ndarray) -> np.ndarray:
-    """(K, K) variances between days beyond what errors and charges explain.
+def _wider(days: Sequence[Day]) -> np.ndarray:
+    """(K,) how many times wider errors are by blocks than by the curvature, over all days.
+
+    So the few blocks of a day decide how wide errors are, and not how they go together. Of two
+    days alone nothing shows how drives and days differ: then they are no less than by the
+    curvature, as in fits for evidence.
+    """
+    ratio = sum(d.variances for d in days) / sum(np.diag(d.by_curvature) for d in days)
+    return np.sqrt(np.maximum(ratio, 1.0) if len(days) == 2 else ratio)
+
+
+def _errors(day: Day, wider: np.ndarray, common: np.ndarray) -> np.ndarray:
+    """(K, K) covariance of a day's numbers."""
+    return day.by_curvature * np.outer(wider, wider) + day.charge_std**2 * np.outer(common, common)
+
+
+def _between_days(
+    others: Sequence[Day], mean: np.ndarray, errors: Sequence[np.ndarray]
+) -> np.ndarray:
+    """(K,) variances between days beyond their errors.
 
     By moments, no less than zero (DerSimonian and Laird 1986).
     """
     if len(others) < 2:
-        return np.zeros((len(mean), len(mean)))
+        return np.zeros(len(mean))
     squares = sum((o.values - mean) ** 2 for o in others) / (len(others) - 1)
-    explained = [np.diag(o.errors) + o.charge_std**2 * common**2 for o in others]
-    return np.diag(np.maximum(squares - np.mean(explained, axis=0), 0.0))
+    return np.maximum(squares - np.mean([np.diag(e) for e in errors], axis=0), 0.0)
