@@ -73,7 +73,7 @@ def day(drawn: Drawn, random: np.random.Generator, duration_s: float, weak: str 
         drawn: who drives.
         random: of the day.
         duration_s: of the run, about.
-        weak: name of the wheel that is weaker, in the words of its model; of two to a side both are.
+        weak: name that its model has for the wheel that is weaker; of two to a side both are.
     """
     robot = drawn.robot
     forms = {h.name: h for h in catalogue_forms(robot, random) if h.kind == "plain"}

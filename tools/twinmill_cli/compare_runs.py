@@ -47,7 +47,11 @@ def _compare_runs(
     robot: Annotated[
         int | None,
         typer.Option(
-            "--robot", min=0, max=99, show_default=False, help="Its number, where logs have several."
+            "--robot",
+            min=0,
+            max=99,
+            show_default=False,
+            help="Its number, where logs have several.",
         ),
     ] = None,
     alarm_rate: Annotated[

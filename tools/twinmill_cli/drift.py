@@ -39,7 +39,10 @@ def _drift(
     alarm_rate: Annotated[
         float,
         typer.Option(
-            "--alarm-rate", min=0.001, max=0.5, help="Of an unchanged robot's calibrations, at most."
+            "--alarm-rate",
+            min=0.001,
+            max=0.5,
+            help="Of an unchanged robot's calibrations, at most.",
         ),
     ] = ALARM_RATE,
     as_json: AsJson = False,

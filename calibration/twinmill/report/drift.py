@@ -12,8 +12,8 @@ from twinmill.report.tables import Cell, Table, number
 from twinmill.runs.drift import FEWEST_BEFORE, Drift, Series
 
 NOTE = (
-    "The band of a number is where the next calibration of an unchanged robot lies, by those before "
-    "it; all numbers together leave theirs by chance at the rate of false alarms."
+    "The band of a number is where the next calibration of an unchanged robot lies, by those "
+    "before it; all numbers together leave theirs by chance at the rate of false alarms."
 )
 SPARK = "▁▂▃▄▅▆▇█"
 
@@ -105,7 +105,10 @@ def section(result: Drift) -> Section:
         "\n".join(verdict(result)),
         facts=[
             ("false alarms", f"{100 * result.rate:g} % of calibrations, all numbers together"),
-            *((f"{c.date:%Y-%m-%d %H:%M}", f"{_logs(c.logs)}: {c.model}") for c in result.calibrations),
+            *(
+                (f"{c.date:%Y-%m-%d %H:%M}", f"{_logs(c.logs)}: {c.model}")
+                for c in result.calibrations
+            ),
         ],
         figures=[courses(result)],
         tables=[numbers(result)],

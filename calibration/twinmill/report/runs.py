@@ -25,10 +25,6 @@ from twinmill.runs.rate import runs_for
 from twinmill.runs.reference import CHARGE_STD
 
 SHOWN = {"1": (100.0, "%"), "s": (1000.0, "ms")}  # unit: factor, as a person reads it
-NOTE = (
-    "Both runs are fitted by one model. A difference counts by its standard error, found by leaving "
-    "out blocks of time; the alarm is the largest of all."
-)
 HINT = (
     "Point at the curves, or use the arrow keys, to move the cursor through both runs; the wheel "
     "zooms, a double click shows all."
@@ -52,7 +48,9 @@ def _told(named: Named, log: str) -> str:
     begin = "all the time" if named.onset.from_start else _since(named)
     same = [f"the {label(r)} ({sized(r)})" for r in named.rivals]
     rest = f" As well explained by: {', '.join(same)}." if same else ""
-    return f"Changed in {log}: {change.kind.what} {sized(change)} ({interval(change)}), {begin}.{rest}"
+    return (
+        f"Changed in {log}: {change.kind.what} {sized(change)} ({interval(change)}), {begin}.{rest}"
+    )
 
 
 def _since(named: Named) -> str:
@@ -130,22 +128,23 @@ def _charge(first_V: float, second_V: float) -> str:
 
 def calibration(result: RunComparison) -> str:
     """How often such an alarm is false."""
-    wanted, needed = f"{100 * result.alarm.rate:g} %", runs_for(result.alarm.rate)
-    if not result.alarm.calibrated:
+    found = result.alarm
+    wanted, needed = f"{100 * found.rate:g} %", runs_for(found.rate)
+    chance = number(found.p_errors, 2)
+    if not found.calibrated:
         return (
-            f"By the standard errors alone, so large a difference has a chance of "
-            f"{number(result.alarm.p_errors, 2)} without a change. That is not calibrated on this robot: "
-            f"what else varies between its days is not known. Give healthy runs with --healthy; "
-            f"{needed}, the first one included, promise false alarms in {wanted} of comparisons."
+            f"By the standard errors alone, so large a difference has a chance of {chance} without "
+            "a change. That is not calibrated on this robot: what else varies between its days is "
+            f"not known. Give healthy runs with --healthy; {needed}, the first one included, "
+            f"promise false alarms in {wanted} of comparisons."
         )
-    count = len(result.alarm.healthy)
-    rank = f"{sum(h >= result.alarm.score for h in result.alarm.healthy)} of {count} healthy runs are as unlike"
+    count = len(found.healthy)
+    rank = f"{sum(h >= found.score for h in found.healthy)} of {count} healthy runs are as unlike"
     if count < needed:
         return (
             f"{rank}. With {count} healthy runs, the first one included, false alarms can be "
             f"promised in no less than one of {count + 1} comparisons; {needed} promise {wanted}. "
-            "Until then the standard errors must say so, too (chance "
-            f"{number(result.alarm.p_errors, 2)})."
+            f"Until then the standard errors must say so, too (chance {chance})."
         )
     return f"{rank}: calibrated on this robot, with false alarms in {wanted} of comparisons."
 
@@ -236,11 +235,11 @@ def intervals(result: RunComparison) -> Figure:
     return Figure(
         svg,
         "What differs",
-        "Each by itself with its 95 % interval. Grey: what is no alarm. Red: what is told as changed.",
+        "Each by itself with its 95 % interval. Grey: no alarm. Red: told as changed.",
     )
 
 
-# -- both runs on one axis of time ------------------------------------------------------------------
+# -- both runs on one axis of time -------------------------------------------------------------
 
 
 def _charts(result: RunComparison) -> str:
@@ -291,9 +290,7 @@ def start_s(track: Track) -> float:
 def _panels(series: list[np.ndarray], titles, units, factors) -> list[dict]:
     found = []
     for k, (title, unit, factor) in enumerate(zip(titles, units, factors, strict=True), 1):
-        curves = [
-            {"t": _rounded(s[:, 0], 2), "v": _rounded(factor * s[:, k], 3)} for s in series
-        ]
+        curves = [{"t": _rounded(s[:, 0], 2), "v": _rounded(factor * s[:, k], 3)} for s in series]
         found.append({"title": title, "unit": unit, "curves": curves})
     return found
 
@@ -327,11 +324,13 @@ def _model(result: RunComparison, run: int, changed: bool):
 
 
 def _marks(result: RunComparison) -> np.ndarray:
-    """(M, 2) s: the shortest stretches of the second run that hold half of what tells the change."""
+    """(M, 2) s: the shortest stretches of the second run that hold half of the evidence."""
     if not result.changed:
         return np.zeros((0, 2))
     data = result.whole.fit.datasets[1]
-    without, with_it = (data.errors(_model(result, 1, changed=c))[:, HORIZON] for c in (False, True))
+    without, with_it = (
+        data.errors(_model(result, 1, changed=c))[:, HORIZON] for c in (False, True)
+    )
     square = (np.nan_to_num((with_it - without) / data.floor[HORIZON]) ** 2).sum(axis=1)
     begin_s = float(data.start_s[0]) + min(n.onset.at_s for n in result.changes)
     square *= data.keep & (data.start_s >= begin_s)

@@ -151,6 +151,7 @@ def rivals(change: Change, changes: Sequence[Change]) -> list[Change]:
 
 def kinds_of(model: native.Model, keys: Sequence[str]) -> list[Kind]:
     """What may change of a robot whose differences have these keys."""
+
     def direction(**sizes: float) -> np.ndarray:
         return np.array([sizes.get(key, 0.0) for key in keys])
 

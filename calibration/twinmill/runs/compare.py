@@ -145,8 +145,8 @@ def compare_runs(
     Where they are too few for the rate, the standard errors must say so, too.
 
     Args:
-        first, second: the runs; the first one is what the second one and the healthy ones are
-            compared with.
+        first: run that was healthy.
+        second: run in question.
         model_file: of the robot.
         healthy: more runs of it, on other days, in which nothing was wrong.
         rate: of false alarms.
@@ -176,7 +176,8 @@ def compared(
     """Compares two opened runs; see `compare_runs`.
 
     Args:
-        first, second: the runs.
+        first: run that was healthy.
+        second: run in question.
         healthy: differences of healthy runs from the first one.
         rate: of false alarms.
     """

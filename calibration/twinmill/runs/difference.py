@@ -91,7 +91,8 @@ def difference(first: Opened, second: Opened) -> Difference:
     """Fits both runs together.
 
     Args:
-        first, second: runs of one robot, opened with one model, each with a noise floor.
+        first: run of a robot, with a noise floor.
+        second: another run of it, opened with the same model.
     """
     charged = charge_is_known(first, second)
     model, fresh = _with_changes(first.model, charged)
@@ -101,9 +102,7 @@ def difference(first: Opened, second: Opened) -> Difference:
     changed = [_wide(replace(p, value=0.0)) for p in changed]
     late = [] if _clock_is_free(second) else [_wide(*base_parameters(second.model, [CLOCK]))]
     kept = {p.name for p in changed}
-    opened = [
-        o.with_fitted(_with_changes(o.model, charged)[0]) for o in (first, second)
-    ]
+    opened = [o.with_fitted(_with_changes(o.model, charged)[0]) for o in (first, second)]
     own = [[_wide(p) for p in base_parameters(o.model, of_each)] for o in opened]
     own[1] += [*changed, *late]
     data = [
@@ -178,9 +177,7 @@ def _quantities(model: native.Model, fresh: dict[str, str], first: Opened) -> tu
     found.append(Quantity("late_s", "s", CLOCK, _clock_is_free(first)))
     for effect in MOUNTING:
         own = effect_parameters(model, fresh[effect])
-        found += [
-            Quantity(f"marker.{p.name.split('.')[-1]}", p.unit, p.name, False) for p in own
-        ]
+        found += [Quantity(f"marker.{p.name.split('.')[-1]}", p.unit, p.name, False) for p in own]
     return tuple(found)
 
 

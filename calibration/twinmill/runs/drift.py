@@ -58,7 +58,7 @@ class Series:
 
     @property
     def left(self) -> bool:
-        """Whether the last calibration is out of its band, or all have a trend; never of nuisance."""
+        """Whether the last calibration is out of its band, or all have a trend; no nuisance is."""
         return not self.natural and bool(self.outside[-1] or self.drifts)
 
 
@@ -133,9 +133,7 @@ def _is_natural(name: str) -> bool:
 
 
 def _series(calibrations: Sequence[Calibration], name: str, rate: float) -> Series:
-    found = [
-        (day, n) for day, c in enumerate(calibrations) for n in c.numbers if n.name == name
-    ]
+    found = [(day, n) for day, c in enumerate(calibrations) for n in c.numbers if n.name == name]
     values, stds = (np.array([getattr(n, k) for _, n in found]) for k in ("value", "std"))
     bands = [_band(values[:k], stds[:k], stds[k], rate / TESTS) for k in range(len(found))]
     low, high = np.array(bands).T

@@ -57,9 +57,7 @@ def onset(change: Change, beside: Sequence[Change], tested: Difference, rate: fl
     return Onset(*(float(t) - begin_s for t in (start_s[best], close.min(), close.max())))
 
 
-def _gain_by_moment(
-    change: Change, beside: Sequence[Change], tested: Difference
-) -> np.ndarray:
+def _gain_by_moment(change: Change, beside: Sequence[Change], tested: Difference) -> np.ndarray:
     """(W,) by how much chi squared falls for a change that begins with each prediction."""
     fit = tested.fit
     rows, slopes, _ = fit.whitened([0, 1])
