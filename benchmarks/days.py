@@ -30,7 +30,7 @@ from twinmill.fitting.opening import Opened
 from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import Alarm, alarm
 from twinmill.runs.changes import kinds_of
-from twinmill.runs.compare import may_alarm, open_run
+from twinmill.runs.compare import may_alarm, open_run, second_half
 from twinmill.runs.difference import difference
 from twinmill.runs.reference import Day, day_of
 
@@ -122,10 +122,11 @@ def recorded(number: int, duration_s: float) -> dict:
         weak = [str(random.choice(names)) for _ in range(WEAK_TESTS * has_wheels)]
         days = []
         for wheel in [""] * (HEALTHY - 1 + TESTS) + weak:
-            pair = difference(first, day(drawn, random, duration_s, wheel))
-            keys = may_alarm(pair, first.one_clock)
-            runs = [day_of(pair.only(keys), k) for k in (0, 1)]
-            days.append({"weak": wheel, "days": [plain(vars(d)) for d in runs]})
+            second = day(drawn, random, duration_s, wheel)
+            pairs = [difference(first, run) for run in (second, second_half(second))]
+            keys = may_alarm(pairs[0], first.one_clock)
+            told = [[plain(vars(day_of(p.only(keys), k))) for k in (0, 1)] for p in pairs]
+            days.append({"weak": wheel, "whole": told[0], "half": told[1]})
     robot = drawn.robot
     return {
         "robot": number,
@@ -143,13 +144,17 @@ def examined(line: dict) -> list[dict]:
     with TemporaryDirectory() as folder:
         model = draw(line["robot"], Path(folder)).model.model
     kinds = kinds_of(model, line["keys"])
-    pairs = [[_day(d) for d in run["days"]] for run in line["runs"]]
-    healthy = [own for _, own in pairs[: HEALTHY - 1]]
+    healthy = [_day(run["whole"][1]) for run in line["runs"][: HEALTHY - 1]]
     told = []
-    for run, (first, own) in zip(line["runs"][HEALTHY - 1 :], pairs[HEALTHY - 1 :], strict=True):
-        for others in ([], healthy):
-            found = alarm([first, *others, own], kinds, ALARM_RATE)
-            told.append(_told(found, run["weak"], line["wheels"]) | {"calibrated": bool(others)})
+    for run in line["runs"][HEALTHY - 1 :]:
+        pieces = [[_day(d) for d in run[piece]] for piece in ("whole", "half")]
+        alone = (alarm(days, kinds, ALARM_RATE, len(pieces)) for days in pieces)
+        first, own = pieces[0]
+        for found, calibrated in (
+            (min(alone, key=lambda a: a.p_errors), False),
+            (alarm([first, *healthy, own], kinds, ALARM_RATE), True),
+        ):
+            told.append(_told(found, run["weak"], line["wheels"]) | {"calibrated": calibrated})
     return told
 
 

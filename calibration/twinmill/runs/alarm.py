@@ -21,12 +21,14 @@ class Alarm:
         score: the largest of them, in standard errors.
         healthy: scores of the healthy runs, the first run's first: each against all others.
         rate: of false alarms that is asked for.
+        pieces: stretches of the run that are judged; each has its share of the rate.
     """
 
     tested: Judged
     score: float
     healthy: tuple[float, ...]
     rate: float
+    pieces: int = 1
 
     @property
     def calibrated(self) -> bool:
@@ -36,7 +38,7 @@ class Alarm:
     @property
     def p_errors(self) -> float:
         """Chance of such a score by the standard errors alone."""
-        return self.tested.chance(self.score)
+        return min(1.0, self.pieces * self.tested.chance(self.score))
 
     @property
     def p_rank(self) -> float | None:
@@ -63,7 +65,7 @@ class Alarm:
         if len(self.healthy) >= runs_for(self.rate):
             place = int(self.rate * (len(self.healthy) + 1) + 1e-9)
             return sorted(self.healthy)[-place]
-        by_errors = float(np.quantile(self.tested.by_errors, 1 - self.rate))
+        by_errors = float(np.quantile(self.tested.by_errors, 1 - self.rate / self.pieces))
         return max([by_errors, *(self.healthy if self.calibrated else ())])
 
     @cached_property
@@ -85,14 +87,15 @@ class Alarm:
         return list(zip(sizes, others, strict=True))
 
 
-def alarm(days: Sequence[Day], kinds: Sequence[Kind], rate: float) -> Alarm:
+def alarm(days: Sequence[Day], kinds: Sequence[Kind], rate: float, pieces: int = 1) -> Alarm:
     """Judges the last day by the others, and each of these by all, itself left out.
 
     Args:
         days: the first run, other healthy ones, and the run in question.
         kinds: of changes that the robot may have.
         rate: of false alarms.
+        pieces: see `Alarm`.
     """
     against = [judged(days, k, kinds) for k in range(len(days))]
     *healthy, score = (a.score for a in against)
-    return Alarm(against[-1], score, tuple(healthy), rate)
+    return Alarm(against[-1], score, tuple(healthy), rate, pieces)

@@ -14,7 +14,7 @@ from twinmill.defaults import ALARM_RATE
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import Alarm, alarm
-from twinmill.runs.changes import SHARE_95, Change, kinds_of
+from twinmill.runs.changes import SHARE_95, Change, Judged, kinds_of
 from twinmill.runs.difference import Difference, difference, mean_V
 from twinmill.runs.onset import Onset, onset
 from twinmill.runs.reference import day_of
@@ -183,14 +183,44 @@ def compared(
     """
     whole = difference(first, second)
     keys = may_alarm(whole, first.one_clock and second.one_clock)
-    pairs = [pair.only(keys) for pair in (*healthy, whole)]
-    days = [day_of(pairs[-1], 0), *(day_of(pair, 1) for pair in pairs)]
-    found = alarm(days, kinds_of(first.model, keys), rate)
+    others = [pair.only(keys) for pair in healthy]
+    kinds = kinds_of(first.model, keys)
+
+    def judge(pair: Difference, pieces: int = 1) -> Alarm:
+        days = [day_of(pair, 0), *(day_of(other, 1) for other in others), day_of(pair, 1)]
+        return alarm(days, kinds, rate, pieces)
+
+    own = whole.only(keys)
+    found = judge(own)
+    if not others:
+        pieces = (own, difference(first, second_half(second)).only(keys))
+        found = min((judge(pair, len(pieces)) for pair in pieces), key=lambda a: a.p_errors)
     named = []
-    for change, others in found.found:
+    for change, rest in found.found:
         beside = [c for c, _ in found.found if c is not change]
-        named.append(Named(change, others, onset(change, beside, pairs[-1], rate)))
+        named.append(Named(change, rest, onset(change, beside, own, rate)))
+    since_s = max((n.onset.at_s for n in named), default=0.0)
+    if since_s:
+        after = judge(difference(first, _since(second, since_s)).only(keys)).tested
+        named = [replace(n, change=_sized_anew(n, named, after)) for n in named]
     return RunComparison(first, second, whole, tuple(keys), found, tuple(named))
+
+
+def second_half(opened: Opened) -> Opened:
+    """The second half of a run; what changes within a run looks like scatter of the whole."""
+    return _since(opened, float(np.ptp(opened.data.start_s)) / 2)
+
+
+def _since(opened: Opened, at_s: float) -> Opened:
+    """A run from a moment on, s since its start."""
+    data = opened.data
+    late = data.start_s >= data.start_s[0] + at_s
+    return replace(opened, data=replace(data, keep=data.keep & late))
+
+
+def _sized_anew(own: Named, named: Sequence[Named], after: Judged) -> Change:
+    kinds = [n.change.kind for n in named if n is not own]
+    return after.sized(own.change.kind, kinds)
 
 
 def of_robot(

@@ -53,7 +53,7 @@ def day_of(pair: Difference, run: int) -> Day:
         run * pair.values,
         share * np.diag(pair.covariance),
         share * pair.by_curvature,
-        len(np.unique(own.block)),
+        len(np.unique(own.block[np.repeat(own.keep, own.measured[0].size)])),
         CHARGE_STD if _charge_is_missed(pair.fit.models[run]) else 0.0,
     )
 
