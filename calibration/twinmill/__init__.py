@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Log as Log
     from twinmill.api import Model as Model
     from twinmill.api import compare as compare
+    from twinmill.api import compare_runs as compare_runs
     from twinmill.api import diagnose as diagnose
     from twinmill.api import effect as effect
     from twinmill.api import effects as effects
@@ -43,6 +44,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.results import Effect as Effect
     from twinmill.results import Inference as Inference
     from twinmill.results import NextRun as NextRun
+    from twinmill.results import RunComparison as RunComparison
     from twinmill.results import SwarmComparison as SwarmComparison
 
 # Where each public name is; imported when it is first used.
@@ -52,13 +54,23 @@ _HOME = {
     **dict.fromkeys(
         (
             *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),
-            *("compare", "diagnose", "effect", "effects", "explain", "fit", "import_log"),
-            *("infer", "load", "next_run", "simulate"),
+            *(
+                "compare",
+                "compare_runs",
+                "diagnose",
+                "effect",
+                "effects",
+                "explain",
+                "fit",
+                "import_log",
+            ),
+            *("import_log", "infer", "load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),
     **dict.fromkeys(
-        ("Comparison", "Effect", "Inference", "NextRun", "SwarmComparison"), "twinmill.results"
+        ("Comparison", "Effect", "Inference", "NextRun", "RunComparison", "SwarmComparison"),
+        "twinmill.results",
     ),
 }
 __all__ = sorted(_HOME)

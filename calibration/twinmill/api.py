@@ -39,7 +39,7 @@ from twinmill.data.log import LogError, RobotLog, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import read_multi_log
 from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
-from twinmill.defaults import DEFAULT_MODEL, LogFormat, ModelFormat, least_seeds
+from twinmill.defaults import ALARM_RATE, DEFAULT_MODEL, LogFormat, ModelFormat, least_seeds
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis import explain as _explain
 from twinmill.diagnosis.finding import Finding as _Found
@@ -67,9 +67,12 @@ from twinmill.results import (
     Effect,
     Inference,
     NextRun,
+    RunComparison,
     SwarmComparison,
     errors_drawn,
 )
+from twinmill.runs.compare import compare_runs as _compare_runs
+from twinmill.runs.compare import of_robot
 from twinmill.shown import (
     A_PATH,
     Reported,
@@ -1230,6 +1233,59 @@ def compare(log: Log | str | Path, model: Model | str | Path | None = None) -> C
     model = _model(model)
     measurements = _log(log).measurements(model)
     return _told(Comparison(_compare.compare(measurements, model.file)), measurements)
+
+
+@_one_thread
+def compare_runs(
+    first: Log | str | Path,
+    second: Log | str | Path,
+    model: Model | str | Path | None = None,
+    *,
+    healthy: Iterable[Log | str | Path] = (),
+    robot: int | None = None,
+    alarm_rate: float = ALARM_RATE,
+    progress: Callable[[str], None] | None = None,
+) -> RunComparison:
+    """Tells whether anything changed between two runs of one robot: what, how much, since when.
+
+    What varies from day to day is told apart: how the marker is mounted, the battery's charge, the
+    clocks' offset.
+
+    Args:
+        first: a healthy run, or the path of one.
+        second: a later run of that robot.
+        model: a model, or the name of one; None is TurboPi's.
+        healthy: more healthy runs, on other days, which calibrate the alarm on this robot.
+        robot: its number, where logs have several.
+        alarm_rate: share of comparisons without a change that may be called changed.
+        progress: is told in words what is being done.
+
+    Returns:
+        What changed, with intervals, and what differs without being a change.
+
+    Raises:
+        LogError: a run cannot be judged, or has several robots; one sentence.
+        ModelError: the model cannot be read.
+        ValueError: the rate is not between 0 and 1.
+
+    Examples:
+        >>> runs = tm.compare_runs("run.lcmlog", "later.lcmlog", "fitted.toml")
+        >>> runs.changed
+        False
+    """
+    model = _model(model)
+    rate = float(checked("alarm_rate", alarm_rate, *NUMBER))
+    if not 0 < rate < 1:
+        raise ValueError(f"alarm_rate: is {rate:g}, and must be between 0 and 1.")
+    given = [_log(log) for log in (first, second, *healthy)]
+    with said_in_python():
+        a, b, *others = (of_robot(g.measurements(model), g.paths[0].name, robot) for g in given)
+        known = (a.log_sha256, b.log_sha256)
+        others = [m for m in others if m.log_sha256 not in known]
+        found = _compare_runs(
+            *(a, b, model.file), healthy=others, rate=rate, tell=progress or (lambda _: None)
+        )
+    return RunComparison(found)
 
 
 @_one_thread

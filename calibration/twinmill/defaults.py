@@ -10,6 +10,8 @@ FOREVER_S = 1e9  # how long a bus is listened to where nothing else is said
 # LCM's default group, one hop far: the robots' bus.
 URL = "udpm://239.255.76.67:7667?ttl=1"
 
+ALARM_RATE = 0.05  # of comparisons of runs without a change, and of calibrations
+
 # Chance that a swarm of the model itself is called different from it, both tests together.
 FALSE_ALARMS = 0.05
 

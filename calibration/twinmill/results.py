@@ -20,12 +20,14 @@ from twinmill.report import (
     error_figures,
     inference,
     next_run_figures,
+    runs,
     sections,
     show,
     steady,
     swarm_comparison,
 )
 from twinmill.report import next_run as next_run_report
+from twinmill.runs import compare as _compare_runs
 from twinmill.shown import Reported, Shown, replacing_in_python
 from twinmill.swarm import compare as _compare_swarm
 
@@ -137,6 +139,61 @@ class Inference(Shown):
 
     def __repr__(self) -> str:
         return f"Inference({self.verdict}: {self.sentence})"
+
+
+class RunComparison(Reported):
+    """What changed between two runs of one robot.
+
+    Attributes:
+        changed: whether anything did, beyond what varies from day to day.
+        verdict: what, by how much, and since when; or that nothing did.
+        p_value: rank among the healthy runs; without any, chance by the standard errors alone.
+        remounted: whether the marker was mounted anew, which is no change of the robot.
+
+    Examples:
+        >>> tm.compare_runs("run.lcmlog", "later.lcmlog", "fitted.toml").changed
+        False
+    """
+
+    def __init__(self, result: _compare_runs.RunComparison):
+        self._result = result
+        self.changed, self.remounted = result.changed, result.remounted
+        self.verdict = " ".join(runs.verdict(result))
+        found = result.alarm
+        self.p_value = found.p_errors if found.p_rank is None else found.p_rank
+
+    def table(self) -> pd.DataFrame:
+        """Each kind of change by itself, were it all that changed.
+
+        Returns:
+            name, value, std, low, high (95 %), unit, score (value over std), smallest_shown.
+
+        Examples:
+            >>> "wheels.left" in set(runs.table()["name"])
+            True
+        """
+        return pd.DataFrame(self._result.to_json()["numbers"])
+
+    def plot(self) -> Figure:
+        """All differences with their intervals, and from where on each is an alarm.
+
+        Returns:
+            A figure of matplotlib: shares in percent, and times in ms.
+
+        Examples:
+            >>> len(runs.plot().axes)
+            2
+        """
+        return runs.intervals(self._result).svg.picture
+
+    def _page(self) -> tuple[report.Section, str]:
+        return runs.section(self._result), "twinmill.compare_runs"
+
+    def _text(self) -> RenderableType:
+        return runs.terminal(self._result)
+
+    def __repr__(self) -> str:
+        return f"RunComparison({self.verdict})"
 
 
 class NextRun(Reported):

@@ -20,6 +20,9 @@ from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import RobotLog
 from twinmill_cli import main
 
+sys.path.insert(0, str(Path(__file__).parent))
+from same_robot import make_days
+
 NOISE = """
 [noise]
 sensor_m = 0.0003
@@ -211,3 +214,9 @@ def _coasting(
     )
     import_log(poses, commands, folder / "run.lcmlog", options=ImportOptions())
     return CoastingRobot(folder / "run.lcmlog", folder / "model.toml", folder / "true.toml", 0.7)
+
+
+@pytest.fixture(scope="session")
+def same_robot(tmp_path_factory) -> dict[str, Path]:
+    """Logs of one robot on four days, by name; `model.toml` is beside them."""
+    return make_days(tmp_path_factory.mktemp("days"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shlex
 from functools import partial
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -22,6 +23,7 @@ if working():  # not for --help
     from twinmill.model.parameters import find_effect
     from twinmill.report import show
     from twinmill.report.sections import added_section, comparison_section, fit_section
+    from twinmill.runs.history import append, calibration, check_history
     from twinmill_cli.frame import (
         command_line,
         finish,
@@ -69,6 +71,15 @@ def _fit(
     *,
     model: Model = DEFAULT_MODEL,
     hold: Hold = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            "--history",
+            metavar="FILE",
+            show_default=False,
+            help="Append the numbers to the history of the robot (.jsonl), for `twinmill drift`.",
+        ),
+    ] = None,
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
@@ -78,14 +89,19 @@ def _fit(
     Example: twinmill fit run.lcmlog --model turbopi.toml -o fitted.toml
     """
     held = hold or []
-    verb = shlex.join(["fit", *holding(held)])
+    kept = [] if history is None else ["--history", str(history)]
+    verb = shlex.join(["fit", *holding(held), *kept])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
     check_new_file(output, force, [model_file.path, *logs])
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file)
+        if history:
+            check_history(history, measurements)
         result = fit(measurements, model_file, output, source.command, held=held, force=force)
+        if history:
+            append(history, calibration(result, measurements, logs, history))
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section=section, as_json=as_json, out=out)

@@ -76,6 +76,16 @@ COMMANDS = (
         "Tell how well a model predicts logs, against the log's own noise, and where it fails.",
     ),
     (
+        "compare-runs",
+        "compare_runs",
+        "Tell whether anything changed between two runs of one robot: what, how much, since when.",
+    ),
+    (
+        "drift",
+        "drift",
+        "Draw a robot's numbers over its calibrations, and tell which left its band.",
+    ),
+    (
         "fit",
         "calibrate",
         "Fit all quantities of a model to logs; writes a new model file and leaves the old one.",
@@ -231,7 +241,8 @@ def _options(
 
     `twinmill --install-completion` lets the shell complete commands and options.
 
-    Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line, 130 stopped.
+    Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line, 3 something
+    changed (compare-runs, drift), 130 stopped.
     """
 
 

@@ -29,11 +29,13 @@ class Plan:
         robot: who drives.
         legs: what it is told.
         seed: of disturbance, sensor and chance.
+        full_V: of the battery when the drive begins.
     """
 
     robot: Robot
     legs: list[Leg]
     seed: int
+    full_V: float = 8.3
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def play(plan: Plan, hidden: Sequence[Hidden] = (), forces: bool = False, calm: 
     tick_s, axes = sampled(plan.legs, robot.control_hz)
     command = _commanded(robot, axes)
     t_s = np.arange(0, tick_s[-1], STEP_S)
-    battery_V = 8.3 - random.uniform(0.4, 1.1) * t_s / t_s[-1]
+    battery_V = plan.full_V - random.uniform(0.4, 1.1) * t_s / t_s[-1]
     noise = _disturbance(robot, len(t_s), random) * (not calm)
     at_s = _acted("command", tick_s, hidden, Signals(robot, command, battery_V, axes, random))
     row = np.clip(np.searchsorted(at_s, t_s + STEP_S / 2, side="right") - 1, 0, None)

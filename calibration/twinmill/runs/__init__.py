@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One robot on several days: what changed between two runs, and how its numbers drift."""

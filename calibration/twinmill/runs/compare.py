@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Did anything change between two runs of one robot: by name, by how much, from when on?"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from twinmill.chance import f_above, t_quantile
+from twinmill.data.log import LogError
+from twinmill.data.measurement import Measurement
+from twinmill.data.steady_table import SteadyTable
+from twinmill.defaults import ALARM_RATE
+from twinmill.fitting.opening import Opened, open_measurements
+from twinmill.model.model_file import ModelFile
+from twinmill.runs.alarm import Alarm, alarm
+from twinmill.runs.changes import SHARE_95, Change, Judged, kinds_of
+from twinmill.runs.difference import Difference, difference, mean_V
+from twinmill.runs.onset import Onset, onset
+from twinmill.runs.reference import day_of
+
+
+@dataclass(frozen=True)
+class Named:
+    """A change that is told.
+
+    Attributes:
+        change: what, and by how much.
+        rivals: what explains the differences as well.
+        onset: from when on.
+    """
+
+    change: Change
+    rivals: tuple[Change, ...]
+    onset: Onset
+
+    def to_json(self) -> dict:
+        """Fields of the interface."""
+        return {
+            **self.change.to_json(),
+            "rivals": [r.to_json() for r in self.rivals],
+            "onset": self.onset.to_json(),
+        }
+
+
+@dataclass(frozen=True)
+class RunComparison:
+    """Two runs of one robot.
+
+    Attributes:
+        first, second: the runs.
+        whole: all differences of the second run from the first, the marker's included.
+        tested_keys: of the differences that may be an alarm.
+        alarm: of these, with the healthy runs.
+        changes: what changed, the surest first; empty if nothing did.
+        left_out: sentences on healthy runs that could not be used.
+    """
+
+    first: Opened
+    second: Opened
+    whole: Difference
+    tested_keys: tuple[str, ...]
+    alarm: Alarm
+    changes: tuple[Named, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether there is an alarm."""
+        return bool(self.changes)
+
+    @property
+    def remounted(self) -> bool:
+        """Whether the marker sits elsewhere, at the same rate of false alarms."""
+        marker = self.whole.only([k for k in self.whole.keys if k.startswith("marker.")])
+        size = len(marker.values)
+        square = marker.values @ np.linalg.pinv(marker.covariance) @ marker.values
+        return f_above(square / size, size, self.alarm.tested.free) <= self.alarm.rate
+
+    @property
+    def volts(self) -> tuple[float, float]:
+        """Mean of the battery in each run; NaN where it was not recorded."""
+        return mean_V(self.first), mean_V(self.second)
+
+    def size_of(self, key: str) -> tuple[float, float]:
+        """A difference and half of its 95 % interval."""
+        own = self.whole.only([key])
+        reach = t_quantile(SHARE_95, self.alarm.tested.free) * np.sqrt(own.covariance[0, 0])
+        return float(own.values[0]), float(reach)
+
+    def to_json(self) -> dict:
+        """The interface's object."""
+        marker = [k for k in self.whole.keys if k.startswith("marker.")]
+        return {
+            "verdict": "changed" if self.changed else "unchanged",
+            "changes": [n.to_json() for n in self.changes],
+            "remounted": self.remounted,
+            "marker": {k.removeprefix("marker."): self._with_interval(k) for k in marker},
+            "late_s": self._with_interval("late_s"),
+            "one_clock": "late_s" in self.tested_keys,
+            "battery_V": list(self.volts),
+            "numbers": [self._number(c) for c in self.alarm.tested.changes()],
+            "score": self.alarm.score,
+            "alarm_above": self.alarm.above,
+            "alarm_rate": self.alarm.rate,
+            "p_errors": self.alarm.p_errors,
+            "p_rank": self.alarm.p_rank,
+            "healthy_runs": len(self.alarm.healthy),
+            "promised_rate": self.alarm.promised,
+            "first_is_odd": self.alarm.first_is_odd,
+            "left_out": list(self.left_out),
+            "runs": [_run_json(o) for o in (self.first, self.second)],
+        }
+
+    def _with_interval(self, key: str) -> dict[str, float]:
+        value, reach = self.size_of(key)
+        return {"value": value, "low": value - reach, "high": value + reach}
+
+    def _number(self, change: Change) -> dict:
+        return {**change.to_json(), "smallest_shown": self.alarm.above * change.std}
+
+
+def _run_json(opened: Opened) -> dict:
+    run = opened.measurement
+    return {
+        "log": run.log_name,
+        "log_sha256": run.log_sha256,
+        "robot_id": run.track.robot_id,
+        "recorded_utime_us": run.recorded_utime_us,
+    }
+
+
+def compare_runs(
+    first: Measurement,
+    second: Measurement,
+    model_file: ModelFile,
+    *,
+    healthy: Sequence[Measurement] = (),
+    rate: float = ALARM_RATE,
+    tell: Callable[[str], None] = lambda _: None,
+) -> RunComparison:
+    """Compares two runs of one robot.
+
+    With healthy runs the alarm is calibrated on this robot: its score is ranked among theirs.
+    Where they are too few for the rate, the standard errors must say so, too.
+
+    Args:
+        first: run that was healthy.
+        second: run in question.
+        model_file: of the robot.
+        healthy: more runs of it, on other days, in which nothing was wrong.
+        rate: of false alarms.
+        tell: is told what is being done.
+
+    Raises:
+        LogError: one of the two cannot be judged.
+    """
+    tell(first.label)
+    opened = open_run(first, model_file)
+    pairs, left_out = [], []
+    for run in healthy:
+        tell(run.label)
+        try:
+            pairs.append(difference(opened, open_run(run, model_file)))
+        except LogError as error:
+            left_out.append(f"Healthy run left out: {error}")
+    tell(second.label)
+    other = open_run(second, model_file)
+    result = compared(opened, other, pairs, rate)
+    return replace(result, left_out=tuple(left_out))
+
+
+def compared(
+    first: Opened, second: Opened, healthy: Sequence[Difference], rate: float
+) -> RunComparison:
+    """Compares two opened runs; see `compare_runs`.
+
+    Args:
+        first: run that was healthy.
+        second: run in question.
+        healthy: differences of healthy runs from the first one.
+        rate: of false alarms.
+    """
+    whole = difference(first, second)
+    keys = may_alarm(whole, first.one_clock and second.one_clock)
+    others = [pair.only(keys) for pair in healthy]
+    kinds = kinds_of(first.model, keys)
+
+    def judge(pair: Difference, pieces: int = 1) -> Alarm:
+        days = [day_of(pair, 0), *(day_of(other, 1) for other in others), day_of(pair, 1)]
+        return alarm(days, kinds, rate, pieces)
+
+    own = whole.only(keys)
+    found = judge(own)
+    if not others:
+        pieces = (own, difference(first, second_half(second)).only(keys))
+        found = min((judge(pair, len(pieces)) for pair in pieces), key=lambda a: a.p_errors)
+    named = []
+    for change, rest in found.found:
+        beside = [c for c, _ in found.found if c is not change]
+        named.append(Named(change, rest, onset(change, beside, own, rate)))
+    since_s = max((n.onset.at_s for n in named), default=0.0)
+    if since_s:
+        after = judge(difference(first, _since(second, since_s)).only(keys)).tested
+        named = [replace(n, change=_sized_anew(n, named, after)) for n in named]
+    return RunComparison(first, second, whole, tuple(keys), found, tuple(named))
+
+
+def second_half(opened: Opened) -> Opened:
+    """The second half of a run; what changes within a run looks like scatter of the whole."""
+    return _since(opened, float(np.ptp(opened.data.start_s)) / 2)
+
+
+def _since(opened: Opened, at_s: float) -> Opened:
+    """A run from a moment on, s since its start."""
+    data = opened.data
+    late = data.start_s >= data.start_s[0] + at_s
+    return replace(opened, data=replace(data, keep=data.keep & late))
+
+
+def _sized_anew(own: Named, named: Sequence[Named], after: Judged) -> Change:
+    kinds = [n.change.kind for n in named if n is not own]
+    return after.sized(own.change.kind, kinds)
+
+
+def of_robot(
+    measurements: Sequence[Measurement | SteadyTable], name: str, robot: int | None
+) -> Measurement:
+    """The run of one robot in a log.
+
+    Args:
+        measurements: of all its robots.
+        name: of the log.
+        robot: its number; None: the log has one robot.
+
+    Raises:
+        LogError: there is no such robot, or no number and several robots.
+    """
+    runs = [m for m in measurements if isinstance(m, Measurement)]
+    if not runs:
+        raise LogError(f"{name}: is a table, and no run; give a log with commands and poses.")
+    ids = [m.track.robot_id for m in runs]
+    known = ", ".join(map(str, ids))
+    if robot is None and len(runs) > 1:
+        raise LogError(f"{name}: has robots {known}; say which one with --robot.")
+    chosen = [m for m in runs if robot in (None, m.track.robot_id)]
+    if not chosen:
+        raise LogError(f"{name}: has no robot {robot}, but {known}.")
+    return chosen[0]
+
+
+def open_run(run: Measurement, model_file: ModelFile) -> Opened:
+    """A run with its noise floor.
+
+    Raises:
+        LogError: it has none.
+    """
+    (opened,) = open_measurements([run], model_file)
+    if opened.data is None:
+        raise LogError(f"{run.label}: cannot be compared: {opened.floor.reason}.")
+    return opened
+
+
+def may_alarm(whole: Difference, one_clock: bool) -> list[str]:
+    """Keys of differences that no new mounting of the marker and no other clock explains."""
+    told = [k for k in whole.keys if not k.startswith("marker.")]
+    return [k for k in told if k != "late_s" or one_clock]

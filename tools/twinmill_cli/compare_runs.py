@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill compare-runs`: did anything change between two runs of one robot?"""
+
+from __future__ import annotations
+
+import shlex
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twinmill.defaults import ALARM_RATE, DEFAULT_MODEL
+from twinmill_cli.lazy import working
+from twinmill_cli.options import Model, Out
+from twinmill_cli.output import CHANGED, AsJson, say, telling
+
+if working():  # not for --help
+    from twinmill.data.measurement import load_measurements
+    from twinmill.report import runs as present
+    from twinmill.runs.compare import RunComparison, compare_runs, of_robot
+    from twinmill.runs.history import healthy_logs
+    from twinmill_cli.frame import command_line, finish, open_model, provenance
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("compare-runs")(_compare_runs)
+
+
+def _compare_runs(
+    first: Annotated[Path, typer.Argument(metavar="A", show_default=False, help="A healthy run.")],
+    second: Annotated[
+        Path, typer.Argument(metavar="B", show_default=False, help="A later run of that robot.")
+    ],
+    *,
+    model: Model = DEFAULT_MODEL,
+    healthy: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--healthy",
+            metavar="LOG",
+            show_default=False,
+            help="Another healthy run, or a history that `fit --history` wrote; may be repeated.",
+        ),
+    ] = None,
+    robot: Annotated[
+        int | None,
+        typer.Option(
+            "--robot",
+            min=0,
+            max=99,
+            show_default=False,
+            help="Its number, where logs have several.",
+        ),
+    ] = None,
+    alarm_rate: Annotated[
+        float,
+        typer.Option(
+            "--alarm-rate", min=0.001, max=0.5, help="Of comparisons without a change, at most."
+        ),
+    ] = ALARM_RATE,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> RunComparison:
+    """Tell whether anything changed between two runs of one robot: what, how much, since when.
+
+    What varies from day to day is told apart and is no alarm: how the marker is
+    mounted, the battery's charge, the clocks' offset. With --healthy the alarm is
+    calibrated on this robot.
+
+    Exit codes: 0 nothing changed, 3 something did.
+
+    Example: twinmill compare-runs monday.lcmlog friday.lcmlog --model fitted.toml
+    """
+    given = healthy or []
+    words = [w for path in given for w in ("--healthy", str(path))]
+    words += [] if robot is None else ["--robot", str(robot)]
+    words += [] if alarm_rate == ALARM_RATE else ["--alarm-rate", f"{alarm_rate:g}"]
+    verb = shlex.join(["compare-runs", *words])
+    model_file = open_model(model, out)
+    source = provenance(command_line(verb, [first, second], model), model_file)
+    others, missing = healthy_logs(given)
+    for sentence in missing:
+        say(sentence)
+
+    def run(path: Path):
+        return of_robot(load_measurements([path], model_file.model), path.name, robot)
+
+    with telling("comparing runs") as tell:
+        known = {m.log_sha256: m for m in map(run, [first, second])}
+        more = [m for m in map(run, others) if m.log_sha256 not in known]
+        result = compare_runs(
+            *(run(first), run(second), model_file), healthy=more, rate=alarm_rate, tell=tell
+        )
+    finish(
+        {"sentence": " ".join(present.verdict(result)), **result.to_json()},
+        None if as_json else present.terminal(result),
+        source,
+        section=partial(present.section, result),
+        as_json=as_json,
+        out=out,
+        scored=False,
+    )
+    if result.changed:
+        raise typer.Exit(CHANGED)
+    return result

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill drift`: a robot's numbers over its calibrations."""
+
+from __future__ import annotations
+
+import shlex
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from twinmill.defaults import ALARM_RATE
+from twinmill_cli.lazy import working
+from twinmill_cli.options import Out
+from twinmill_cli.output import CHANGED, AsJson
+
+if working():  # not for --help
+    from twinmill.files import check_report
+    from twinmill.provenance import Provenance
+    from twinmill.report import drift as present
+    from twinmill.runs.drift import Drift, drift
+    from twinmill.runs.history import read_history
+    from twinmill.version import __version__
+    from twinmill_cli.frame import finish
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("drift")(_drift)
+
+
+def _drift(
+    history: Annotated[
+        Path,
+        typer.Argument(metavar="HISTORY", show_default=False, help="That `fit --history` wrote."),
+    ],
+    *,
+    alarm_rate: Annotated[
+        float,
+        typer.Option(
+            "--alarm-rate",
+            min=0.001,
+            max=0.5,
+            help="Of an unchanged robot's calibrations, at most.",
+        ),
+    ] = ALARM_RATE,
+    as_json: AsJson = False,
+    out: Out = None,
+) -> Drift:
+    """Draw a robot's numbers over its calibrations, and tell which left its band.
+
+    The band is where the next calibration of an unchanged robot lies, by those
+    before it. Exit codes: 0 all are in their bands, 3 one is not.
+
+    Example: twinmill drift robot.jsonl --out report
+    """
+    if out:
+        check_report(out)
+    words = [] if alarm_rate == ALARM_RATE else ["--alarm-rate", f"{alarm_rate:g}"]
+    command = shlex.join(["twinmill", "drift", str(history), *words])
+    result = drift(read_history(history), alarm_rate)
+    finish(
+        {"sentence": " ".join(present.verdict(result)), **result.to_json()},
+        None if as_json else present.terminal(result),
+        Provenance(command, f"twinmill {__version__}", ""),
+        section=partial(present.section, result),
+        as_json=as_json,
+        out=out,
+        scored=False,
+    )
+    if result.left:
+        raise typer.Exit(CHANGED)
+    return result
