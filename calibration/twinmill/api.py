@@ -14,30 +14,39 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 """
 
 import subprocess
-import weakref
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
 from dataclasses import replace
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import NoneType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 from rich.console import RenderableType
 from threadpoolctl import threadpool_limits
 
 from twinmill import report
 from twinmill.arguments import checked, in_python, known
 from twinmill.data.importers import import_log as _import
+from twinmill.data.importers.from_arrays import (
+    MOST_ROBOTS,
+    Kind,
+    commands_of,
+    log_of_frames,
+    log_of_series,
+    poses_of,
+)
 from twinmill.data.importers.import_log import ImportOptions
+from twinmill.data.importers.plain import VALUES
+from twinmill.data.lcm_log import split_events
 from twinmill.data.log import Log as RecordedLog
-from twinmill.data.log import LogError, RobotLog, read_log
+from twinmill.data.log import LogError, RobotLog, log_of, read_log
 from twinmill.data.measurement import Measurements, load_measurements
-from twinmill.data.multi_log import read_multi_log
+from twinmill.data.multi_log import multi_log_of
 from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
 from twinmill.defaults import DEFAULT_MODEL, LogFormat, ModelFormat, least_seeds
 from twinmill.diagnosis import diagnose as _diagnose
@@ -74,7 +83,6 @@ from twinmill.shown import (
     A_PATH,
     Reported,
     Shown,
-    own_folder,
     path_of,
     replacing_in_python,
     said_in_python,
@@ -82,6 +90,10 @@ from twinmill.shown import (
 from twinmill.swarm.compare import compare_swarm
 from twinmill.swarm.metrics import swarm_metrics
 
+if TYPE_CHECKING:
+    import xarray
+
+Frame = Any  # a data frame of pandas or polars, a dataset of xarray, a dictionary of arrays
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 SWARM_SCALE = ("sensor.range_m", "robot.body_radius_m")  # of a model, for metrics of swarms
 LONGEST_RUN_S = 600.0
@@ -131,10 +143,11 @@ def _one_thread(call: Call) -> Call:
 class Log(Shown):
     """One recorded run, or several: what robots were told, and where they were.
 
-    Of a steady-state table `table` gives the rows; it has no commands, paths or swarm.
+    `load` reads files, `from_arrays` and `from_frames` take numbers. Of a steady-state table
+    `table` gives the rows; it has no commands, paths or swarm.
 
     Attributes:
-        paths: the files of the runs.
+        paths: the files of the runs; names of those that are in no file.
 
     Examples:
         >>> log = tm.load("run.lcmlog")
@@ -146,18 +159,111 @@ class Log(Shown):
 
     def __init__(
         self,
-        paths: Iterable[str | Path],
+        runs: Iterable[RecordedLog],
+        tables: Iterable[SteadyTable] = (),
         said: Iterable[str] = (),
-        forget: Callable[[], None] = lambda: None,
     ):
-        several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
-        self.paths = [path_of("log", path, A_PATH) for path in several]
-        weakref.finalize(self, forget)  # removes the file of a simulated run
+        runs = checked("runs", runs, (list, tuple), "a list of runs; `load` takes names of files")
+        self._logs, self._tables = list(runs), list(tables)
+        self.paths = [log.path for log in self._logs]
+        self.paths += dict.fromkeys(Path(table.log_name) for table in self._tables)
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
-        tables = filter(is_steady_table, self.paths)
-        self._tables = [table for path in tables for table in read_steady_tables(path)]
-        self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t_s: ArrayLike,
+        pose: ArrayLike,
+        commands_t_s: ArrayLike,
+        commands: ArrayLike,
+        *,
+        kind: Kind,
+        same_clock: bool = False,
+        robot_id: int = 0,
+        wheelbase_m: float | None = None,
+        name: str = "arrays",
+    ) -> "Log":
+        """Makes a log of one robot from arrays.
+
+        Args:
+            t_s: (N,) times of the poses, s, or numpy's datetime64; ascending.
+            pose: (N, 3) x_m, y_m, theta_rad in the world frame, or (N, 2) where no heading was
+                measured. Rows with NaN are lost poses.
+            commands_t_s: (M,) times of the commands, likewise; each is held until the next.
+            commands: (M, K) by `kind`. `twist`: vx_mps, vy_mps, omega_radps, or vx_mps,
+                omega_radps. `duty`: percent, and `wheel_speed`: rad/s, of each driven wheel in the
+                model's order. `steering`: vx_mps, steering_rad.
+            kind: of the commands.
+            same_clock: one clock stamped poses and commands; False: their offset is fitted.
+            robot_id: 0 to 99.
+            wheelbase_m: distance of the axles, for `steering`.
+            name: of the log in tables and sentences.
+
+        Returns:
+            A log; nothing is written.
+
+        Raises:
+            LogError: the arrays make no run; one sentence.
+
+        Examples:
+            >>> t_s = np.arange(0, 20, 0.05)
+            >>> pose = np.column_stack([np.cos(t_s), np.sin(t_s), t_s + np.pi / 2])
+            >>> tm.Log.from_arrays(t_s, pose, [0, 10], [[1.0, 1.0], [1.0, 1.0]], kind="twist")
+            Log(arrays: robot 0, 20 s)
+        """
+        _check_arrays(robot_id, wheelbase_m, same_clock=same_clock, name=name)
+        poses = poses_of(robot_id, t_s, pose)
+        told = commands_of(robot_id, commands_t_s, commands, kind=kind, wheelbase_m=wheelbase_m)
+        return cls([log_of_series([poses], [told], name, same_clock)])
+
+    @classmethod
+    def from_frames(
+        cls,
+        poses: Frame,
+        commands: Frame,
+        *,
+        kind: Kind | None = None,
+        same_clock: bool = False,
+        robot_id: int = 0,
+        wheelbase_m: float | None = None,
+        name: str = "frames",
+    ) -> "Log":
+        """Makes a log from two data frames of pandas or polars, or dictionaries of arrays.
+
+        Args:
+            poses: columns t_s, x_m, y_m, and theta_rad where headings were measured; robot_id
+                where there are several robots; rows where `valid` is false are lost poses.
+            commands: columns t_s and one group: vx_mps, vy_mps, omega_radps; fl_pct, fr_pct,
+                rl_pct, rr_pct; w1_radps to w4_radps; or vx_mps, steering_rad; robot_id as in poses.
+            kind: which group; by default the one that is there.
+            same_clock: one clock stamped poses and commands; False: their offset is fitted.
+            robot_id: of frames that do not say.
+            wheelbase_m: distance of the axles, for steering angles.
+            name: of the log in tables and sentences.
+
+        Returns:
+            A log; nothing is written.
+
+        Raises:
+            LogError: a column is missing, or the numbers make no run; one sentence.
+
+        Examples:
+            >>> log = tm.load("run.lcmlog")
+            >>> tm.Log.from_frames(log.table(), log.commands())
+            Log(frames: robot 0, 60 s)
+        """
+        _check_arrays(robot_id, wheelbase_m, same_clock=same_clock, name=name)
+        run = log_of_frames(
+            poses,
+            commands,
+            kind=kind,
+            robot_id=robot_id,
+            wheelbase_m=wheelbase_m,
+            name=name,
+            same_clock=same_clock,
+        )
+        return cls([run])
 
     def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
         """Cleaned runs, one for each robot in each log.
@@ -181,7 +287,7 @@ class Log(Shown):
         key = model.file.hash if model else ""
         if key not in self._measurements:
             self._measurements[key] = load_measurements(
-                self.paths, model.file.model if model else None
+                [*self._logs, *self._tables], model.file.model if model else None
             )
         return self._measurements[key]
 
@@ -239,9 +345,8 @@ class Log(Shown):
         """All commands, as they were recorded.
 
         Returns:
-            log, robot_id, t_s (robot's clock), kind, c0 to c3: duty as a fraction or speed in rad/s
-            of the wheels front-left, front-right, rear-left, rear-right; or vx_mps, vy_mps,
-            omega_radps, 0.
+            log, robot_id, t_s (robot's clock), kind, and by kind fl_pct, fr_pct, rl_pct, rr_pct
+            (duty); w1_radps to w4_radps (wheel_speed); or vx_mps, vy_mps, omega_radps (twist).
 
         Raises:
             LogError: all are steady-state tables.
@@ -251,6 +356,42 @@ class Log(Shown):
             {'duty'}
         """
         return _rows(self._recorded("commands"), _commands)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row per measured pose, with the command that was in force by the stamps.
+
+        Returns:
+            The columns of `table`, then those of `commands` from kind on; NaN before the first
+            command. Stamps are as recorded: an offset of the clocks is not taken out.
+
+        Raises:
+            LogError: all are steady-state tables.
+
+        Examples:
+            >>> frame = tm.load("run.lcmlog").to_pandas()
+            >>> list(frame.columns)[3:8]
+            ['x_m', 'y_m', 'theta_rad', 'valid', 'kind']
+        """
+        keys = ["log", "robot_id"]
+        commands, poses = self.commands().sort_values("t_s"), self.table().sort_values("t_s")
+        joined = pd.merge_asof(poses, commands, on="t_s", by=keys)
+        return joined.sort_values([*keys, "t_s"], ignore_index=True)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The numbers of `to_pandas` as a dataset of xarray, which must be installed.
+
+        Returns:
+            Variables along `t_s` if there is one robot in one log; else along `row`, with the
+            coordinates log, robot_id and t_s.
+
+        Raises:
+            ModuleNotFoundError: xarray is not installed.
+        """
+        frame = self.to_pandas()
+        keys = ["log", "robot_id"]
+        dataset = frame.rename_axis("row").to_xarray().set_coords([*keys, "t_s"])
+        one = len(frame[keys].drop_duplicates()) == 1
+        return dataset.swap_dims(row="t_s").drop_vars("row") if one else dataset
 
     def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
         """What the swarm does over time.
@@ -293,8 +434,13 @@ class Log(Shown):
             >>> tm.load("run.lcmlog").plot().axes[0].get_xlabel()
             'x (m)'
         """
-        paths = [log.path for log in self._recorded("paths")]
-        robots = [robot for path in paths for robot in read_multi_log(path).robots]
+        robots = [
+            robot
+            for log in self._recorded("paths")
+            for robot in multi_log_of(
+                split_events(log.read_bytes(), log.path.name), log.path, log.sha256
+            ).robots
+        ]
         return draw(4.6, Drawing(robots).paths).picture
 
     def save(self, path: str | Path, force: bool = False) -> None:
@@ -313,8 +459,9 @@ class Log(Shown):
         """
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
+        (run,) = self._recorded("file of its own")
         with replacing_in_python(path, force) as temporary:
-            temporary.write_bytes(self.paths[0].read_bytes())
+            temporary.write_bytes(run.read_bytes())
 
     def export(
         self,
@@ -357,6 +504,7 @@ class Log(Shown):
                 model=file.model,
                 command="twinmill.Log.export",
                 force=force,
+                data=logs[0].data,
             )
         return done.files
 
@@ -1200,7 +1348,12 @@ def load(*paths: str | Path) -> Log:
     if not paths:
         raise LogError("load: name one log at least.")
     several = f"{A_PATH}; several are named one by one: load(*paths)"
-    return Log([path_of("log", path, several) for path in paths])
+    files = [path_of("log", path, several) for path in paths]
+    tables = [path for path in files if is_steady_table(path)]
+    return Log(
+        [read_log(path) for path in files if path not in tables],
+        [table for path in tables for table in read_steady_tables(path)],
+    )
 
 
 @_one_thread
@@ -1483,7 +1636,7 @@ def simulate(
             `next_run` designed.
 
     Returns:
-        A log like a robot's own; its file goes with the object unless it is saved.
+        A log like a robot's own; it is in no file unless it is saved.
 
     Raises:
         ModelError: the model cannot be read.
@@ -1505,15 +1658,16 @@ def simulate(
         script = path_of("script", script, "the path of a CSV file, or a designed run").resolve()
     file = _model(model).file
     options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s]
-    with ExitStack() as stack:
-        place = own_folder(stack)
+    with TemporaryDirectory(prefix="twinmill.") as folder:
+        place = Path(folder)
         (place / "model.toml").write_text(file.text)
         if isinstance(script, NextRun):
             script.save(place / "script.csv")
             script = place / "script.csv"
         options += ["--behavior", behavior] if script is None else ["--script", script]
         said = _run_twin(place, options)
-        return Log([place / "simulated.lcmlog"], said, stack.pop_all().close)
+        recorded = (place / "simulated.lcmlog").read_bytes()
+        return Log([log_of(recorded, "simulated.lcmlog")], said=said)
 
 
 def import_log(
@@ -1559,7 +1713,7 @@ def import_log(
             `wheel_factor`.
 
     Returns:
-        A log; its file goes with the object unless it is saved.
+        A log; it is in no file unless it is saved.
 
     Raises:
         LogError: a file cannot be read, or what it holds makes no run; one sentence.
@@ -1585,8 +1739,8 @@ def import_log(
     tables = {"poses": poses, "commands": commands, "detections": detections}
     files = {"motive": motive, "vicon": vicon, "bag": bag}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
-    with ExitStack() as stack, said_in_python():
-        place = own_folder(stack)
+    with TemporaryDirectory(prefix="twinmill.") as folder, said_in_python():
+        place = Path(folder)
         read = {key: _as_csv(place, key, table) for key, table in tables.items()}
         read |= {key: path and path_of(key, path, A_PATH) for key, path in files.items()}
         out = place / "imported.lcmlog"
@@ -1596,9 +1750,9 @@ def import_log(
             options=how,
             **read,
         )
-        own = read_log(out).warnings
-        said = [in_python(text) for text in told["warnings"] if text not in own]
-        return Log([out], said, stack.pop_all().close)
+        made = log_of(out.read_bytes(), out.name)
+        said = [in_python(text) for text in told["warnings"] if text not in made.warnings]
+        return Log([made], said=said)
 
 
 def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -1730,8 +1884,18 @@ def _poses(robot: RobotLog) -> dict:
 
 
 def _commands(robot: RobotLog) -> dict:
-    columns = {f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))}
-    return {"t_s": robot.command_t_s, "kind": robot.command_kind, **columns}
+    value = robot.command * (100 if robot.command_kind == "duty" else 1)  # fractions to percent
+    columns = zip(VALUES.get(robot.command_kind, ()), value.T, strict=False)
+    return {"t_s": robot.command_t_s, "kind": robot.command_kind, **dict(columns)}
+
+
+def _check_arrays(robot_id: int, wheelbase_m: float | None, *, same_clock: bool, name: str) -> None:
+    checked("robot_id", robot_id, Integral, "the number of a robot")
+    checked("wheelbase_m", wheelbase_m, (Real, NoneType), "a number")
+    checked("same_clock", same_clock, *SWITCH)
+    checked("name", name, str, "the name of a log")
+    if not 0 <= robot_id < MOST_ROBOTS:
+        raise LogError(f"robot_id: is {robot_id}, and must be within 0 to {MOST_ROBOTS - 1}.")
 
 
 def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.DataFrame:

@@ -4,10 +4,9 @@
 import html
 import shutil
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 import pandas as pd
@@ -70,12 +69,6 @@ class Shown:
     def __deepcopy__(self, _: dict) -> Self:
         return self
 
-    def __reduce__(self) -> str:
-        raise TypeError(
-            f"{type(self).__name__}: cannot be pickled; give paths to other processes, and return "
-            "what to_json() or table() gives."
-        )
-
     def _repr_html_(self) -> str:
         return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
 
@@ -132,9 +125,3 @@ def said_in_python() -> Iterator[None]:
         yield
     except ValueError as error:
         raise type(error)(in_python(str(error))) from error
-
-
-def own_folder(stack: ExitStack) -> Path:
-    """A folder that goes with the object that it is made for."""
-    folder = TemporaryDirectory(prefix="twinmill.", ignore_cleanup_errors=True)
-    return Path(stack.enter_context(folder))

@@ -6,7 +6,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -107,6 +107,7 @@ class Log:
             series.
         robots: by robot_id, ascending.
         warnings: sentences.
+        data: bytes of a log that is in no file.
     """
 
     path: Path
@@ -114,6 +115,15 @@ class Log:
     t0_utime_us: int
     robots: dict[int, RobotLog]
     warnings: list[str]
+    data: bytes | None = field(default=None, repr=False)
+
+    def read_bytes(self) -> bytes:
+        """What its file holds, or would hold.
+
+        Raises:
+            LogError: the file cannot be read.
+        """
+        return read_bytes(self.path) if self.data is None else self.data
 
 
 def read_log(path: str | Path, channel_prefix: str = "") -> Log:
@@ -128,7 +138,23 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
             another type.
     """
     path = Path(path)
-    data = read_bytes(path)
+    return _decoded(read_bytes(path), path, channel_prefix)
+
+
+def log_of(data: bytes, name: str) -> Log:
+    """A log in memory.
+
+    Args:
+        data: bytes of an LCM log.
+        name: of the log, in place of a file's.
+
+    Raises:
+        LogError: as read_log.
+    """
+    return replace(_decoded(data, Path(name), ""), data=data)
+
+
+def _decoded(data: bytes, path: Path, channel_prefix: str) -> Log:
     if (other := other_file(data[:LOOKED_AT])) and other[0] != LCM_LOG:
         raise LogError(f"{path.name}: is {other[0]}, not an LCM log; {other[1]}.")
     events = split_events(data, path.name)
