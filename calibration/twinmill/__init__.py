@@ -38,6 +38,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import next_run as next_run
     from twinmill.api import simulate as simulate
     from twinmill.data.log import LogError as LogError
+    from twinmill.fitting.settings import FitSettings as FitSettings
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.results import Comparison as Comparison
     from twinmill.results import Effect as Effect
@@ -47,6 +48,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
 
 # Where each public name is; imported when it is first used.
 _HOME = {
+    "FitSettings": "twinmill.fitting.settings",
     "LogError": "twinmill.data.log",
     "ModelError": "twinmill.model.model_file",
     **dict.fromkeys(

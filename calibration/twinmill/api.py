@@ -13,14 +13,14 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 `table` gives.
 """
 
+import logging
 import subprocess
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import NoneType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, Union
 
 import numpy as np
 import pandas as pd
@@ -62,6 +62,7 @@ from twinmill.files import plain
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
+from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
@@ -94,6 +95,7 @@ if TYPE_CHECKING:
     import xarray
 
 Frame = Any  # a data frame of pandas or polars, a dataset of xarray, a dictionary of arrays
+Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 SWARM_SCALE = ("sensor.range_m", "robot.body_radius_m")  # of a model, for metrics of swarms
 LONGEST_RUN_S = 600.0
@@ -125,10 +127,13 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "wheel_factor": ("wheel_factor", *NUMBER),
 }
 Form = TypeVar("Form", LogFormat, ModelFormat)
-Result = TypeVar("Result")
 Told = TypeVar("Told", bound="Shown")
 
 Call = TypeVar("Call", bound=Callable)
+
+
+LOGGER = logging.getLogger("twinmill")  # what is being done, and what is odd in the input
+LOGGER.addHandler(logging.NullHandler())
 
 
 def _one_thread(call: Call) -> Call:
@@ -264,6 +269,28 @@ class Log(Shown):
             same_clock=same_clock,
         )
         return cls([run])
+
+    @classmethod
+    def joined(cls, logs: "Sequence[Log]") -> "Log":
+        """Several logs of the same kind of robot as one object, as `load` makes of several files.
+
+        Args:
+            logs: one at least; names of two of them should differ.
+
+        Raises:
+            LogError: there is none.
+
+        Examples:
+            >>> tm.Log.joined([tm.load("run.lcmlog"), tm.simulate(n=2, duration_s=5)]).robots
+            [0, 1]
+        """
+        if not logs:
+            raise LogError("log: name one log at least.")
+        runs, tables, said = (
+            [part for log in logs for part in getattr(log, own)]
+            for own in ("_logs", "_tables", "_said")
+        )
+        return cls(runs, tables, said)
 
     def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
         """Cleaned runs, one for each robot in each log.
@@ -726,11 +753,12 @@ class Model(Shown):
         """
         return compare(log, self)
 
-    def fit(self, log: "Log | str | Path") -> "Fit":
-        """Fits all free quantities of the model to a log.
+    def fit(self, log: "Logs", **options: Any) -> "Fit":
+        """Fits the model to a log.
 
         Args:
-            log: a log, or the path of one.
+            log: a log, the path of one, or a list of these.
+            options: as of `fit`, which says more: hold, free, priors, settings.
 
         Returns:
             As `fit`, which says more.
@@ -742,7 +770,7 @@ class Model(Shown):
             >>> tm.Model.load("turbopi.toml").fit("run.lcmlog").model.name
             'turbopi_fitted.toml'
         """
-        return fit(log, self)
+        return fit(log, self, **options)
 
     @_one_thread
     def add(
@@ -776,21 +804,16 @@ class Model(Shown):
         for key, text in texts.items():
             checked(key, text, str, "a text of the effect `equation`; numbers are fitted")
         measurements = _log(log).measurements(self)
-        name = f"{self.file.path.stem}+{effect}.toml"
-        command = f"twinmill.add {effect}"
-        result, file = _made(
-            name,
-            lambda out: _add.add(
-                effect,
-                measurements,
-                self.file,
-                out=out,
-                command=command,
-                texts=texts,
-                robot_id=None if robot is None else int(robot),
-            ),
+        result = _add.add_to_model(
+            effect,
+            measurements,
+            self.file,
+            path=Path(f"{self.file.path.stem}+{effect}.toml"),
+            command=f"twinmill.add {effect}",
+            texts=texts,
+            robot_id=None if robot is None else int(robot),
         )
-        return _told(Addition(result, Model(file)), measurements)
+        return _told(Addition(result), measurements)
 
     def set(self, values: Mapping[str, float]) -> "Model":
         """Sets numbers by hand; what fits told of these is forgotten.
@@ -814,7 +837,7 @@ class Model(Shown):
             checked("values", name, str, "the name of a quantity")
             checked(name, value, Real, "a number")
         text = with_values(self.file, values, "twinmill.Model.set")
-        return Model(_read_back(f"{self.file.path.stem}_set.toml", text))
+        return Model(ModelFile.of(Path(f"{self.file.path.stem}_set.toml"), text))
 
     def export(
         self,
@@ -937,8 +960,13 @@ class Fit(Reported):
 
     Attributes:
         model: the new one.
-        before, after: comparisons of both models on the same noise.
+        before: comparison of the model as given with the log.
+        after: comparison of the new model, on the same noise.
         score: of the new model on the log it was fitted to.
+        log_likelihood: Gaussian, of errors over their floors, with the scale of each data set at
+            its best, without priors.
+        nobs: number of independent errors; residuals are more, and overlap.
+        converged: the fit ended before its last round.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -946,10 +974,107 @@ class Fit(Reported):
         ([], True)
     """
 
-    def __init__(self, result: _fit.FitResult, model: Model):
-        self._result, self.model = result, model
+    def __init__(self, result: _fit.FitResult):
+        self._result, self.model = result, Model(result.child)
         self.before, self.after = Comparison(result.before), Comparison(result.after)
-        self.score = self.after.score
+        self.score, told = self.after.score, result.statistics
+        self.log_likelihood, self.nobs, self.converged = (
+            told.log_likelihood,
+            told.nobs,
+            told.converged,
+        )
+
+    @property
+    def params(self) -> pd.Series:
+        """Estimates by name.
+
+        Examples:
+            >>> fitted.params["base.motor_lag_s"] > 0
+            True
+        """
+        return pd.Series({e.name: e.value for e in self._result.parameters}, name="value")
+
+    @property
+    def stderr(self) -> pd.Series:
+        """Standard errors by name: half a 95 % interval over 1.96.
+
+        They are from left-out blocks, widened by Student's t for few of these, and include what
+        priors leave open. All tables, files and intervals have these.
+
+        Examples:
+            >>> (fitted.stderr ** 2 - np.diag(fitted.covariance())).abs().max() < 1e-12
+            True
+        """
+        return pd.Series({e.name: e.std for e in self._result.parameters}, name="stderr")
+
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the estimates.
+
+        Returns:
+            A square table, in products of the units; `stderr` squared on its diagonal.
+
+        Examples:
+            >>> fitted.covariance().shape == (len(fitted.params), len(fitted.params))
+            True
+        """
+        told = self._result.statistics.covariance
+        return pd.DataFrame(told.values, index=told.names, columns=told.names)
+
+    def conf_int(self, alpha: float = 0.05) -> pd.DataFrame:
+        """Intervals that miss a parameter with a chance of alpha, by Student's t.
+
+        Args:
+            alpha: 0.05 for 95 %.
+
+        Returns:
+            lower and upper, by name.
+
+        Raises:
+            ValueError: alpha is not within 0 to 1.
+
+        Examples:
+            >>> (fitted.conf_int()["lower"] < fitted.params).all()
+            True
+        """
+        if not 0 < checked("alpha", alpha, *NUMBER) < 1:
+            raise ValueError(f"alpha: is {alpha}, and must be within 0 to 1.")
+        half = self._result.statistics.half_width(self.stderr, alpha)
+        return pd.DataFrame({"lower": self.params - half, "upper": self.params + half})
+
+    def residuals(self) -> pd.DataFrame:
+        """Measured less predicted, of the fitted model.
+
+        Returns:
+            log, robot_id, t_s (where the prediction starts), horizon_s (how far it goes), channel,
+            unit, residual and floor (the error that counts as one; both in the unit).
+
+        Examples:
+            >>> fitted.residuals()["channel"].unique().tolist()
+            ['forward', 'left', 'heading']
+        """
+        told = self._result.statistics.residuals
+        return pd.concat([pd.DataFrame(r.columns()) for r in told], ignore_index=True)
+
+    def summary(self) -> str:
+        """Estimates with errors and intervals, as text.
+
+        Examples:
+            >>> "log-likelihood" in fitted.summary()
+            True
+        """
+        rows = pd.DataFrame({"value": self.params, "stderr": self.stderr})
+        rows = rows.join(self.conf_int().set_axis(["[0.025", "0.975]"], axis=1))
+        rows["unit"] = [e.unit for e in self._result.parameters]
+        head = {
+            "model": self.model.name,
+            "score": f"{self.before.score:.3g} -> {self.score:.3g}",
+            "held-out score": f"{self._result.heldout.score:.3g}",
+            "independent errors": f"{self.nobs:.4g}",
+            "log-likelihood": f"{self.log_likelihood:.4g}",
+            "converged": "yes" if self.converged else "no",
+        }
+        lines = [f"{name:20}{value}" for name, value in head.items()]
+        return "\n".join([*lines, "", rows.to_string(float_format="{:.4g}".format)])
 
     def table(self) -> pd.DataFrame:
         """Fitted quantities.
@@ -1021,8 +1146,8 @@ class Addition(Reported):
         'dead_zone.width'
     """
 
-    def __init__(self, result: _add.AddResult, model: Model):
-        self._result, self.model = result, model
+    def __init__(self, result: _add.AddResult):
+        self._result, self.model = result, Model(result.child)
         self.effect = result.effect
         self.heldout_before = result.heldout_refit.score
         self.heldout_after = result.heldout_after.score
@@ -1270,8 +1395,8 @@ class Explanation(Reported):
         'effect_missing'
     """
 
-    def __init__(self, result: _explain.Explanation, model: Model, log: Log, file: ModelFile):
-        self._result, self.model = result, model
+    def __init__(self, result: _explain.Explanation, log: Log, file: ModelFile):
+        self._result, self.model = result, Model(result.child or file)
         self.diagnosis = Diagnosis(result.diagnosis, log, file)
         self.after = Comparison(result.after)
         self.score = self.after.score
@@ -1386,19 +1511,36 @@ def compare(log: Log | str | Path, model: Model | str | Path | None = None) -> C
 
 
 @_one_thread
-def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
-    """Fits all free quantities of a model, and the parameters of its effects, to a log.
+def fit(
+    log: Logs,
+    model: Model | str | Path | None = None,
+    *,
+    hold: Iterable[str] = (),
+    free: Iterable[str] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    settings: FitSettings = FIT_SETTINGS,
+) -> Fit:
+    """Fits a model, and the parameters of its effects, to a log.
+
+    By default it moves what the log can tell: gains, speeds of duties and lag of the base, and the
+    numbers of all effects. Names are those of `Model.table`, or an effect or a table as a whole:
+    `coasting`, `base.wheel_speed_mps`.
 
     Args:
-        log: a log, or the path of one.
+        log: a log, the path of one, or a list of these.
         model: where the fit begins; a model, or the name of one; None is TurboPi's.
+        hold: names of what keeps its value, fitted by default or not.
+        free: names of what alone is fitted, any number of base and robot; None: the default.
+        priors: mean and standard deviation of normal priors by name, in place of the usual ones,
+            which are wide and about the model's value.
+        settings: when the fit ends.
 
     Returns:
         The new model, its parameters with uncertainties, and both comparisons.
 
     Raises:
         LogError: the log cannot be used; one sentence.
-        ModelError: the model cannot be read.
+        ModelError: the model cannot be read, has no such quantity, or a prior cannot be.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -1406,14 +1548,37 @@ def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
         True
         >>> list(fitted.table().columns)
         ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words']
+        >>> gains = ["base.forward_gain", "base.yaw_gain"]
+        >>> tm.fit("run.lcmlog", "turbopi.toml", free=gains).params.index.tolist()
+        ['base.yaw_gain', 'base.forward_gain']
     """
     start = _model(model)
-    measurements = _log(log).measurements(start)
-    result, file = _made(
-        f"{start.file.path.stem}_fitted.toml",
-        lambda out: _fit.fit(measurements, start.file, out, "twinmill.fit"),
+    checked("settings", settings, FitSettings, "a `FitSettings`")
+    choice = _fit.Choice(
+        _names("hold", hold), None if free is None else _names("free", free), _priors(priors or {})
     )
-    return _told(Fit(result, Model(file)), measurements)
+    measurements = _log(log).measurements(start)
+    path = Path(f"{start.file.path.stem}_fitted.toml")
+    result = _fit.fit_model(
+        measurements, start.file, path, "twinmill.fit", choice=choice, settings=settings
+    )
+    return _told(Fit(result), measurements)
+
+
+def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
+    checked(what, names, *NAMES)
+    return tuple(checked(f"a name in {what}", name, str, "a text") for name in names)
+
+
+def _priors(priors: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    checked("priors", priors, *BY_NAME)
+    for name, prior in priors.items():
+        two = isinstance(prior, (list, tuple)) and [isinstance(v, Real) for v in prior]
+        if two != [True, True]:
+            raise TypeError(
+                f"prior of {name}: is {prior!r}, and must be (mean, standard deviation)."
+            )
+    return dict(priors)
 
 
 @_one_thread
@@ -1448,10 +1613,9 @@ def diagnose(
         ['coasting']
     """
     log, model = _log(log), _model(model)
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     excluded = known("without", without, catalogue())
     measurements = log.measurements(model)
-    result = _diagnose.diagnose(measurements, model.file, progress or (lambda _: None), excluded)
+    result = _diagnose.diagnose(measurements, model.file, _progress(progress), excluded)
     return _told(Diagnosis(result, log, model.file), measurements)
 
 
@@ -1484,10 +1648,9 @@ def infer(
         'coasting'
     """
     log, model = _log(log), _model(model)
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     measurements = log.measurements(model)
     before = _log(own).measurements(model) if own is not None else ()
-    result = _infer.infer(measurements, model.file, before, progress or (lambda _: None))
+    result = _infer.infer(measurements, model.file, before, _progress(progress))
     return _told(Inference(result), measurements)
 
 
@@ -1521,19 +1684,16 @@ def explain(
     """
     log, model = _log(log), _model(model)
     checked("formula", formula, (bool,), "True or False")
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     measurements = log.measurements(model)
-    result, file = _made(
-        f"{model.file.path.stem}_explained.toml",
-        lambda out: _explain.explain(
-            *(measurements, model.file),
-            out=out,
-            command="twinmill.explain",
-            progress=progress or (lambda _: None),
-            formula=formula,
-        ),
+    result = _explain.explain_model(
+        measurements,
+        model.file,
+        path=Path(f"{model.file.path.stem}_explained.toml"),
+        command="twinmill.explain",
+        progress=_progress(progress),
+        formula=formula,
     )
-    return _told(Explanation(result, Model(file), log, model.file), measurements)
+    return _told(Explanation(result, log, model.file), measurements)
 
 
 @_one_thread
@@ -1574,10 +1734,9 @@ def next_run(
         ['t_s', 'fl_pct', 'fr_pct', 'rl_pct', 'rr_pct']
     """
     log, model = _log(log), _model(model)
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     limits = _limits(duration_s, floor_m, max_duty)
     measurements = log.measurements(model)
-    plan = plan_run(measurements, model.file, limits, progress or (lambda _: None))
+    plan = plan_run(measurements, model.file, limits, _progress(progress))
     return _told(NextRun(plan), measurements)
 
 
@@ -1839,8 +1998,11 @@ def _run_twin(place: Path, options: list) -> list[str]:
     return [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
 
 
-def _log(log: Log | str | Path) -> Log:
-    log = checked("log", log, (Log, str, Path), f"a log, or {A_PATH}; `load` joins several")
+def _log(log: Logs) -> Log:
+    """One object of all logs that are named."""
+    if isinstance(log, (list, tuple)):
+        return Log.joined([_log(one) for one in log])
+    log = checked("log", log, (Log, str, Path), f"a log, {A_PATH}, or a list of these")
     return log if isinstance(log, Log) else load(log)
 
 
@@ -1852,29 +2014,26 @@ def _model(model: Model | str | Path | None) -> Model:
     return Model.load(DEFAULT_MODEL if model is None else model)
 
 
+def _progress(progress: Callable[[str], None] | None) -> Callable[[str], None]:
+    """A function that logs what it is told, and tells it on."""
+    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
+
+    def tell(text: str) -> None:
+        LOGGER.info(text)
+        if progress is not None:
+            progress(text)
+
+    return tell
+
+
 def _told(shown: Told, measurements: Measurements) -> Told:
     """The result, with what was found wrong with its logs."""
     mild = [str(f) for f in measurements.findings if not f.fatal]
     shown.left_out = (*measurements.excluded, *mild)
+    for said in shown.left_out:
+        LOGGER.warning(said)
     shown.input = tuple(finding.to_json() for finding in measurements.findings)
     return shown
-
-
-def _read_back(name: str, text: str) -> ModelFile:
-    """A model of that text, which is in no file."""
-    with TemporaryDirectory(prefix="twinmill.") as folder:
-        path = Path(folder) / name
-        path.write_text(text)
-        return replace(ModelFile.load(str(path)), path=Path(name))
-
-
-def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]:
-    """A result whose model is written to a file that is read back and gone at once."""
-    with TemporaryDirectory(prefix="twinmill.") as folder:
-        path = Path(folder) / name
-        result = make(path)
-        file = ModelFile.load(str(path))
-    return replace(result, path=Path(name)), replace(file, path=Path(name))
 
 
 def _poses(robot: RobotLog) -> dict:

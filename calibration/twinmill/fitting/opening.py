@@ -12,7 +12,8 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.equations import check_states
 from twinmill.fitting.floor import NoiseFloor, coarse_offset_s, no_floor, noise_floor, too_poor
-from twinmill.fitting.score_fit import ROUNDS, ScoreFit
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.settings import FIT_SETTINGS
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     CLOCK,
@@ -82,7 +83,10 @@ class Opened:
         return ModelledLog.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
 
     def aligned(
-        self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS
+        self,
+        model: native.Model,
+        offset_s: float | None = None,
+        rounds: int = FIT_SETTINGS.rounds,
     ) -> "Opened":
         """The same with another model, on the clock, heading, angles and phases that suit it.
 

@@ -108,8 +108,7 @@ def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> Mod
         document["fit"]["left_over"] = old
     if covariance.names:
         document["fit"]["covariance"] = covariance.to_toml()
-    text = tomlkit.dumps(document)
-    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+    return ModelFile.of(Path(path), tomlkit.dumps(document))
 
 
 def _short(value: float) -> float:

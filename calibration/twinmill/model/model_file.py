@@ -40,8 +40,7 @@ class ModelFile:
         """
         try:
             path = Path(native.find_model_file(str(name)))
-            text = path.read_text()
-            loaded = cls(path, text, native.Model.from_toml(text, str(name)))
+            loaded = cls.of(path, path.read_text(), str(name))
         except UnicodeDecodeError as error:
             raise ModelError(
                 f"{name}: is no text, so it is no model file; check the name."
@@ -54,6 +53,20 @@ class ModelFile:
                 "the robot follows them; write one, or make a model file with twinmill guide."
             )
         return loaded
+
+    @classmethod
+    def of(cls, path: Path, text: str, origin: str = "") -> "ModelFile":
+        """A model that is in no file yet.
+
+        Args:
+            path: where it will be.
+            text: TOML.
+            origin: named in errors; by default the path.
+
+        Raises:
+            ValueError: it is no valid model.
+        """
+        return cls(path, text, native.Model.from_toml(text, origin or str(path)))
 
     def write(self, force: bool = True) -> None:
         """Writes its file, whole or not at all; `force` replaces one that is there.
