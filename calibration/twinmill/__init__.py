@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Log as Log
     from twinmill.api import Model as Model
     from twinmill.api import compare as compare
+    from twinmill.api import compare_models as compare_models
     from twinmill.api import diagnose as diagnose
     from twinmill.api import effect as effect
     from twinmill.api import effects as effects
@@ -54,7 +55,16 @@ _HOME = {
     **dict.fromkeys(
         (
             *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),
-            *("compare", "diagnose", "effect", "effects", "explain", "fit", "import_log"),
+            *(
+                "compare",
+                "compare_models",
+                "diagnose",
+                "effect",
+                "effects",
+                "explain",
+                "fit",
+                "import_log",
+            ),
             *("infer", "load", "next_run", "simulate"),
         ),
         "twinmill.api",

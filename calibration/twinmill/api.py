@@ -62,6 +62,7 @@ from twinmill.files import plain
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
+from twinmill.fitting import model_comparison as _models
 from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
@@ -1579,6 +1580,59 @@ def _priors(priors: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float,
                 f"prior of {name}: is {prior!r}, and must be (mean, standard deviation)."
             )
     return dict(priors)
+
+
+@_one_thread
+def compare_models(
+    models: "Sequence[Model | str | Path] | Mapping[str, Model | str | Path]",
+    log: Logs,
+    *,
+    refit: bool = True,
+) -> pd.DataFrame:
+    """Ranks models by how well they predict what they were not fitted to.
+
+    Each is fitted to the logs with one of six parts left out in turn, and predicts that part.
+    Blocks of 8 s count as independent.
+
+    Args:
+        models: two at least, or a dictionary of them by name.
+        log: a log, the path of one, or a list of these.
+        refit: fit each model to the parts that are not left out; False: all predict as they are.
+
+    Returns:
+        One row per model, best first: rank, score_heldout (1.0 is as good as the log can tell),
+        elpd (expected log predictive density, of all blocks), elpd_diff (of the best less this
+        one's), dse (standard error of the difference), weight (in the mixture that predicts best:
+        stacking), p_chance (chance of so large a lead of the best, were no model better than this
+        one). `attrs["correction"]` says how p_chance allows for the best being one of many.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+        ModelError: a model cannot be read.
+        ValueError: there are not two models.
+
+    Examples:
+        >>> table = tm.compare_models(["turbopi.toml", "hidden.toml"], "run.lcmlog")
+        >>> table.index[0], table["weight"].sum().round(6)
+        ('hidden.toml', ...1.0...)
+    """
+    checked("refit", refit, *SWITCH)
+    checked("models", models, (list, tuple, Mapping), "a list of models, or a dictionary of them")
+    given = [_model(m) for m in (models.values() if isinstance(models, Mapping) else models)]
+    if len(given) < 2:
+        raise ValueError(f"models: {len(given)} cannot be compared; give two or more.")
+    names = list(models) if isinstance(models, Mapping) else [model.name for model in given]
+    if len(set(names)) < len(names):
+        raise ValueError(f"models: two have one name ({', '.join(names)}); give a dictionary.")
+    measurements = _log(log).measurements(given[0])
+    found = _models.standings(_models.predicted(measurements, [m.file for m in given], refit))
+    table = pd.DataFrame(
+        [vars(standing) for standing in found], index=pd.Index(names, name="model")
+    )
+    table = table.sort_values("elpd", ascending=False, kind="stable")
+    table.insert(0, "rank", range(1, len(table) + 1))
+    table.attrs["correction"] = _models.CORRECTION
+    return table
 
 
 @_one_thread
