@@ -39,6 +39,8 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import next_run as next_run
     from twinmill.api import simulate as simulate
     from twinmill.data.log import LogError as LogError
+    from twinmill.defaults import Certainty as Certainty
+    from twinmill.defaults import Verdict as Verdict
     from twinmill.fitting.settings import FitSettings as FitSettings
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.results import Comparison as Comparison
@@ -49,6 +51,8 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
 
 # Where each public name is; imported when it is first used.
 _HOME = {
+    "Certainty": "twinmill.defaults",
+    "Verdict": "twinmill.defaults",
     "FitSettings": "twinmill.fitting.settings",
     "LogError": "twinmill.data.log",
     "ModelError": "twinmill.model.model_file",

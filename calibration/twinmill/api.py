@@ -48,7 +48,14 @@ from twinmill.data.log import LogError, RobotLog, log_of, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import multi_log_of
 from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
-from twinmill.defaults import DEFAULT_MODEL, LogFormat, ModelFormat, least_seeds
+from twinmill.defaults import (
+    DEFAULT_MODEL,
+    Certainty,
+    LogFormat,
+    ModelFormat,
+    Verdict,
+    least_seeds,
+)
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis import explain as _explain
 from twinmill.diagnosis.finding import Finding as _Found
@@ -314,9 +321,10 @@ class Log(Shown):
         model = None if model is None else _model(model)
         key = model.file.hash if model else ""
         if key not in self._measurements:
-            self._measurements[key] = load_measurements(
-                [*self._logs, *self._tables], model.file.model if model else None
-            )
+            with said_in_python():
+                self._measurements[key] = load_measurements(
+                    [*self._logs, *self._tables], model.file.model if model else None
+                )
         return self._measurements[key]
 
     @property
@@ -1213,7 +1221,8 @@ class Finding(Shown):
     def __init__(self, finding: _Found, ranked: Ranked, log: Log):
         self._result, self._ranked, self._log = finding, ranked, log
         self.effect, self.score_heldout = finding.effect, ranked.score_heldout
-        self.share, self.certainty = finding.share, finding.certainty
+        self.share = finding.share
+        self.certainty: Certainty = finding.certainty
         self.parameters = {key_of(e.name): e.value for e in finding.parameters}
 
     def to_json(self) -> dict:
@@ -1288,7 +1297,8 @@ class Diagnosis(Reported):
 
     def __init__(self, result: _diagnose.Diagnosis, log: Log, file: ModelFile):
         self._result, self._file = result, file
-        self.verdict, self.sentence = result.verdict, result.sentence
+        self.verdict: Verdict = result.verdict
+        self.sentence = result.sentence
         ranked = {r.effect: r for r in result.ranking}
         self.found = [
             Finding(result.finding(name), ranked[name], log)

@@ -124,4 +124,5 @@ def said_in_python() -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise type(error)(in_python(str(error))) from error
+        error.args = (in_python(str(error)),)
+        raise

@@ -26,7 +26,12 @@ WIDTHS: dict[Kind, tuple[int, int]] = {
     "wheel_speed": (1, 4),
     "steering": (2, 2),
 }
-COLUMNS: dict[Kind, tuple[str, ...]] = {**VALUES, "steering": STEERED}
+COLUMNS: dict[Kind, tuple[str, ...]] = {
+    "twist": VALUES["twist"],
+    "duty": VALUES["duty"],
+    "wheel_speed": VALUES["wheel_speed"],
+    "steering": STEERED,
+}
 POSE = ("x_m", "y_m", "theta_rad")
 FULL_DUTY_PCT = 100.0
 MOST_ROBOTS = 100  # their numbers have two digits in the names of channels
@@ -81,7 +86,7 @@ def commands_of(
     if kind == "duty" and np.abs(values).max() > FULL_DUTY_PCT:
         raise LogError(f"commands: a duty is {np.abs(values).max():g} %; give -100 to 100.")
     if kind == "steering":
-        values = velocities_of_steering("commands", *values.T, wheelbase_m)
+        values = velocities_of_steering("commands", values[:, 0], values[:, 1], wheelbase_m)
     elif kind == "twist" and values.shape[1] == 2:
         values = np.insert(values, 1, 0.0, axis=1)
     count = len(values)
