@@ -20,10 +20,11 @@ from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import NoneType
-from typing import TYPE_CHECKING, Any, TypeVar, Union
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, Union
 
 import numpy as np
 import pandas as pd
+import twinmill_native as native
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 from rich.console import RenderableType
@@ -40,7 +41,7 @@ from twinmill.data.importers.from_arrays import (
     log_of_series,
     poses_of,
 )
-from twinmill.data.importers.import_log import ImportOptions
+from twinmill.data.importers.options import ImportOptions
 from twinmill.data.importers.plain import VALUES
 from twinmill.data.lcm_log import split_events
 from twinmill.data.log import Log as RecordedLog
@@ -58,6 +59,7 @@ from twinmill.defaults import (
 )
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis import explain as _explain
+from twinmill.diagnosis import result as _diagnosed
 from twinmill.diagnosis.finding import Finding as _Found
 from twinmill.diagnosis.finding import Ranked
 from twinmill.experiment.design import Limits, design, plan_run
@@ -105,7 +107,6 @@ if TYPE_CHECKING:
 Frame = Any  # a data frame of pandas or polars, a dataset of xarray, a dictionary of arrays
 Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
-SWARM_SCALE = ("sensor.range_m", "robot.body_radius_m")  # of a model, for metrics of swarms
 LONGEST_RUN_S = 600.0
 LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
 NAMES = ((list, tuple, set, frozenset), "a list of names")
@@ -137,20 +138,22 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
 Form = TypeVar("Form", LogFormat, ModelFormat)
 Told = TypeVar("Told", bound="Shown")
 
-Call = TypeVar("Call", bound=Callable)
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 
 LOGGER = logging.getLogger("twinmill")  # what is being done, and what is odd in the input
 LOGGER.addHandler(logging.NullHandler())
 
 
-def _one_thread(call: Call) -> Call:
+def _one_thread(call: Callable[Given, Result]) -> Callable[Given, Result]:
     """Leaves BLAS one thread meanwhile.
 
     Its threads wait in loops: on matrices as narrow as ours, two take many times the processor time
     of one where other programs run, and are no sooner done.
     """
-    return threadpool_limits.wrap(limits=1, user_api="blas")(call)
+    limited: Callable[Given, Result] = threadpool_limits.wrap(limits=1, user_api="blas")(call)
+    return limited
 
 
 class Log(Shown):
@@ -446,10 +449,9 @@ class Log(Shown):
             ['log', 't_s', 'circliness']
         """
         twin = _model(model).file.model
-        scale = [twin.get(name) for name in SWARM_SCALE]
         parts = []
         for log in self._recorded("swarm"):
-            series = swarm_metrics(log, *scale)
+            series = swarm_metrics(log, *_scale(twin))
             part = pd.DataFrame(series.values, columns=list(series.to_json()["metrics"]))
             part.insert(0, "log", log.path.name)
             part.insert(1, "t_s", series.t_s)
@@ -581,13 +583,13 @@ class Log(Shown):
         logs, twin = self._recorded("swarm"), _model(model).file.model
         if len(logs) > 1:
             raise LogError(f"compare_swarm: is of one log, and these are {len(logs)}.")
-        series = swarm_metrics(logs[0], *(twin.get(name) for name in SWARM_SCALE))
+        series = swarm_metrics(logs[0], *_scale(twin))
         seeds = range(1, int(n_seeds) + 1)
         with said_in_python():
             result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
         return SwarmComparison(result)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """What the log holds, in numbers and names.
 
         Returns:
@@ -650,7 +652,8 @@ class Model(Shown):
             >>> tm.Model.load("turbopi.toml").effects
             []
         """
-        return cls(ModelFile.load(str(checked("model", name, (str, Path), "the name of a model"))))
+        checked("model", name, (str, Path), "the name of a model")
+        return cls(ModelFile.load(str(name)))
 
     @property
     def file(self) -> ModelFile:
@@ -706,7 +709,7 @@ class Model(Shown):
         """
         return pd.DataFrame(self.file.model.values())
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """What the model holds.
 
         Returns:
@@ -1225,7 +1228,7 @@ class Finding(Shown):
         self.certainty: Certainty = finding.certainty
         self.parameters = {key_of(e.name): e.value for e in finding.parameters}
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """What the diagnosis tells of this effect.
 
         Returns:
@@ -1295,7 +1298,7 @@ class Diagnosis(Reported):
         'effect_missing'
     """
 
-    def __init__(self, result: _diagnose.Diagnosis, log: Log, file: ModelFile):
+    def __init__(self, result: _diagnosed.Diagnosis, log: Log, file: ModelFile):
         self._result, self._file = result, file
         self.verdict: Verdict = result.verdict
         self.sentence = result.sentence
@@ -1894,35 +1897,35 @@ def simulate(
 
 
 def import_log(
-    poses: str | Path | pd.DataFrame | None = None,
-    commands: str | Path | pd.DataFrame | None = None,
+    poses: str | Path | None = None,
+    commands: str | Path | None = None,
     *,
     motive: str | Path | None = None,
     vicon: str | Path | None = None,
     io_tsv: Iterable[str | Path] = (),
     bag: str | Path | None = None,
-    detections: str | Path | pd.DataFrame | None = None,
+    detections: str | Path | None = None,
     robot_id: int | None = None,
     heading_offset_deg: float | Mapping[int, float] = 0.0,
     **options: Any,
 ) -> Log:
-    """Makes a log from motion capture and commands: tables, or files of other programs.
+    """Makes a log from motion capture and commands in files of other programs.
 
     One source of poses (`poses`, `motive`, `vicon`) is needed, and one of commands (`commands`,
-    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. Tables may be
-    those of pandas; the page Files lists their columns. Arguments are named as the options of
-    `twinmill import`, whose help says more.
+    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. The page Files
+    lists the columns of tables; those of pandas go into `Log.from_frames`. Arguments are named as
+    the options of `twinmill import`, whose help says more.
 
     Args:
-        poses: CSV or table: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with
+        poses: CSV: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with
             `rename`.
-        commands: CSV or table: t_s, robot_id, and fl_pct, fr_pct, rl_pct, rr_pct, or vx_mps,
+        commands: CSV: t_s, robot_id, and fl_pct, fr_pct, rl_pct, rr_pct, or vx_mps,
             vy_mps, omega_radps, or others; each row is held until the next.
         motive: CSV export of OptiTrack Motive.
         vicon: CSV export of Vicon Tracker or Nexus.
         io_tsv: io.tsv of robots.
         bag: ROS bag, with its topics in `pose` and `command`.
-        detections: CSV or table of what cameras saw: t_s, robot_id, seen.
+        detections: CSV of what cameras saw: t_s, robot_id, seen.
         robot_id: whose the rows are, for files that do not say.
         heading_offset_deg: from the tracked body's x axis to the robot's front, left positive; or
             by robot.
@@ -1943,10 +1946,11 @@ def import_log(
         ValueError: there is no such option; the sentence has the nearest.
 
     Examples:
-        >>> poses = tm.load("run.lcmlog").table().drop(columns="log")
-        >>> commands = pd.DataFrame({"t_s": [0, 5], "robot_id": 0, "vx_mps": 0.2, "vy_mps": 0,
-        ...                          "omega_radps": [0, 0.5]})
-        >>> tm.import_log(poses, commands)
+        >>> from tempfile import mkdtemp
+        >>> tables = Path(mkdtemp())
+        >>> tm.load("run.lcmlog").table().to_csv(tables / "poses.csv")
+        >>> tm.load("run.lcmlog").commands().to_csv(tables / "commands.csv")
+        >>> tm.import_log(tables / "poses.csv", tables / "commands.csv")
         Log(imported.lcmlog: robot 0, 60 s)
     """
     checked("robot_id", robot_id, (Integral, NoneType), "the number of a robot")
@@ -1959,19 +1963,20 @@ def import_log(
     how = ImportOptions(
         robot_id=robot_id, heading_offset_rad=offset_rad, **_import_options(options)
     )
-    tables = {"poses": poses, "commands": commands, "detections": detections}
-    files = {"motive": motive, "vicon": vicon, "bag": bag}
+    given = {"poses": poses, "commands": commands, "motive": motive, "vicon": vicon, "bag": bag}
+    given["detections"] = detections
+    files = {k: None if path is None else path_of(k, path, A_PATH) for k, path in given.items()}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
     with TemporaryDirectory(prefix="twinmill.") as folder, said_in_python():
-        place = Path(folder)
-        read = {key: _as_csv(place, key, table) for key, table in tables.items()}
-        read |= {key: path and path_of(key, path, A_PATH) for key, path in files.items()}
-        out = place / "imported.lcmlog"
+        out = Path(folder) / "imported.lcmlog"
         told = _import.import_log(
-            *(read.pop("poses"), read.pop("commands"), out),
+            *(files["poses"], files["commands"], out),
+            motive=files["motive"],
+            vicon=files["vicon"],
             io_tsv=tuple(path_of("io_tsv", path, A_PATH) for path in several),
+            bag=files["bag"],
+            detections=files["detections"],
             options=how,
-            **read,
         )
         made = log_of(out.read_bytes(), out.name)
         said = [in_python(text) for text in told["warnings"] if text not in made.warnings]
@@ -2024,16 +2029,6 @@ def _format(to: str, forms: type[Form]) -> Form:
     return forms(to)
 
 
-def _as_csv(place: Path, name: str, table: str | Path | pd.DataFrame | None) -> Path | None:
-    """The path of a table, which is written to a folder if it is one of pandas."""
-    wanted = "a table of pandas, or the path of a CSV file"
-    checked(name, table, (str, Path, pd.DataFrame, NoneType), wanted)
-    if not isinstance(table, pd.DataFrame):
-        return table if table is None else path_of(name, table, wanted)
-    table.to_csv(place / f"{name}.csv", index=False)
-    return place / f"{name}.csv"
-
-
 def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) -> Limits:
     """Of a designed run, from what came."""
     checked("duration_s", duration_s, Real, "a number of seconds")
@@ -2048,7 +2043,7 @@ def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) ->
     return Limits(float(duration_s), (float(floor_m[0]), float(floor_m[1])), float(max_duty))
 
 
-def _run_twin(place: Path, options: list) -> list[str]:
+def _run_twin(place: Path, options: list[Any]) -> list[str]:
     """Writes simulated.lcmlog in a folder, by the model.toml in it; what the twin warned of."""
     command = [
         find_program("twin_run"), "--model", "model.toml", "--log", "simulated.lcmlog", *options,
@@ -2067,7 +2062,7 @@ def _log(log: Logs) -> Log:
     if isinstance(log, (list, tuple)):
         return Log.joined([_log(one) for one in log])
     log = checked("log", log, (Log, str, Path), f"a log, {A_PATH}, or a list of these")
-    return log if isinstance(log, Log) else load(log)
+    return log if isinstance(log, Log) else load(Path(log))
 
 
 def _model(model: Model | str | Path | None) -> Model:
@@ -2100,13 +2095,18 @@ def _told(shown: Told, measurements: Measurements) -> Told:
     return shown
 
 
-def _poses(robot: RobotLog) -> dict:
+def _scale(model: native.Model) -> tuple[float, float]:
+    """Range of sight and radius of the body, in m, which metrics of swarms are over."""
+    return model.get("sensor.range_m"), model.get("robot.body_radius_m")
+
+
+def _poses(robot: RobotLog) -> dict[str, Any]:
     names = ("x_m", "y_m", "theta_rad")
     columns = zip(names, robot.pose.T, strict=True)
     return {"t_s": robot.pose_t_s, **dict(columns), "valid": robot.valid}
 
 
-def _commands(robot: RobotLog) -> dict:
+def _commands(robot: RobotLog) -> dict[str, Any]:
     value = robot.command * (100 if robot.command_kind == "duty" else 1)  # fractions to percent
     columns = zip(VALUES.get(robot.command_kind, ()), value.T, strict=False)
     return {"t_s": robot.command_t_s, "kind": robot.command_kind, **dict(columns)}
@@ -2121,7 +2121,7 @@ def _check_arrays(robot_id: int, wheelbase_m: float | None, *, same_clock: bool,
         raise LogError(f"robot_id: is {robot_id}, and must be within 0 to {MOST_ROBOTS - 1}.")
 
 
-def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.DataFrame:
+def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict[str, Any]]) -> pd.DataFrame:
     """One table of all robots in all logs."""
     parts = [
         pd.DataFrame({"log": log.path.name, "robot_id": number, **columns(robot)})

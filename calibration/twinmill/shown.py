@@ -32,9 +32,9 @@ class Shown:
 
     _result: Any
     left_out: tuple[str, ...] = ()
-    input: tuple[dict, ...] | None = None
+    input: tuple[dict[str, Any], ...] | None = None
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The same object as `--json` of the command, without how the command was called.
 
         Returns:
@@ -45,7 +45,8 @@ class Shown:
             True
         """
         told = {} if self.input is None else {"input": self.input}
-        return plain({**self._result.to_json(), **told})
+        found: dict[str, Any] = plain({**self._result.to_json(), **told})
+        return found
 
     def table(self) -> pd.DataFrame:
         """The numbers; each class says which."""
@@ -66,7 +67,7 @@ class Shown:
     def __copy__(self) -> Self:
         return self  # it never changes
 
-    def __deepcopy__(self, _: dict) -> Self:
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
         return self
 
     def _repr_html_(self) -> str:

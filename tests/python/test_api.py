@@ -6,6 +6,7 @@ import copy
 import doctest
 import json
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -64,7 +65,7 @@ def here(folder, monkeypatch) -> Path:
     return folder
 
 
-def test_the_examples_of_the_documentation_run(here):
+def test_the_examples_of_the_documentation_run_and_all_results_pickle(here):
     options = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     log, model = tm.load("run.lcmlog"), tm.Model.load("turbopi.toml")
     made = {
@@ -79,6 +80,10 @@ def test_the_examples_of_the_documentation_run(here):
     names = {"tm": tm, "np": np, "pd": pd, "Path": Path, "log": log, **made}
     done = [doctest.testmod(m, extraglobs=names, optionflags=options) for m in PUBLIC]
     assert sum(d.attempted for d in done) > 100 and not any(d.failed for d in done)
+    for thing in (log, model, *made.values(), made["d"].best, tm.effect("coasting")):
+        again = pickle.loads(pickle.dumps(thing))
+        assert repr(again) == repr(thing) and str(again) == str(thing)
+        assert again.to_json() == thing.to_json()
     assert sorted(p.name for p in here.iterdir()) == [
         *("fitted.toml", "hidden.toml", "run.lcmlog", "script.csv")
     ]
@@ -167,7 +172,8 @@ def test_tables_become_the_log_of_the_command(here, tmp_path):
     out = tmp_path / "run.lcmlog"
     files = ["--poses", str(tmp_path / "poses.csv"), "--commands", str(tmp_path / "commands.csv")]
     run(["import", *files, "-o", str(out)])
-    tm.import_log(poses, commands).save(tmp_path / "saved.lcmlog")
+    tables = tmp_path / "poses.csv", tmp_path / "commands.csv"
+    tm.import_log(*tables).save(tmp_path / "saved.lcmlog")
     assert (tmp_path / "saved.lcmlog").read_bytes() == out.read_bytes()
 
 
@@ -316,7 +322,7 @@ WRONG_TYPES = {  # what is called, and what the sentence says
         lambda log, model: tm.import_log("a.csv", "b.csv", pose_shift_s={"R02": 1}),
         "'R02' in pose_shift_s: is 'R02', and must be the number of a robot",
     ),
-    "poses": (lambda log, model: tm.import_log(5, 6), "poses: is 5, and must be a table"),
+    "poses": (lambda log, model: tm.import_log(5, 6), "poses: is 5, and must be the path"),
     "card": (lambda log, model: tm.effect(None), "name: is a NoneType, and must be"),
     "progress": (
         lambda log, model: tm.diagnose(log, progress=True),
@@ -372,7 +378,14 @@ def test_of_several_logs_all_views_show_the_same_robot(here, tmp_path):
     assert "run.lcmlog" in repr(found) and "other.lcmlog" in repr(found)
 
 
-def test_a_robot_that_is_left_out_is_told(here, tmp_path):
+def test_what_is_done_goes_to_the_logger_and_to_who_asks(caplog):
+    heard = []
+    with caplog.at_level("INFO", logger="twinmill"):
+        api._progress(heard.append)("fitting")
+    assert heard == ["fitting"] == caplog.messages
+
+
+def test_a_robot_that_is_left_out_is_told(here, tmp_path, caplog):
     """Its poses are those of the middle of the room, in a log that is else the same."""
     dead = tmp_path / "dead.lcmlog"
     log = lcm.EventLog(str(dead), "w", overwrite=True)
@@ -389,6 +402,7 @@ def test_a_robot_that_is_left_out_is_told(here, tmp_path):
     found = tm.compare(tm.load("run.lcmlog", dead), "fitted.toml")
     (said,) = found.left_out
     assert said.startswith("Left out: dead.lcmlog R00") and "Left out" in str(found)
+    assert said in caplog.messages
 
 
 def test_a_fit_is_shown_with_its_own_clock_and_name_and_says_that_nothing_is_written(here):

@@ -14,6 +14,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
+from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.equations import check_states
@@ -156,7 +157,7 @@ class AddResult:
 
 def add(
     effect: str,
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     *,
     out: Path,
@@ -185,7 +186,7 @@ def add(
 @np.errstate(over="ignore", invalid="ignore")  # a state may grow at some numbers that are tried
 def add_to_model(
     effect: str,
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     *,
     path: Path,
@@ -287,7 +288,7 @@ def _check_told(effect: str, opened: Sequence[Opened], told: Collection[str]) ->
 
 def _add_to_camera(
     effect: str,
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     path: Path,
     *,

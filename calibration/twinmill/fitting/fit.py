@@ -5,13 +5,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.chance import t_quantile
 from twinmill.data.measurement import Measurement
-from twinmill.fitting.compare import Comparison, comparison
+from twinmill.data.steady_table import SteadyTable
+from twinmill.fitting.compare import Comparison, RobotComparison, comparison
 from twinmill.fitting.floor import acting_gains
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
@@ -43,7 +45,8 @@ from twinmill.model.parameters import (
     duty_table,
     gains_of,
 )
-from twinmill.predict.steady_states import SteadyStates
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.noise import Noise
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
 
@@ -114,7 +117,7 @@ class FitResult:
         """Of the new model."""
         return self.child.path
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         return {
             "model": str(self.path),
@@ -221,8 +224,9 @@ def effects_free(model: native.Model, opened: Sequence[Opened]) -> list[Paramete
 
 def _gains(own: Opened, model: native.Model) -> list[str]:
     """Gains of the base that this measurement moves."""
-    steady = isinstance(own.data, SteadyStates)
-    return gains_of(model) if steady else acting_gains(own.data, model)
+    if isinstance(own.data, Trajectory):
+        return acting_gains(own.data, model)
+    return gains_of(model)
 
 
 def fitted(
@@ -253,8 +257,8 @@ def fitted(
     if fresh:
         fit.begin_at_best(fresh)
     fit.fit(settings.rounds, settings.tolerance)
-    models = iter(fit.models)
-    moved = [replace(o, model=next(models)) if o.data is not None else o for o in opened]
+    found = iter(fit.models)
+    moved = [replace(o, model=next(found)) if o.data is not None else o for o in opened]
     shared = {e.name: e.value for e in fit.shared_values}
     for own in moved:
         if own.data is None:
@@ -264,7 +268,7 @@ def fitted(
 
 
 def fit(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     out: Path,
     command: str,
@@ -292,7 +296,7 @@ def fit(
 
 
 def fit_model(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     path: Path,
     command: str,
@@ -348,15 +352,17 @@ def fit_model(
     )
 
 
-def _told(model_file: ModelFile, measurements: Sequence[Measurement]) -> Collection[str]:
+def _told(
+    model_file: ModelFile, measurements: Sequence[Measurement | SteadyTable]
+) -> Collection[str]:
     """Names of what other logs told of the base."""
     return model_file.known_from_other_logs([m.log_sha256 for m in measurements])
 
 
-def noise_of(after: Comparison):
+def noise_of(after: Comparison) -> Noise | None:
     """Of the first log that has a score; None of tables."""
-    logs = (r.modelled for r in after.robots if r.modelled.noise and np.isfinite(r.score))
-    return next((log.noise_at_speed for log in logs), None)
+    logs = [r for r in after.robots if isinstance(r, RobotComparison) and np.isfinite(r.score)]
+    return next((r.modelled.noise_at_speed for r in logs if r.modelled.noise), None)
 
 
 def with_estimates(model: native.Model, estimates: Sequence[ParameterEstimate]) -> native.Model:
@@ -387,7 +393,8 @@ def common_clock(fit: ScoreFit) -> dict[str, ParameterEstimate]:
 
 def unsteady_clocks(fit: ScoreFit) -> list[str]:
     """Labels of logs whose clocks are found, and whose offset changes within them."""
-    own = [d.measurement for d in fit.datasets if CLOCK in {p.name for p in d.own}]
+    logs = [d for d in fit.datasets if isinstance(d, Trajectory)]
+    own = [d.measurement for d in logs if CLOCK in {p.name for p in d.own}]
     return [m.label for m in own if not m.steady]
 
 

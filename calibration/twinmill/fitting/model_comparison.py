@@ -14,6 +14,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from twinmill.data.measurement import Measurement
+from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.fit import base_names, effects_free, fitted
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import judged, open_measurements
@@ -61,7 +62,7 @@ class Standing:
 
 
 def predicted(
-    measurements: Sequence[Measurement], models: Sequence[ModelFile], refit: bool
+    measurements: Sequence[Measurement | SteadyTable], models: Sequence[ModelFile], refit: bool
 ) -> list[Predicted]:
     """Each model on the same data, over the same floors.
 

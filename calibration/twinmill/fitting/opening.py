@@ -3,6 +3,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import twinmill_native as native
@@ -257,7 +258,14 @@ def untold_parts(opened: Sequence[Opened], told: Collection[str]) -> list[str]:
     return [*lag, "delay", "clock"] if lateness_changes(opened) else []
 
 
-def judged(opened: Sequence[Opened]) -> list[Opened]:
+@dataclass(frozen=True)
+class Judged(Opened):
+    """One that has a floor; a name for type checkers alone, that no object is made of."""
+
+    data: Trajectory | SteadyStates
+
+
+def judged(opened: Sequence[Opened]) -> list[Judged]:
     """Those that have a floor.
 
     Raises:
@@ -266,7 +274,7 @@ def judged(opened: Sequence[Opened]) -> list[Opened]:
     known = [o for o in opened if o.data is not None]
     if not known:
         raise LogError(f"{' '.join(o.floor.reason for o in opened if o.floor)}.")
-    return known
+    return cast("list[Judged]", known)
 
 
 def of_few_commands(opened: Sequence[Opened]) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict import steady_states, windows
 from twinmill.predict.datasets import Trajectory
+from twinmill.predict.steady_states import SteadyStates
 
 
 @dataclass(frozen=True)
@@ -52,15 +53,19 @@ def residuals_of(fit: ScoreFit) -> list[Residuals]:
     """Of each data set of a finished fit."""
     found = []
     for data, model, rows in zip(fit.datasets, fit.models, fit.state[0], strict=True):
-        name, robot_id = data.measurement.log_name, data.robot_id
         if isinstance(data, Trajectory):
             errors = data.as_errors(rows)
             floor = np.broadcast_to(data.floor, errors.shape)
             start_s, horizon_s = data.start_s, np.array(windows.HORIZONS_S)
             channels = windows.CHANNELS
-        else:
+        elif isinstance(data, SteadyStates):
             errors, floor = data.fitted(model).errors()[:, None], data.floor()[:, None]
             start_s, horizon_s = np.full(len(errors), np.nan), np.array([np.nan])
             channels = steady_states.CHANNELS
-        found.append(Residuals(name, robot_id, start_s, horizon_s, tuple(channels), errors, floor))
+        else:
+            raise TypeError(f"{data.label}: has no errors in a unit of its own.")
+        name = data.measurement.log_name
+        found.append(
+            Residuals(name, data.robot_id, start_s, horizon_s, tuple(channels), errors, floor)
+        )
     return found

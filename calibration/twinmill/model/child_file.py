@@ -62,17 +62,6 @@ class Fitted:
     shares: Mapping[str, float] = field(default_factory=dict)
 
 
-def write_child(
-    parent: ModelFile, fitted: Fitted, path: Path, command: str, *, force: bool = True
-) -> None:
-    """Writes the fitted model to a new file: whole or not at all; `force` replaces one.
-
-    Raises:
-        ModelError: the file cannot be written.
-    """
-    child_of(parent, fitted, path, command).write(force)
-
-
 def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> ModelFile:
     """The fitted model as its file has it, before that is written."""
     document = tomlkit.parse(parent.text)

@@ -11,6 +11,7 @@ from markupsafe import Markup, escape
 from twinmill.files import REPORT, check_report, made_folder
 from twinmill.model.model_file import write_whole
 from twinmill.provenance import Provenance
+from twinmill.report.canvas import Svg
 from twinmill.report.tables import Table, Tone
 
 
@@ -18,7 +19,7 @@ from twinmill.report.tables import Table, Tone
 class Figure:
     """A picture as SVG text, and what is to be seen in it, in plain words."""
 
-    svg: str
+    svg: Svg
     title: str
     caption: str
 
