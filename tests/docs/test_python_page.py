@@ -21,7 +21,7 @@ def test_all_blocks_of_the_page_run(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(ROOT / "build/bin"), prepend=":")
     names: dict = {}
     blocks = BLOCK.findall((ROOT / "docs/python.md").read_text())
-    assert len(blocks) == 9  # one task has two
+    assert len(blocks) == 10  # eight tasks, two with a second one
     for block in blocks:
         exec(block, names)
     plt.close(names["figure"])
@@ -32,5 +32,6 @@ def test_all_blocks_of_the_page_run(tmp_path, monkeypatch):
     found = names["added"].table().set_index("name").loc["coasting.deceleration_mps2"]
     assert found["value"] == pytest.approx(0.7, abs=3 * found["std"])
     assert {"range_m", "seed", "circliness"} == set(names["rows"][0])
+    assert len(names["seen"]) == len(names["poses"])
     made = {"residuals.png", "params.csv", "tables", "turbopi.urdf", "better.toml", "report"}
     assert made <= {path.name for path in tmp_path.iterdir()}
