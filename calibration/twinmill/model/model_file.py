@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import twinmill_native as native
 
@@ -77,7 +78,7 @@ class ModelFile:
         write_whole(self.path, self.text, force)
 
     @cached_property
-    def _document(self) -> dict:
+    def _document(self) -> dict[str, Any]:
         """What the text says, without how it says it, which takes tomlkit long to read."""
         return tomllib.loads(self.text)
 
