@@ -425,6 +425,10 @@ class Log(Shown):
 
         Raises:
             ModuleNotFoundError: xarray is not installed.
+
+        Examples:
+            >>> tm.load("run.lcmlog").to_xarray()["x_m"].dims  # doctest: +SKIP
+            ('t_s',)
         """
         frame = self.to_pandas()
         keys = ["log", "robot_id"]
@@ -1303,11 +1307,8 @@ class Diagnosis(Reported):
         self.verdict: Verdict = result.verdict
         self.sentence = result.sentence
         ranked = {r.effect: r for r in result.ranking}
-        self.found = [
-            Finding(result.finding(name), ranked[name], log)
-            for name in result.found
-            if name in ranked
-        ]
+        named = [(result.finding(name), ranked.get(name)) for name in result.found]
+        self.found = [Finding(f, rank, log) for f, rank in named if f and rank]
         self.best = self.found[0] if self.found else None
 
     def table(self) -> pd.DataFrame:
@@ -2015,9 +2016,9 @@ def _of_robots(name: str, given: Any, kinds: Any, wanted: str) -> Any:
     """What is given for all robots, or by robot, once it is known to be of its kind."""
     checked(name, given, kinds, wanted)
     if isinstance(given, Mapping) and kinds is not Mapping:
-        of_one, one = (Real, "a number") if Real in kinds else NAMES
+        of_one: tuple[Any, str] = NUMBER if Real in kinds else NAMES
         for robot, own in given.items():
-            checked(f"{name} of {robot!r}", own, of_one, one)
+            checked(f"{name} of {robot!r}", own, *of_one)
             checked(f"{robot!r} in {name}", robot, Integral, "the number of a robot")
     return given
 
@@ -2061,8 +2062,10 @@ def _log(log: Logs) -> Log:
     """One object of all logs that are named."""
     if isinstance(log, (list, tuple)):
         return Log.joined([_log(one) for one in log])
-    log = checked("log", log, (Log, str, Path), f"a log, {A_PATH}, or a list of these")
-    return log if isinstance(log, Log) else load(Path(log))
+    if isinstance(log, (str, Path)):
+        return load(log)
+    own: Log = checked("log", log, Log, f"a log, {A_PATH}, or a list of these")
+    return own
 
 
 def _model(model: Model | str | Path | None) -> Model:

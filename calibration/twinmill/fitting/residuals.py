@@ -51,7 +51,7 @@ class Residuals:
 
 def residuals_of(fit: ScoreFit) -> list[Residuals]:
     """Of each data set of a finished fit."""
-    found = []
+    found: list[Residuals] = []
     for data, model, rows in zip(fit.datasets, fit.models, fit.state[0], strict=True):
         if isinstance(data, Trajectory):
             errors = data.as_errors(rows)

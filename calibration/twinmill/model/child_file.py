@@ -23,7 +23,10 @@ from twinmill.model.parameters import (
 class NoiseTable(Protocol):
     """Noise of a log, as far as a model file records it."""
 
-    speed_mps: float
+    @property
+    def speed_mps(self) -> float:
+        """RMS speed at which it was seen."""
+        ...
 
     def to_json(self) -> dict[str, float]:
         """Keys and values of the table `[noise]`."""
