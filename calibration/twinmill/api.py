@@ -16,6 +16,7 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 import logging
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import StrEnum
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -135,7 +136,7 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "full_duty": ("full_duty", *NUMBER),
     "wheel_factor": ("wheel_factor", *NUMBER),
 }
-Form = TypeVar("Form", LogFormat, ModelFormat)
+Form = TypeVar("Form", bound=StrEnum)
 Told = TypeVar("Told", bound="Shown")
 
 Given = ParamSpec("Given")

@@ -246,7 +246,7 @@ def add_to_model(
     estimates = [*found.shared_estimates(), *found.first_phases]
     own = _own_estimates(found, fresh) if robot_id is not None else []
     kept = lag_is_kept(judged(opened), told)
-    told = Fitted(
+    news = Fitted(
         model=with_estimates(richer, estimates),
         estimates=[e for e in estimates if e.seen],
         logs=logs,
@@ -259,7 +259,7 @@ def add_to_model(
         covariance=found.shared_covariance(),
         shares={name: _takes(*held)},
     )
-    child = child_of(model_file, told, path, command)
+    child = child_of(model_file, news, path, command)
     estimates += own
     return AddResult(
         *(name, before.model_name, before, after, estimates, *held, child),
