@@ -21,15 +21,11 @@ def main() -> None:
     log = tm.simulate("real_robot.toml", n=1, script="script.csv", duration_s=60)
     poses = log.table().query("valid")[["t_s", "robot_id", "x_m", "y_m", "theta_rad"]]
     poses.to_csv("poses.csv", index=False, float_format="%.6f")
-    commands = log.commands()[["t_s", "robot_id", "c0", "c1", "c2", "c3"]]
-    percent = commands.rename(columns=dict(zip(DUTIES, NAMES, strict=True)))
-    percent[list(NAMES)] *= 100
-    percent.to_csv("commands.csv", index=False, float_format="%.6f")
+    commands = log.commands()[["t_s", "robot_id", "fl_pct", "fr_pct", "rl_pct", "rr_pct"]]
+    commands.to_csv("commands.csv", index=False, float_format="%.6f")
     for path in ("real_robot.toml", "script.csv"):
         Path(path).unlink()
 
-
-DUTIES, NAMES = ("c0", "c1", "c2", "c3"), ("fl_pct", "fr_pct", "rl_pct", "rr_pct")
 
 if __name__ == "__main__":
     main()

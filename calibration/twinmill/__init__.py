@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Log as Log
     from twinmill.api import Model as Model
     from twinmill.api import compare as compare
+    from twinmill.api import compare_models as compare_models
     from twinmill.api import compare_runs as compare_runs
     from twinmill.api import diagnose as diagnose
     from twinmill.api import effect as effect
@@ -39,6 +40,9 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import next_run as next_run
     from twinmill.api import simulate as simulate
     from twinmill.data.log import LogError as LogError
+    from twinmill.defaults import Certainty as Certainty
+    from twinmill.defaults import Verdict as Verdict
+    from twinmill.fitting.settings import FitSettings as FitSettings
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.results import Comparison as Comparison
     from twinmill.results import Effect as Effect
@@ -49,6 +53,9 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
 
 # Where each public name is; imported when it is first used.
 _HOME = {
+    "Certainty": "twinmill.defaults",
+    "Verdict": "twinmill.defaults",
+    "FitSettings": "twinmill.fitting.settings",
     "LogError": "twinmill.data.log",
     "ModelError": "twinmill.model.model_file",
     **dict.fromkeys(
@@ -56,6 +63,7 @@ _HOME = {
             *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),
             *(
                 "compare",
+                "compare_models",
                 "compare_runs",
                 "diagnose",
                 "effect",
@@ -64,7 +72,7 @@ _HOME = {
                 "fit",
                 "import_log",
             ),
-            *("import_log", "infer", "load", "next_run", "simulate"),
+            *("infer", "load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),

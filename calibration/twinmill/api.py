@@ -13,35 +13,55 @@ Objects cannot be pickled: give paths to other processes, and let them return wh
 `table` gives.
 """
 
+import logging
 import subprocess
-import weakref
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import StrEnum
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import NoneType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, Union
 
 import numpy as np
 import pandas as pd
+import twinmill_native as native
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 from rich.console import RenderableType
 from threadpoolctl import threadpool_limits
 
 from twinmill import report
 from twinmill.arguments import checked, in_python, known
 from twinmill.data.importers import import_log as _import
-from twinmill.data.importers.import_log import ImportOptions
+from twinmill.data.importers.from_arrays import (
+    MOST_ROBOTS,
+    Kind,
+    commands_of,
+    log_of_frames,
+    log_of_series,
+    poses_of,
+)
+from twinmill.data.importers.options import ImportOptions
+from twinmill.data.importers.plain import VALUES
+from twinmill.data.lcm_log import split_events
 from twinmill.data.log import Log as RecordedLog
-from twinmill.data.log import LogError, RobotLog, read_log
+from twinmill.data.log import LogError, RobotLog, log_of, read_log
 from twinmill.data.measurement import Measurements, load_measurements
-from twinmill.data.multi_log import read_multi_log
+from twinmill.data.multi_log import multi_log_of
 from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
-from twinmill.defaults import ALARM_RATE, DEFAULT_MODEL, LogFormat, ModelFormat, least_seeds
+from twinmill.defaults import (
+    ALARM_RATE,
+    DEFAULT_MODEL,
+    Certainty,
+    LogFormat,
+    ModelFormat,
+    Verdict,
+    least_seeds,
+)
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis import explain as _explain
+from twinmill.diagnosis import result as _diagnosed
 from twinmill.diagnosis.finding import Finding as _Found
 from twinmill.diagnosis.finding import Ranked
 from twinmill.experiment.design import Limits, design, plan_run
@@ -53,6 +73,8 @@ from twinmill.files import plain
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
+from twinmill.fitting import model_comparison as _models
+from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
@@ -77,7 +99,6 @@ from twinmill.shown import (
     A_PATH,
     Reported,
     Shown,
-    own_folder,
     path_of,
     replacing_in_python,
     said_in_python,
@@ -85,8 +106,12 @@ from twinmill.shown import (
 from twinmill.swarm.compare import compare_swarm
 from twinmill.swarm.metrics import swarm_metrics
 
+if TYPE_CHECKING:
+    import xarray
+
+Frame = Any  # a data frame of pandas or polars, a dataset of xarray, a dictionary of arrays
+Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
-SWARM_SCALE = ("sensor.range_m", "robot.body_radius_m")  # of a model, for metrics of swarms
 LONGEST_RUN_S = 600.0
 LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
 NAMES = ((list, tuple, set, frozenset), "a list of names")
@@ -115,29 +140,35 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "full_duty": ("full_duty", *NUMBER),
     "wheel_factor": ("wheel_factor", *NUMBER),
 }
-Form = TypeVar("Form", LogFormat, ModelFormat)
-Result = TypeVar("Result")
+Form = TypeVar("Form", bound=StrEnum)
 Told = TypeVar("Told", bound="Shown")
 
-Call = TypeVar("Call", bound=Callable)
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 
-def _one_thread(call: Call) -> Call:
+LOGGER = logging.getLogger("twinmill")  # what is being done, and what is odd in the input
+LOGGER.addHandler(logging.NullHandler())
+
+
+def _one_thread(call: Callable[Given, Result]) -> Callable[Given, Result]:
     """Leaves BLAS one thread meanwhile.
 
     Its threads wait in loops: on matrices as narrow as ours, two take many times the processor time
     of one where other programs run, and are no sooner done.
     """
-    return threadpool_limits.wrap(limits=1, user_api="blas")(call)
+    limited: Callable[Given, Result] = threadpool_limits.wrap(limits=1, user_api="blas")(call)
+    return limited
 
 
 class Log(Shown):
     """One recorded run, or several: what robots were told, and where they were.
 
-    Of a steady-state table `table` gives the rows; it has no commands, paths or swarm.
+    `load` reads files, `from_arrays` and `from_frames` take numbers. Of a steady-state table
+    `table` gives the rows; it has no commands, paths or swarm.
 
     Attributes:
-        paths: the files of the runs.
+        paths: the files of the runs; names of those that are in no file.
 
     Examples:
         >>> log = tm.load("run.lcmlog")
@@ -149,18 +180,133 @@ class Log(Shown):
 
     def __init__(
         self,
-        paths: Iterable[str | Path],
+        runs: Iterable[RecordedLog],
+        tables: Iterable[SteadyTable] = (),
         said: Iterable[str] = (),
-        forget: Callable[[], None] = lambda: None,
     ):
-        several = checked("paths", paths, (list, tuple), "a list of paths; `load` takes names")
-        self.paths = [path_of("log", path, A_PATH) for path in several]
-        weakref.finalize(self, forget)  # removes the file of a simulated run
+        runs = checked("runs", runs, (list, tuple), "a list of runs; `load` takes names of files")
+        self._logs, self._tables = list(runs), list(tables)
+        self.paths = [log.path for log in self._logs]
+        self.paths += dict.fromkeys(Path(table.log_name) for table in self._tables)
         self._said = list(said)  # by the twin
         self._measurements: dict[str, Measurements] = {}  # by the model's hash
-        tables = filter(is_steady_table, self.paths)
-        self._tables = [table for path in tables for table in read_steady_tables(path)]
-        self._logs = [read_log(path) for path in self.paths if not is_steady_table(path)]
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t_s: ArrayLike,
+        pose: ArrayLike,
+        commands_t_s: ArrayLike,
+        commands: ArrayLike,
+        *,
+        kind: Kind,
+        same_clock: bool = False,
+        robot_id: int = 0,
+        wheelbase_m: float | None = None,
+        name: str = "arrays",
+    ) -> "Log":
+        """Makes a log of one robot from arrays.
+
+        Args:
+            t_s: (N,) times of the poses, s, or numpy's datetime64; ascending.
+            pose: (N, 3) x_m, y_m, theta_rad in the world frame, or (N, 2) where no heading was
+                measured. Rows with NaN are lost poses.
+            commands_t_s: (M,) times of the commands, likewise; each is held until the next.
+            commands: (M, K) by `kind`. `twist`: vx_mps, vy_mps, omega_radps, or vx_mps,
+                omega_radps. `duty`: percent, and `wheel_speed`: rad/s, of each driven wheel in the
+                model's order. `steering`: vx_mps, steering_rad.
+            kind: of the commands.
+            same_clock: one clock stamped poses and commands; False: their offset is fitted.
+            robot_id: 0 to 99.
+            wheelbase_m: distance of the axles, for `steering`.
+            name: of the log in tables and sentences.
+
+        Returns:
+            A log; nothing is written.
+
+        Raises:
+            LogError: the arrays make no run; one sentence.
+
+        Examples:
+            >>> t_s = np.arange(0, 20, 0.05)
+            >>> pose = np.column_stack([np.cos(t_s), np.sin(t_s), t_s + np.pi / 2])
+            >>> tm.Log.from_arrays(t_s, pose, [0, 10], [[1.0, 1.0], [1.0, 1.0]], kind="twist")
+            Log(arrays: robot 0, 20 s)
+        """
+        _check_arrays(robot_id, wheelbase_m, same_clock=same_clock, name=name)
+        poses = poses_of(robot_id, t_s, pose)
+        told = commands_of(robot_id, commands_t_s, commands, kind=kind, wheelbase_m=wheelbase_m)
+        return cls([log_of_series([poses], [told], name, same_clock)])
+
+    @classmethod
+    def from_frames(
+        cls,
+        poses: Frame,
+        commands: Frame,
+        *,
+        kind: Kind | None = None,
+        same_clock: bool = False,
+        robot_id: int = 0,
+        wheelbase_m: float | None = None,
+        name: str = "frames",
+    ) -> "Log":
+        """Makes a log from two data frames of pandas or polars, or dictionaries of arrays.
+
+        Args:
+            poses: columns t_s, x_m, y_m, and theta_rad where headings were measured; robot_id
+                where there are several robots; rows where `valid` is false are lost poses.
+            commands: columns t_s and one group: vx_mps, vy_mps, omega_radps; fl_pct, fr_pct,
+                rl_pct, rr_pct; w1_radps to w4_radps; or vx_mps, steering_rad; robot_id as in poses.
+            kind: which group; by default the one that is there.
+            same_clock: one clock stamped poses and commands; False: their offset is fitted.
+            robot_id: of frames that do not say.
+            wheelbase_m: distance of the axles, for steering angles.
+            name: of the log in tables and sentences.
+
+        Returns:
+            A log; nothing is written.
+
+        Raises:
+            LogError: a column is missing, or the numbers make no run; one sentence.
+
+        Examples:
+            >>> log = tm.load("run.lcmlog")
+            >>> tm.Log.from_frames(log.table(), log.commands())
+            Log(frames: robot 0, 60 s)
+        """
+        _check_arrays(robot_id, wheelbase_m, same_clock=same_clock, name=name)
+        run = log_of_frames(
+            poses,
+            commands,
+            kind=kind,
+            robot_id=robot_id,
+            wheelbase_m=wheelbase_m,
+            name=name,
+            same_clock=same_clock,
+        )
+        return cls([run])
+
+    @classmethod
+    def joined(cls, logs: "Sequence[Log]") -> "Log":
+        """Several logs of the same kind of robot as one object, as `load` makes of several files.
+
+        Args:
+            logs: one at least; names of two of them should differ.
+
+        Raises:
+            LogError: there is none.
+
+        Examples:
+            >>> tm.Log.joined([tm.load("run.lcmlog"), tm.simulate(n=2, duration_s=5)]).robots
+            [0, 1]
+        """
+        if not logs:
+            raise LogError("log: name one log at least.")
+        runs, tables, said = (
+            [part for log in logs for part in getattr(log, own)]
+            for own in ("_logs", "_tables", "_said")
+        )
+        return cls(runs, tables, said)
 
     def measurements(self, model: "Model | str | Path | None" = None) -> Measurements:
         """Cleaned runs, one for each robot in each log.
@@ -183,9 +329,10 @@ class Log(Shown):
         model = None if model is None else _model(model)
         key = model.file.hash if model else ""
         if key not in self._measurements:
-            self._measurements[key] = load_measurements(
-                self.paths, model.file.model if model else None
-            )
+            with said_in_python():
+                self._measurements[key] = load_measurements(
+                    [*self._logs, *self._tables], model.file.model if model else None
+                )
         return self._measurements[key]
 
     @property
@@ -242,9 +389,8 @@ class Log(Shown):
         """All commands, as they were recorded.
 
         Returns:
-            log, robot_id, t_s (robot's clock), kind, c0 to c3: duty as a fraction or speed in rad/s
-            of the wheels front-left, front-right, rear-left, rear-right; or vx_mps, vy_mps,
-            omega_radps, 0.
+            log, robot_id, t_s (robot's clock), kind, and by kind fl_pct, fr_pct, rl_pct, rr_pct
+            (duty); w1_radps to w4_radps (wheel_speed); or vx_mps, vy_mps, omega_radps (twist).
 
         Raises:
             LogError: all are steady-state tables.
@@ -254,6 +400,46 @@ class Log(Shown):
             {'duty'}
         """
         return _rows(self._recorded("commands"), _commands)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row per measured pose, with the command that was in force by the stamps.
+
+        Returns:
+            The columns of `table`, then those of `commands` from kind on; NaN before the first
+            command. Stamps are as recorded: an offset of the clocks is not taken out.
+
+        Raises:
+            LogError: all are steady-state tables.
+
+        Examples:
+            >>> frame = tm.load("run.lcmlog").to_pandas()
+            >>> list(frame.columns)[3:8]
+            ['x_m', 'y_m', 'theta_rad', 'valid', 'kind']
+        """
+        keys = ["log", "robot_id"]
+        commands, poses = self.commands().sort_values("t_s"), self.table().sort_values("t_s")
+        joined = pd.merge_asof(poses, commands, on="t_s", by=keys)
+        return joined.sort_values([*keys, "t_s"], ignore_index=True)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The numbers of `to_pandas` as a dataset of xarray, which must be installed.
+
+        Returns:
+            Variables along `t_s` if there is one robot in one log; else along `row`, with the
+            coordinates log, robot_id and t_s.
+
+        Raises:
+            ModuleNotFoundError: xarray is not installed.
+
+        Examples:
+            >>> tm.load("run.lcmlog").to_xarray()["x_m"].dims  # doctest: +SKIP
+            ('t_s',)
+        """
+        frame = self.to_pandas()
+        keys = ["log", "robot_id"]
+        dataset = frame.rename_axis("row").to_xarray().set_coords([*keys, "t_s"])
+        one = len(frame[keys].drop_duplicates()) == 1
+        return dataset.swap_dims(row="t_s").drop_vars("row") if one else dataset
 
     def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
         """What the swarm does over time.
@@ -272,10 +458,9 @@ class Log(Shown):
             ['log', 't_s', 'circliness']
         """
         twin = _model(model).file.model
-        scale = [twin.get(name) for name in SWARM_SCALE]
         parts = []
         for log in self._recorded("swarm"):
-            series = swarm_metrics(log, *scale)
+            series = swarm_metrics(log, *_scale(twin))
             part = pd.DataFrame(series.values, columns=list(series.to_json()["metrics"]))
             part.insert(0, "log", log.path.name)
             part.insert(1, "t_s", series.t_s)
@@ -296,8 +481,13 @@ class Log(Shown):
             >>> tm.load("run.lcmlog").plot().axes[0].get_xlabel()
             'x (m)'
         """
-        paths = [log.path for log in self._recorded("paths")]
-        robots = [robot for path in paths for robot in read_multi_log(path).robots]
+        robots = [
+            robot
+            for log in self._recorded("paths")
+            for robot in multi_log_of(
+                split_events(log.read_bytes(), log.path.name), log.path, log.sha256
+            ).robots
+        ]
         return draw(4.6, Drawing(robots).paths).picture
 
     def save(self, path: str | Path, force: bool = False) -> None:
@@ -316,8 +506,9 @@ class Log(Shown):
         """
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
+        (run,) = self._recorded("file of its own")
         with replacing_in_python(path, force) as temporary:
-            temporary.write_bytes(self.paths[0].read_bytes())
+            temporary.write_bytes(run.read_bytes())
 
     def export(
         self,
@@ -360,6 +551,7 @@ class Log(Shown):
                 model=file.model,
                 command="twinmill.Log.export",
                 force=force,
+                data=logs[0].data,
             )
         return done.files
 
@@ -400,13 +592,13 @@ class Log(Shown):
         logs, twin = self._recorded("swarm"), _model(model).file.model
         if len(logs) > 1:
             raise LogError(f"compare_swarm: is of one log, and these are {len(logs)}.")
-        series = swarm_metrics(logs[0], *(twin.get(name) for name in SWARM_SCALE))
+        series = swarm_metrics(logs[0], *_scale(twin))
         seeds = range(1, int(n_seeds) + 1)
         with said_in_python():
             result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
         return SwarmComparison(result)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """What the log holds, in numbers and names.
 
         Returns:
@@ -469,7 +661,8 @@ class Model(Shown):
             >>> tm.Model.load("turbopi.toml").effects
             []
         """
-        return cls(ModelFile.load(str(checked("model", name, (str, Path), "the name of a model"))))
+        checked("model", name, (str, Path), "the name of a model")
+        return cls(ModelFile.load(str(name)))
 
     @property
     def file(self) -> ModelFile:
@@ -525,7 +718,7 @@ class Model(Shown):
         """
         return pd.DataFrame(self.file.model.values())
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """What the model holds.
 
         Returns:
@@ -581,11 +774,12 @@ class Model(Shown):
         """
         return compare(log, self)
 
-    def fit(self, log: "Log | str | Path") -> "Fit":
-        """Fits all free quantities of the model to a log.
+    def fit(self, log: "Logs", **options: Any) -> "Fit":
+        """Fits the model to a log.
 
         Args:
-            log: a log, or the path of one.
+            log: a log, the path of one, or a list of these.
+            options: as of `fit`, which says more: hold, free, priors, settings.
 
         Returns:
             As `fit`, which says more.
@@ -597,7 +791,7 @@ class Model(Shown):
             >>> tm.Model.load("turbopi.toml").fit("run.lcmlog").model.name
             'turbopi_fitted.toml'
         """
-        return fit(log, self)
+        return fit(log, self, **options)
 
     @_one_thread
     def add(
@@ -631,21 +825,16 @@ class Model(Shown):
         for key, text in texts.items():
             checked(key, text, str, "a text of the effect `equation`; numbers are fitted")
         measurements = _log(log).measurements(self)
-        name = f"{self.file.path.stem}+{effect}.toml"
-        command = f"twinmill.add {effect}"
-        result, file = _made(
-            name,
-            lambda out: _add.add(
-                effect,
-                measurements,
-                self.file,
-                out=out,
-                command=command,
-                texts=texts,
-                robot_id=None if robot is None else int(robot),
-            ),
+        result = _add.add_to_model(
+            effect,
+            measurements,
+            self.file,
+            path=Path(f"{self.file.path.stem}+{effect}.toml"),
+            command=f"twinmill.add {effect}",
+            texts=texts,
+            robot_id=None if robot is None else int(robot),
         )
-        return _told(Addition(result, Model(file)), measurements)
+        return _told(Addition(result), measurements)
 
     def set(self, values: Mapping[str, float]) -> "Model":
         """Sets numbers by hand; what fits told of these is forgotten.
@@ -669,7 +858,7 @@ class Model(Shown):
             checked("values", name, str, "the name of a quantity")
             checked(name, value, Real, "a number")
         text = with_values(self.file, values, "twinmill.Model.set")
-        return Model(_read_back(f"{self.file.path.stem}_set.toml", text))
+        return Model(ModelFile.of(Path(f"{self.file.path.stem}_set.toml"), text))
 
     def export(
         self,
@@ -792,8 +981,13 @@ class Fit(Reported):
 
     Attributes:
         model: the new one.
-        before, after: comparisons of both models on the same noise.
+        before: comparison of the model as given with the log.
+        after: comparison of the new model, on the same noise.
         score: of the new model on the log it was fitted to.
+        log_likelihood: Gaussian, of errors over their floors, with the scale of each data set at
+            its best, without priors.
+        nobs: number of independent errors; residuals are more, and overlap.
+        converged: the fit ended before its last round.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -801,10 +995,107 @@ class Fit(Reported):
         ([], True)
     """
 
-    def __init__(self, result: _fit.FitResult, model: Model):
-        self._result, self.model = result, model
+    def __init__(self, result: _fit.FitResult):
+        self._result, self.model = result, Model(result.child)
         self.before, self.after = Comparison(result.before), Comparison(result.after)
-        self.score = self.after.score
+        self.score, told = self.after.score, result.statistics
+        self.log_likelihood, self.nobs, self.converged = (
+            told.log_likelihood,
+            told.nobs,
+            told.converged,
+        )
+
+    @property
+    def params(self) -> pd.Series:
+        """Estimates by name.
+
+        Examples:
+            >>> fitted.params["base.motor_lag_s"] > 0
+            True
+        """
+        return pd.Series({e.name: e.value for e in self._result.parameters}, name="value")
+
+    @property
+    def stderr(self) -> pd.Series:
+        """Standard errors by name: half a 95 % interval over 1.96.
+
+        They are from left-out blocks, widened by Student's t for few of these, and include what
+        priors leave open. All tables, files and intervals have these.
+
+        Examples:
+            >>> (fitted.stderr ** 2 - np.diag(fitted.covariance())).abs().max() < 1e-12
+            True
+        """
+        return pd.Series({e.name: e.std for e in self._result.parameters}, name="stderr")
+
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the estimates.
+
+        Returns:
+            A square table, in products of the units; `stderr` squared on its diagonal.
+
+        Examples:
+            >>> fitted.covariance().shape == (len(fitted.params), len(fitted.params))
+            True
+        """
+        told = self._result.statistics.covariance
+        return pd.DataFrame(told.values, index=told.names, columns=told.names)
+
+    def conf_int(self, alpha: float = 0.05) -> pd.DataFrame:
+        """Intervals that miss a parameter with a chance of alpha, by Student's t.
+
+        Args:
+            alpha: 0.05 for 95 %.
+
+        Returns:
+            lower and upper, by name.
+
+        Raises:
+            ValueError: alpha is not within 0 to 1.
+
+        Examples:
+            >>> (fitted.conf_int()["lower"] < fitted.params).all()
+            True
+        """
+        if not 0 < checked("alpha", alpha, *NUMBER) < 1:
+            raise ValueError(f"alpha: is {alpha}, and must be within 0 to 1.")
+        half = self._result.statistics.half_width(self.stderr, alpha)
+        return pd.DataFrame({"lower": self.params - half, "upper": self.params + half})
+
+    def residuals(self) -> pd.DataFrame:
+        """Measured less predicted, of the fitted model.
+
+        Returns:
+            log, robot_id, t_s (where the prediction starts), horizon_s (how far it goes), channel,
+            unit, residual and floor (the error that counts as one; both in the unit).
+
+        Examples:
+            >>> fitted.residuals()["channel"].unique().tolist()
+            ['forward', 'left', 'heading']
+        """
+        told = self._result.statistics.residuals
+        return pd.concat([pd.DataFrame(r.columns()) for r in told], ignore_index=True)
+
+    def summary(self) -> str:
+        """Estimates with errors and intervals, as text.
+
+        Examples:
+            >>> "log-likelihood" in fitted.summary()
+            True
+        """
+        rows = pd.DataFrame({"value": self.params, "stderr": self.stderr})
+        rows = rows.join(self.conf_int().set_axis(["[0.025", "0.975]"], axis=1))
+        rows["unit"] = [e.unit for e in self._result.parameters]
+        head = {
+            "model": self.model.name,
+            "score": f"{self.before.score:.3g} -> {self.score:.3g}",
+            "held-out score": f"{self._result.heldout.score:.3g}",
+            "independent errors": f"{self.nobs:.4g}",
+            "log-likelihood": f"{self.log_likelihood:.4g}",
+            "converged": "yes" if self.converged else "no",
+        }
+        lines = [f"{name:20}{value}" for name, value in head.items()]
+        return "\n".join([*lines, "", rows.to_string(float_format="{:.4g}".format)])
 
     def table(self) -> pd.DataFrame:
         """Fitted quantities.
@@ -876,8 +1167,8 @@ class Addition(Reported):
         'dead_zone.width'
     """
 
-    def __init__(self, result: _add.AddResult, model: Model):
-        self._result, self.model = result, model
+    def __init__(self, result: _add.AddResult):
+        self._result, self.model = result, Model(result.child)
         self.effect = result.effect
         self.heldout_before = result.heldout_refit.score
         self.heldout_after = result.heldout_after.score
@@ -942,10 +1233,11 @@ class Finding(Shown):
     def __init__(self, finding: _Found, ranked: Ranked, log: Log):
         self._result, self._ranked, self._log = finding, ranked, log
         self.effect, self.score_heldout = finding.effect, ranked.score_heldout
-        self.share, self.certainty = finding.share, finding.certainty
+        self.share = finding.share
+        self.certainty: Certainty = finding.certainty
         self.parameters = {key_of(e.name): e.value for e in finding.parameters}
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """What the diagnosis tells of this effect.
 
         Returns:
@@ -1015,15 +1307,13 @@ class Diagnosis(Reported):
         'effect_missing'
     """
 
-    def __init__(self, result: _diagnose.Diagnosis, log: Log, file: ModelFile):
+    def __init__(self, result: _diagnosed.Diagnosis, log: Log, file: ModelFile):
         self._result, self._file = result, file
-        self.verdict, self.sentence = result.verdict, result.sentence
+        self.verdict: Verdict = result.verdict
+        self.sentence = result.sentence
         ranked = {r.effect: r for r in result.ranking}
-        self.found = [
-            Finding(result.finding(name), ranked[name], log)
-            for name in result.found
-            if name in ranked
-        ]
+        named = [(result.finding(name), ranked.get(name)) for name in result.found]
+        self.found = [Finding(f, rank, log) for f, rank in named if f and rank]
         self.best = self.found[0] if self.found else None
 
     def table(self) -> pd.DataFrame:
@@ -1125,8 +1415,8 @@ class Explanation(Reported):
         'effect_missing'
     """
 
-    def __init__(self, result: _explain.Explanation, model: Model, log: Log, file: ModelFile):
-        self._result, self.model = result, model
+    def __init__(self, result: _explain.Explanation, log: Log, file: ModelFile):
+        self._result, self.model = result, Model(result.child or file)
         self.diagnosis = Diagnosis(result.diagnosis, log, file)
         self.after = Comparison(result.after)
         self.score = self.after.score
@@ -1203,7 +1493,12 @@ def load(*paths: str | Path) -> Log:
     if not paths:
         raise LogError("load: name one log at least.")
     several = f"{A_PATH}; several are named one by one: load(*paths)"
-    return Log([path_of("log", path, several) for path in paths])
+    files = [path_of("log", path, several) for path in paths]
+    tables = [path for path in files if is_steady_table(path)]
+    return Log(
+        [read_log(path) for path in files if path not in tables],
+        [table for path in tables for table in read_steady_tables(path)],
+    )
 
 
 @_one_thread
@@ -1289,19 +1584,36 @@ def compare_runs(
 
 
 @_one_thread
-def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
-    """Fits all free quantities of a model, and the parameters of its effects, to a log.
+def fit(
+    log: Logs,
+    model: Model | str | Path | None = None,
+    *,
+    hold: Iterable[str] = (),
+    free: Iterable[str] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+    settings: FitSettings = FIT_SETTINGS,
+) -> Fit:
+    """Fits a model, and the parameters of its effects, to a log.
+
+    By default it moves what the log can tell: gains, speeds of duties and lag of the base, and the
+    numbers of all effects. Names are those of `Model.table`, or an effect or a table as a whole:
+    `coasting`, `base.wheel_speed_mps`.
 
     Args:
-        log: a log, or the path of one.
+        log: a log, the path of one, or a list of these.
         model: where the fit begins; a model, or the name of one; None is TurboPi's.
+        hold: names of what keeps its value, fitted by default or not.
+        free: names of what alone is fitted, any number of base and robot; None: the default.
+        priors: mean and standard deviation of normal priors by name, in place of the usual ones,
+            which are wide and about the model's value.
+        settings: when the fit ends.
 
     Returns:
         The new model, its parameters with uncertainties, and both comparisons.
 
     Raises:
         LogError: the log cannot be used; one sentence.
-        ModelError: the model cannot be read.
+        ModelError: the model cannot be read, has no such quantity, or a prior cannot be.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -1309,14 +1621,90 @@ def fit(log: Log | str | Path, model: Model | str | Path | None = None) -> Fit:
         True
         >>> list(fitted.table().columns)
         ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words']
+        >>> gains = ["base.forward_gain", "base.yaw_gain"]
+        >>> tm.fit("run.lcmlog", "turbopi.toml", free=gains).params.index.tolist()
+        ['base.yaw_gain', 'base.forward_gain']
     """
     start = _model(model)
-    measurements = _log(log).measurements(start)
-    result, file = _made(
-        f"{start.file.path.stem}_fitted.toml",
-        lambda out: _fit.fit(measurements, start.file, out, "twinmill.fit"),
+    checked("settings", settings, FitSettings, "a `FitSettings`")
+    choice = _fit.Choice(
+        _names("hold", hold), None if free is None else _names("free", free), _priors(priors or {})
     )
-    return _told(Fit(result, Model(file)), measurements)
+    measurements = _log(log).measurements(start)
+    path = Path(f"{start.file.path.stem}_fitted.toml")
+    result = _fit.fit_model(
+        measurements, start.file, path, "twinmill.fit", choice=choice, settings=settings
+    )
+    return _told(Fit(result), measurements)
+
+
+def _names(what: str, names: Iterable[str]) -> tuple[str, ...]:
+    checked(what, names, *NAMES)
+    return tuple(checked(f"a name in {what}", name, str, "a text") for name in names)
+
+
+def _priors(priors: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    checked("priors", priors, *BY_NAME)
+    for name, prior in priors.items():
+        two = isinstance(prior, (list, tuple)) and [isinstance(v, Real) for v in prior]
+        if two != [True, True]:
+            raise TypeError(
+                f"prior of {name}: is {prior!r}, and must be (mean, standard deviation)."
+            )
+    return dict(priors)
+
+
+@_one_thread
+def compare_models(
+    models: "Sequence[Model | str | Path] | Mapping[str, Model | str | Path]",
+    log: Logs,
+    *,
+    refit: bool = True,
+) -> pd.DataFrame:
+    """Ranks models by how well they predict what they were not fitted to.
+
+    Each is fitted to the logs with one of six parts left out in turn, and predicts that part.
+    Blocks of 8 s count as independent.
+
+    Args:
+        models: two at least, or a dictionary of them by name.
+        log: a log, the path of one, or a list of these.
+        refit: fit each model to the parts that are not left out; False: all predict as they are.
+
+    Returns:
+        One row per model, best first: rank, score_heldout (1.0 is as good as the log can tell),
+        elpd (expected log predictive density, of all blocks), elpd_diff (of the best less this
+        one's), dse (standard error of the difference), weight (in the mixture that predicts best:
+        stacking), p_chance (chance of so large a lead of the best, were no model better than this
+        one). `attrs["correction"]` says how p_chance allows for the best being one of many.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+        ModelError: a model cannot be read.
+        ValueError: there are not two models.
+
+    Examples:
+        >>> table = tm.compare_models(["turbopi.toml", "hidden.toml"], "run.lcmlog")
+        >>> table.index[0], table["weight"].sum().round(6)
+        ('hidden.toml', ...1.0...)
+    """
+    checked("refit", refit, *SWITCH)
+    checked("models", models, (list, tuple, Mapping), "a list of models, or a dictionary of them")
+    given = [_model(m) for m in (models.values() if isinstance(models, Mapping) else models)]
+    if len(given) < 2:
+        raise ValueError(f"models: {len(given)} cannot be compared; give two or more.")
+    names = list(models) if isinstance(models, Mapping) else [model.name for model in given]
+    if len(set(names)) < len(names):
+        raise ValueError(f"models: two have one name ({', '.join(names)}); give a dictionary.")
+    measurements = _log(log).measurements(given[0])
+    found = _models.standings(_models.predicted(measurements, [m.file for m in given], refit))
+    table = pd.DataFrame(
+        [vars(standing) for standing in found], index=pd.Index(names, name="model")
+    )
+    table = table.sort_values("elpd", ascending=False, kind="stable")
+    table.insert(0, "rank", range(1, len(table) + 1))
+    table.attrs["correction"] = _models.CORRECTION
+    return table
 
 
 @_one_thread
@@ -1351,10 +1739,9 @@ def diagnose(
         ['coasting']
     """
     log, model = _log(log), _model(model)
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     excluded = known("without", without, catalogue())
     measurements = log.measurements(model)
-    result = _diagnose.diagnose(measurements, model.file, progress or (lambda _: None), excluded)
+    result = _diagnose.diagnose(measurements, model.file, _progress(progress), excluded)
     return _told(Diagnosis(result, log, model.file), measurements)
 
 
@@ -1388,10 +1775,9 @@ def infer(
         'coasting'
     """
     log, model = _log(log), _model(model)
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     measurements = log.measurements(model)
     before = _log(own).measurements(model) if own is not None else ()
-    result = _infer.infer(measurements, model.file, before, progress or (lambda _: None))
+    result = _infer.infer(measurements, model.file, before, _progress(progress))
     return _told(Inference(result), measurements)
 
 
@@ -1425,19 +1811,16 @@ def explain(
     """
     log, model = _log(log), _model(model)
     checked("formula", formula, (bool,), "True or False")
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     measurements = log.measurements(model)
-    result, file = _made(
-        f"{model.file.path.stem}_explained.toml",
-        lambda out: _explain.explain(
-            *(measurements, model.file),
-            out=out,
-            command="twinmill.explain",
-            progress=progress or (lambda _: None),
-            formula=formula,
-        ),
+    result = _explain.explain_model(
+        measurements,
+        model.file,
+        path=Path(f"{model.file.path.stem}_explained.toml"),
+        command="twinmill.explain",
+        progress=_progress(progress),
+        formula=formula,
     )
-    return _told(Explanation(result, Model(file), log, model.file), measurements)
+    return _told(Explanation(result, log, model.file), measurements)
 
 
 @_one_thread
@@ -1478,10 +1861,9 @@ def next_run(
         ['t_s', 'fl_pct', 'fr_pct', 'rl_pct', 'rr_pct']
     """
     log, model = _log(log), _model(model)
-    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
     limits = _limits(duration_s, floor_m, max_duty)
     measurements = log.measurements(model)
-    plan = plan_run(measurements, model.file, limits, progress or (lambda _: None))
+    plan = plan_run(measurements, model.file, limits, _progress(progress))
     return _told(NextRun(plan), measurements)
 
 
@@ -1540,7 +1922,7 @@ def simulate(
             `next_run` designed.
 
     Returns:
-        A log like a robot's own; its file goes with the object unless it is saved.
+        A log like a robot's own; it is in no file unless it is saved.
 
     Raises:
         ModelError: the model cannot be read.
@@ -1562,47 +1944,48 @@ def simulate(
         script = path_of("script", script, "the path of a CSV file, or a designed run").resolve()
     file = _model(model).file
     options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s]
-    with ExitStack() as stack:
-        place = own_folder(stack)
+    with TemporaryDirectory(prefix="twinmill.") as folder:
+        place = Path(folder)
         (place / "model.toml").write_text(file.text)
         if isinstance(script, NextRun):
             script.save(place / "script.csv")
             script = place / "script.csv"
         options += ["--behavior", behavior] if script is None else ["--script", script]
         said = _run_twin(place, options)
-        return Log([place / "simulated.lcmlog"], said, stack.pop_all().close)
+        recorded = (place / "simulated.lcmlog").read_bytes()
+        return Log([log_of(recorded, "simulated.lcmlog")], said=said)
 
 
 def import_log(
-    poses: str | Path | pd.DataFrame | None = None,
-    commands: str | Path | pd.DataFrame | None = None,
+    poses: str | Path | None = None,
+    commands: str | Path | None = None,
     *,
     motive: str | Path | None = None,
     vicon: str | Path | None = None,
     io_tsv: Iterable[str | Path] = (),
     bag: str | Path | None = None,
-    detections: str | Path | pd.DataFrame | None = None,
+    detections: str | Path | None = None,
     robot_id: int | None = None,
     heading_offset_deg: float | Mapping[int, float] = 0.0,
     **options: Any,
 ) -> Log:
-    """Makes a log from motion capture and commands: tables, or files of other programs.
+    """Makes a log from motion capture and commands in files of other programs.
 
     One source of poses (`poses`, `motive`, `vicon`) is needed, and one of commands (`commands`,
-    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. Tables may be
-    those of pandas; the page Files lists their columns. Arguments are named as the options of
-    `twinmill import`, whose help says more.
+    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. The page Files
+    lists the columns of tables; those of pandas go into `Log.from_frames`. Arguments are named as
+    the options of `twinmill import`, whose help says more.
 
     Args:
-        poses: CSV or table: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with
+        poses: CSV: t_s, robot_id, x_m, y_m, theta_rad; one of ROS or of others with
             `rename`.
-        commands: CSV or table: t_s, robot_id, and fl_pct, fr_pct, rl_pct, rr_pct, or vx_mps,
+        commands: CSV: t_s, robot_id, and fl_pct, fr_pct, rl_pct, rr_pct, or vx_mps,
             vy_mps, omega_radps, or others; each row is held until the next.
         motive: CSV export of OptiTrack Motive.
         vicon: CSV export of Vicon Tracker or Nexus.
         io_tsv: io.tsv of robots.
         bag: ROS bag, with its topics in `pose` and `command`.
-        detections: CSV or table of what cameras saw: t_s, robot_id, seen.
+        detections: CSV of what cameras saw: t_s, robot_id, seen.
         robot_id: whose the rows are, for files that do not say.
         heading_offset_deg: from the tracked body's x axis to the robot's front, left positive; or
             by robot.
@@ -1616,17 +1999,18 @@ def import_log(
             `wheel_factor`.
 
     Returns:
-        A log; its file goes with the object unless it is saved.
+        A log; it is in no file unless it is saved.
 
     Raises:
         LogError: a file cannot be read, or what it holds makes no run; one sentence.
         ValueError: there is no such option; the sentence has the nearest.
 
     Examples:
-        >>> poses = tm.load("run.lcmlog").table().drop(columns="log")
-        >>> commands = pd.DataFrame({"t_s": [0, 5], "robot_id": 0, "vx_mps": 0.2, "vy_mps": 0,
-        ...                          "omega_radps": [0, 0.5]})
-        >>> tm.import_log(poses, commands)
+        >>> from tempfile import mkdtemp
+        >>> tables = Path(mkdtemp())
+        >>> tm.load("run.lcmlog").table().to_csv(tables / "poses.csv")
+        >>> tm.load("run.lcmlog").commands().to_csv(tables / "commands.csv")
+        >>> tm.import_log(tables / "poses.csv", tables / "commands.csv")
         Log(imported.lcmlog: robot 0, 60 s)
     """
     checked("robot_id", robot_id, (Integral, NoneType), "the number of a robot")
@@ -1639,23 +2023,24 @@ def import_log(
     how = ImportOptions(
         robot_id=robot_id, heading_offset_rad=offset_rad, **_import_options(options)
     )
-    tables = {"poses": poses, "commands": commands, "detections": detections}
-    files = {"motive": motive, "vicon": vicon, "bag": bag}
+    given = {"poses": poses, "commands": commands, "motive": motive, "vicon": vicon, "bag": bag}
+    given["detections"] = detections
+    files = {k: None if path is None else path_of(k, path, A_PATH) for k, path in given.items()}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
-    with ExitStack() as stack, said_in_python():
-        place = own_folder(stack)
-        read = {key: _as_csv(place, key, table) for key, table in tables.items()}
-        read |= {key: path and path_of(key, path, A_PATH) for key, path in files.items()}
-        out = place / "imported.lcmlog"
+    with TemporaryDirectory(prefix="twinmill.") as folder, said_in_python():
+        out = Path(folder) / "imported.lcmlog"
         told = _import.import_log(
-            *(read.pop("poses"), read.pop("commands"), out),
+            *(files["poses"], files["commands"], out),
+            motive=files["motive"],
+            vicon=files["vicon"],
             io_tsv=tuple(path_of("io_tsv", path, A_PATH) for path in several),
+            bag=files["bag"],
+            detections=files["detections"],
             options=how,
-            **read,
         )
-        own = read_log(out).warnings
-        said = [in_python(text) for text in told["warnings"] if text not in own]
-        return Log([out], said, stack.pop_all().close)
+        made = log_of(out.read_bytes(), out.name)
+        said = [in_python(text) for text in told["warnings"] if text not in made.warnings]
+        return Log([made], said=said)
 
 
 def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -1690,9 +2075,9 @@ def _of_robots(name: str, given: Any, kinds: Any, wanted: str) -> Any:
     """What is given for all robots, or by robot, once it is known to be of its kind."""
     checked(name, given, kinds, wanted)
     if isinstance(given, Mapping) and kinds is not Mapping:
-        of_one, one = (Real, "a number") if Real in kinds else NAMES
+        of_one: tuple[Any, str] = NUMBER if Real in kinds else NAMES
         for robot, own in given.items():
-            checked(f"{name} of {robot!r}", own, of_one, one)
+            checked(f"{name} of {robot!r}", own, *of_one)
             checked(f"{robot!r} in {name}", robot, Integral, "the number of a robot")
     return given
 
@@ -1702,16 +2087,6 @@ def _format(to: str, forms: type[Form]) -> Form:
     if checked("to", to, str, "the name of a format") not in [*forms]:
         raise ValueError(f"to: there is no '{to}'; choose one of {', '.join(forms)}.")
     return forms(to)
-
-
-def _as_csv(place: Path, name: str, table: str | Path | pd.DataFrame | None) -> Path | None:
-    """The path of a table, which is written to a folder if it is one of pandas."""
-    wanted = "a table of pandas, or the path of a CSV file"
-    checked(name, table, (str, Path, pd.DataFrame, NoneType), wanted)
-    if not isinstance(table, pd.DataFrame):
-        return table if table is None else path_of(name, table, wanted)
-    table.to_csv(place / f"{name}.csv", index=False)
-    return place / f"{name}.csv"
 
 
 def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) -> Limits:
@@ -1728,7 +2103,7 @@ def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) ->
     return Limits(float(duration_s), (float(floor_m[0]), float(floor_m[1])), float(max_duty))
 
 
-def _run_twin(place: Path, options: list) -> list[str]:
+def _run_twin(place: Path, options: list[Any]) -> list[str]:
     """Writes simulated.lcmlog in a folder, by the model.toml in it; what the twin warned of."""
     command = [
         find_program("twin_run"), "--model", "model.toml", "--log", "simulated.lcmlog", *options,
@@ -1742,9 +2117,14 @@ def _run_twin(place: Path, options: list) -> list[str]:
     return [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
 
 
-def _log(log: Log | str | Path) -> Log:
-    log = checked("log", log, (Log, str, Path), f"a log, or {A_PATH}; `load` joins several")
-    return log if isinstance(log, Log) else load(log)
+def _log(log: Logs) -> Log:
+    """One object of all logs that are named."""
+    if isinstance(log, (list, tuple)):
+        return Log.joined([_log(one) for one in log])
+    if isinstance(log, (str, Path)):
+        return load(log)
+    own: Log = checked("log", log, Log, f"a log, {A_PATH}, or a list of these")
+    return own
 
 
 def _model(model: Model | str | Path | None) -> Model:
@@ -1755,43 +2135,55 @@ def _model(model: Model | str | Path | None) -> Model:
     return Model.load(DEFAULT_MODEL if model is None else model)
 
 
+def _progress(progress: Callable[[str], None] | None) -> Callable[[str], None]:
+    """A function that logs what it is told, and tells it on."""
+    checked("progress", progress, (Callable, NoneType), "a function that takes a text")
+
+    def tell(text: str) -> None:
+        LOGGER.info(text)
+        if progress is not None:
+            progress(text)
+
+    return tell
+
+
 def _told(shown: Told, measurements: Measurements) -> Told:
     """The result, with what was found wrong with its logs."""
     mild = [str(f) for f in measurements.findings if not f.fatal]
     shown.left_out = (*measurements.excluded, *mild)
+    for said in shown.left_out:
+        LOGGER.warning(said)
     shown.input = tuple(finding.to_json() for finding in measurements.findings)
     return shown
 
 
-def _read_back(name: str, text: str) -> ModelFile:
-    """A model of that text, which is in no file."""
-    with TemporaryDirectory(prefix="twinmill.") as folder:
-        path = Path(folder) / name
-        path.write_text(text)
-        return replace(ModelFile.load(str(path)), path=Path(name))
+def _scale(model: native.Model) -> tuple[float, float]:
+    """Range of sight and radius of the body, in m, which metrics of swarms are over."""
+    return model.get("sensor.range_m"), model.get("robot.body_radius_m")
 
 
-def _made(name: str, make: Callable[[Path], Result]) -> tuple[Result, ModelFile]:
-    """A result whose model is written to a file that is read back and gone at once."""
-    with TemporaryDirectory(prefix="twinmill.") as folder:
-        path = Path(folder) / name
-        result = make(path)
-        file = ModelFile.load(str(path))
-    return replace(result, path=Path(name)), replace(file, path=Path(name))
-
-
-def _poses(robot: RobotLog) -> dict:
+def _poses(robot: RobotLog) -> dict[str, Any]:
     names = ("x_m", "y_m", "theta_rad")
     columns = zip(names, robot.pose.T, strict=True)
     return {"t_s": robot.pose_t_s, **dict(columns), "valid": robot.valid}
 
 
-def _commands(robot: RobotLog) -> dict:
-    columns = {f"c{i}": column for i, column in enumerate(np.atleast_2d(robot.command.T))}
-    return {"t_s": robot.command_t_s, "kind": robot.command_kind, **columns}
+def _commands(robot: RobotLog) -> dict[str, Any]:
+    value = robot.command * (100 if robot.command_kind == "duty" else 1)  # fractions to percent
+    columns = zip(VALUES.get(robot.command_kind, ()), value.T, strict=False)
+    return {"t_s": robot.command_t_s, "kind": robot.command_kind, **dict(columns)}
 
 
-def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict]) -> pd.DataFrame:
+def _check_arrays(robot_id: int, wheelbase_m: float | None, *, same_clock: bool, name: str) -> None:
+    checked("robot_id", robot_id, Integral, "the number of a robot")
+    checked("wheelbase_m", wheelbase_m, (Real, NoneType), "a number")
+    checked("same_clock", same_clock, *SWITCH)
+    checked("name", name, str, "the name of a log")
+    if not 0 <= robot_id < MOST_ROBOTS:
+        raise LogError(f"robot_id: is {robot_id}, and must be within 0 to {MOST_ROBOTS - 1}.")
+
+
+def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict[str, Any]]) -> pd.DataFrame:
     """One table of all robots in all logs."""
     parts = [
         pd.DataFrame({"log": log.path.name, "robot_id": number, **columns(robot)})

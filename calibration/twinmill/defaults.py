@@ -3,6 +3,7 @@
 
 import math
 from enum import StrEnum
+from typing import Literal
 
 DEFAULT_MODEL = "turbopi.toml"
 FOREVER_S = 1e9  # how long a bus is listened to where nothing else is said
@@ -19,6 +20,17 @@ FALSE_ALARMS = 0.05
 BATCH = 36
 EMITTERS = 3
 PER_GENERATION = BATCH * EMITTERS
+
+# What a diagnosis says of a model, and of an effect that it names.
+Verdict = Literal[
+    "model_adequate",
+    "refit_enough",
+    "effect_missing",
+    "ambiguous",
+    "outside_catalogue",
+    "cannot_tell",
+]
+Certainty = Literal["sure", "group", "doubtful"]
 
 
 class Question(StrEnum):

@@ -3,6 +3,7 @@
 
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from matplotlib.figure import Figure
@@ -355,12 +356,12 @@ class Effect(Shown):
         'wheel'
     """
 
-    def __init__(self, entry: dict):
+    def __init__(self, entry: dict[str, Any]):
         self._entry = checked("entry", entry, dict, "a card; `effect` takes its name")
         self.name, self.summary = entry["name"], entry["summary"]
         self.equation, self.stage = entry["equation"], entry["stage"]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """All of the card, as `twinmill effects NAME --json`.
 
         Returns:
@@ -370,7 +371,8 @@ class Effect(Shown):
             >>> tm.effect("coasting").to_json()["parameters"][0]["unit"]
             'm/s^2'
         """
-        return plain(self._entry)
+        card: dict[str, Any] = plain(self._entry)
+        return card
 
     def table(self) -> pd.DataFrame:
         """Its parameters.
@@ -401,5 +403,6 @@ def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     if last.shown in (tables := comparisons.steady_comparisons(last)):
         return steady.values(tables).svg.picture
     robot = last.robots.index(last.shown)
-    same = [(label, result.robots[robot]) for label, result in results]
+    robots = [(label, result.robots[robot]) for label, result in results]
+    same = [(label, own) for label, own in robots if isinstance(own, _compare.RobotComparison)]
     return error_figures.error_growth(same).svg.picture

@@ -4,10 +4,9 @@
 import html
 import shutil
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Self
 
 import pandas as pd
@@ -33,9 +32,9 @@ class Shown:
 
     _result: Any
     left_out: tuple[str, ...] = ()
-    input: tuple[dict, ...] | None = None
+    input: tuple[dict[str, Any], ...] | None = None
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The same object as `--json` of the command, without how the command was called.
 
         Returns:
@@ -46,7 +45,8 @@ class Shown:
             True
         """
         told = {} if self.input is None else {"input": self.input}
-        return plain({**self._result.to_json(), **told})
+        found: dict[str, Any] = plain({**self._result.to_json(), **told})
+        return found
 
     def table(self) -> pd.DataFrame:
         """The numbers; each class says which."""
@@ -67,14 +67,8 @@ class Shown:
     def __copy__(self) -> Self:
         return self  # it never changes
 
-    def __deepcopy__(self, _: dict) -> Self:
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
         return self
-
-    def __reduce__(self) -> str:
-        raise TypeError(
-            f"{type(self).__name__}: cannot be pickled; give paths to other processes, and return "
-            "what to_json() or table() gives."
-        )
 
     def _repr_html_(self) -> str:
         return f"<p><b>{html.escape(repr(self))}</b></p>{self.table()._repr_html_()}"
@@ -131,10 +125,5 @@ def said_in_python() -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise type(error)(in_python(str(error))) from error
-
-
-def own_folder(stack: ExitStack) -> Path:
-    """A folder that goes with the object that it is made for."""
-    folder = TemporaryDirectory(prefix="twinmill.", ignore_cleanup_errors=True)
-    return Path(stack.enter_context(folder))
+        error.args = (in_python(str(error)),)
+        raise

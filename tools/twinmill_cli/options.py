@@ -66,7 +66,9 @@ Force = Annotated[bool, typer.Option("--force", help="Replace M2 if it exists.")
 Hold = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="NAME", show_default=False, help="A quantity that keeps its value; may be repeated."
+        metavar="NAME",
+        show_default=False,
+        help="A quantity, or an effect or table as a whole, that keeps its value; may be repeated.",
     ),
 ]
 KeyFile = Annotated[

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <functional>
 #include "arrays.h"
+#include "pickle_bindings.h"
 
 #include "fw/mixing.h"
 #include "plant/kinematics.h"
@@ -428,6 +429,9 @@ NB_MODULE(twinmill_native, m)
         .def("detection_model", &DetectionModelDict,
              "What the robot's camera sees and how it errs, effects included.")
         .def("copy", [](const Model &model) { return Model(model); })
+        .def("__getstate__", &StateOf)
+        .def("__setstate__",
+             [](Model &model, const nb::tuple &state) { new (&model) Model(ModelOf(state)); })
         .def_prop_ro("drive", &DriveName)
         .def_prop_ro("wheel_kind",
                      [](const Model &model) { return WheelKindName(model.base.wheels); })

@@ -6,9 +6,9 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import turbopi
@@ -107,6 +107,7 @@ class Log:
             series.
         robots: by robot_id, ascending.
         warnings: sentences.
+        data: bytes of a log that is in no file.
     """
 
     path: Path
@@ -114,6 +115,15 @@ class Log:
     t0_utime_us: int
     robots: dict[int, RobotLog]
     warnings: list[str]
+    data: bytes | None = field(default=None, repr=False)
+
+    def read_bytes(self) -> bytes:
+        """What its file holds, or would hold.
+
+        Raises:
+            LogError: the file cannot be read.
+        """
+        return read_bytes(self.path) if self.data is None else self.data
 
 
 def read_log(path: str | Path, channel_prefix: str = "") -> Log:
@@ -128,7 +138,23 @@ def read_log(path: str | Path, channel_prefix: str = "") -> Log:
             another type.
     """
     path = Path(path)
-    data = read_bytes(path)
+    return _decoded(read_bytes(path), path, channel_prefix)
+
+
+def log_of(data: bytes, name: str) -> Log:
+    """A log in memory.
+
+    Args:
+        data: bytes of an LCM log.
+        name: of the log, in place of a file's.
+
+    Raises:
+        LogError: as read_log.
+    """
+    return replace(_decoded(data, Path(name), ""), data=data)
+
+
+def _decoded(data: bytes, path: Path, channel_prefix: str) -> Log:
     if (other := other_file(data[:LOOKED_AT])) and other[0] != LCM_LOG:
         raise LogError(f"{path.name}: is {other[0]}, not an LCM log; {other[1]}.")
     events = split_events(data, path.name)
@@ -213,7 +239,7 @@ def _robot_channels(
     }
 
 
-def _channel_pattern(prefix: str) -> re.Pattern:
+def _channel_pattern(prefix: str) -> re.Pattern[str]:
     return re.compile(rf"{re.escape(prefix)}R(\d\d)_({'|'.join(_READ)})")
 
 
@@ -271,7 +297,7 @@ def _undamaged(messages: np.ndarray, channel: str, warnings: list[str]) -> np.nd
     """
     alone = ALONE if channel.endswith("_DRIVE") else 1
     strange = _strays(messages["utime_us"].astype(float) / 1e6, alone)
-    if "kind" in messages.dtype.names:
+    if "kind" in (messages.dtype.names or ()):
         kinds, counts = np.unique(messages["kind"], return_counts=True)
         strange |= messages["kind"] != kinds[counts.argmax()]
     count = int(np.count_nonzero(strange))
@@ -368,10 +394,10 @@ def _says_same_clock(config_toml: str) -> bool:
 
 def _command_series(
     messages: np.ndarray | None, t0_us: int, robot_id: int, warnings: list[str]
-) -> dict:
+) -> dict[str, Any]:
     """The command fields of RobotLog."""
     count = 0 if messages is None else len(messages)
-    series = {
+    series: dict[str, Any] = {
         "command_kind": "none",
         "command_t_s": np.empty(0),
         "command": np.empty((0, 4)),
@@ -386,7 +412,7 @@ def _command_series(
     if messages is None:
         return series
     series["command_t_s"] = _seconds(messages, t0_us)
-    if "kind" in messages.dtype.names:
+    if "kind" in (messages.dtype.names or ()):
         kind, command = _drive_kind(messages, robot_id), messages["value"].astype(float)
     else:
         kind, command = "duty", messages["wheel_duty_pct"].astype(float)
@@ -409,7 +435,7 @@ def _command_series(
 
 def _detection_series(
     payloads: list[bytes] | None, t0_us: int, robot_id: int, warnings: list[str]
-) -> dict:
+) -> dict[str, Any]:
     """The fields of RobotLog on pictures."""
     if not payloads:
         return {}
@@ -442,7 +468,7 @@ def _duty_fraction(duty_pct: np.ndarray, robot_id: int, warnings: list[str]) -> 
 
 def _pose_series(
     messages: np.ndarray | None, t0_us: int, robot_id: int, warnings: list[str]
-) -> dict:
+) -> dict[str, Any]:
     """The pose fields of RobotLog."""
     if messages is None:
         return {
@@ -486,5 +512,5 @@ def _seconds(messages: np.ndarray, t0_us: int) -> np.ndarray:
     return (messages["utime_us"].astype(np.int64) - t0_us) / 1e6
 
 
-def _listed(values: Iterable) -> str:
+def _listed(values: Iterable[object]) -> str:
     return ", ".join(str(value) for value in values)

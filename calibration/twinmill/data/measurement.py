@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -121,6 +122,10 @@ class Measurement:
         return _played(
             self.track, np.where(np.isnan(smooth_rad), self.track.heading_rad, smooth_rad)
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is made of it for the native module, which has addresses in it."""
+        return {k: v for k, v in vars(self).items() if k not in ("played", "started")}
 
     def with_pose(self, pose: np.ndarray) -> "Measurement":
         """The same run with other poses (N, 3)."""
@@ -241,14 +246,14 @@ def findings_of(error: LogError) -> list[InputFinding]:
 
 
 def load_measurements(
-    paths: Sequence[Path | Log], model: native.Model | None = None
+    paths: Sequence[Path | Log | SteadyTable], model: native.Model | None = None
 ) -> Measurements:
     """Reads logs and cleans every robot in them; reads steady-state tables (.csv).
 
     A robot or a log that cannot be judged is left out, with the reason, if another can.
 
     Args:
-        paths: logs and tables; logs that were read already, too.
+        paths: logs and tables; those that were read already, too.
         model: tells what the wheels do, so that commands can be checked against the motion.
 
     Raises:
@@ -260,7 +265,7 @@ def load_measurements(
 
 
 def clean_measurements(
-    paths: Sequence[Path | Log], model: native.Model | None = None
+    paths: Sequence[Path | Log | SteadyTable], model: native.Model | None = None
 ) -> Measurements:
     """The same, but commands are not yet checked against the motion, which takes longest."""
     judged: list[Measurement | SteadyTable] = []
@@ -269,6 +274,9 @@ def clean_measurements(
     named: dict[str, str] = {}  # first name of each content
     for path in paths:
         try:
+            if isinstance(path, SteadyTable):
+                judged.append(path)
+                continue
             if isinstance(path, Path) and is_steady_table(path):
                 judged += read_steady_tables(path)
                 continue

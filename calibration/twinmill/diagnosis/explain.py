@@ -4,6 +4,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -58,10 +59,15 @@ class Explanation:
     diagnosis: Diagnosis
     after: Comparison
     parameters: list[ParameterEstimate]
-    path: Path | None
+    child: ModelFile | None
     formula: Taken | None = None
     gained: bool = True
     lacks: tuple[str, ...] = ()
+
+    @property
+    def path(self) -> Path | None:
+        """Of the new model; None if there is none."""
+        return self.child and self.child.path
 
     @property
     def sentence(self) -> str:
@@ -123,11 +129,8 @@ def explain(
     model_file: ModelFile,
     *,
     out: Path,
-    command: str,
-    progress: Callable[[str], None] = lambda _: None,
-    formula: bool = True,
-    stoppable: bool = False,
     force: bool = True,
+    **options: Any,
 ) -> Explanation:
     """Adds what helps on left-out data until nothing more does, and writes the model.
 
@@ -135,15 +138,42 @@ def explain(
         measurements: one robot, or several of a kind.
         model_file: the model; see `diagnose`.
         out: the new model file.
-        command: recorded in it.
-        progress: told in words what is being done.
-        formula: one that is proven for what no effect explains goes into the model as well.
-        stoppable: see `diagnose`; the model then has what was found until then, as it was found.
         force: replace a file that has come to be there.
+        options: as of `explain_model`.
 
     Raises:
         LogError: no measurement can be judged.
         ModelError: the new file cannot be written.
+    """
+    told = explain_model(measurements, model_file, path=Path(out), **options)
+    if told.child:
+        told.child.write(force)
+    return told
+
+
+def explain_model(
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    *,
+    path: Path,
+    command: str,
+    progress: Callable[[str], None] = lambda _: None,
+    formula: bool = True,
+    stoppable: bool = False,
+) -> Explanation:
+    """Adds what helps on left-out data until nothing more does; nothing is written.
+
+    Args:
+        measurements: one robot, or several of a kind.
+        model_file: the model; see `diagnose`.
+        path: where the new model may be written.
+        command: recorded in it.
+        progress: told in words what is being done.
+        formula: one that is proven for what no effect explains goes into the model as well.
+        stoppable: see `diagnose`; the model then has what was found until then, as it was found.
+
+    Raises:
+        LogError: no measurement can be judged.
     """
     diagnosis = diagnose(measurements, model_file, progress, stoppable=stoppable)
     unsteady = _unsteady(diagnosis, diagnosis.search.last.fit)
@@ -156,12 +186,11 @@ def explain(
             diagnosis = _with_stale_lag(diagnosis)
             progress("weighing the models that may be written")
             best, beyond = _best(diagnosis, model_file, formula)
-            child, told = _made(diagnosis, model_file, best, beyond, out=out, command=command)
+            told = _made(diagnosis, model_file, best, beyond, out=path, command=command)
             if of_runs(diagnosis.apart) and told.after.score > diagnosis.before.score:
                 # The middle of runs that differ was fitted to none of them: it is judged as it is.
                 given = Candidates(diagnosis, model_file).given
-                child, told = _made(diagnosis, model_file, given, beyond, out=out, command=command)
-            child.write(force)
+                told = _made(diagnosis, model_file, given, beyond, out=path, command=command)
             return told
         except KeyboardInterrupt:
             if not stoppable:
@@ -170,9 +199,7 @@ def explain(
     if not (diagnosis.lasting or diagnosis.robots_off):
         return Explanation(diagnosis, diagnosis.before, [], None)
     so_far = Candidates(diagnosis, model_file).as_found
-    child, told = _made(diagnosis, model_file, so_far, None, out=out, command=command)
-    child.write(force)
-    return told
+    return _made(diagnosis, model_file, so_far, None, out=path, command=command)
 
 
 def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
@@ -219,8 +246,8 @@ def _made(
     *,
     out: Path,
     command: str,
-) -> tuple[ModelFile, Explanation]:
-    """The new model, to be written last of all: Ctrl-C before leaves no file."""
+) -> Explanation:
+    """With the new model, to be written last of all: Ctrl-C before leaves no file."""
     fit, kept = own.fit, own.beyond
     model = _with_effects(diagnosis, model_file, own)
     shared = kept.estimates if kept else fit.shared_estimates()
@@ -259,9 +286,7 @@ def _made(
     told_of = {*own.effects, *diagnosis.passing, *instead}
     lacks = tuple(n for n in diagnosis.motion if n not in told_of)
     gained = bool(diagnosis.camera) or not own.as_given
-    return child, Explanation(
-        diagnosis, after, estimates, child.path, beyond, gained=gained, lacks=lacks
-    )
+    return Explanation(diagnosis, after, estimates, child, beyond, gained=gained, lacks=lacks)
 
 
 def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Outlier]:

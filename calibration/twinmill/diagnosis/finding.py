@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from twinmill.defaults import Certainty
 from twinmill.diagnosis.term import TIME
 from twinmill.model.parameters import ParameterEstimate, with_role
 
@@ -30,7 +31,7 @@ class Finding:
     group: tuple[str, ...] | None
     parameters: list[ParameterEstimate]
     share: float
-    certainty: str
+    certainty: Certainty
     why: str = ""
     again: bool = False
     wrong_form: bool = False

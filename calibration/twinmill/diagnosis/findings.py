@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import twinmill_native as native
 
+from twinmill.defaults import Certainty
 from twinmill.diagnosis.constancy import Change, OneHeading, changes_of
 from twinmill.diagnosis.doubts import (
     beside_larger,
@@ -350,7 +351,7 @@ def _finding(
     doubt = of_one(done, name, own, changes.get(instance))
     if not doubt and instead == []:
         doubt = f"one visit of its place speaks for {name}: it may be that time and not the place"
-    certainty = "doubtful" if doubt else "group" if group else "sure"
+    certainty: Certainty = "doubtful" if doubt else "group" if group else "sure"
     found = Finding(name, group, own, share, certainty, doubt, "#" in instance)
     change = changes.get(instance)
     if isinstance(change, Change) and change.is_of_another_form:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 import twinmill_native as native
 
 from twinmill.data.checks.settings import CHECKS
+from twinmill.defaults import Verdict
 from twinmill.diagnosis.apart import Apart
 from twinmill.diagnosis.finding import Finding, Late, Ranked
 from twinmill.diagnosis.moments import every_s
@@ -59,7 +60,7 @@ class Diagnosis:
             one set of numbers does as well.
     """
 
-    verdict: str
+    verdict: Verdict
     sentence: str
     before: Comparison
     score_refit: float

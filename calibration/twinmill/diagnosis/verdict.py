@@ -4,6 +4,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from twinmill.defaults import Verdict
 from twinmill.diagnosis.apart import Apart, of_runs
 from twinmill.diagnosis.finding import Finding, of_all, part_of_all
 from twinmill.diagnosis.formula import Formula
@@ -62,7 +63,7 @@ class VerdictInputs:
         return [f for f in self.findings if f.effect != REFIT]
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Verdict:
         """One of the verdicts that `Diagnosis.verdict` lists; runs that differ no effect makes."""
         return "outside_catalogue" if self._only_runs else self._within
 
@@ -72,7 +73,7 @@ class VerdictInputs:
         return of_runs(self.apart) and not self.effects
 
     @property
-    def _within(self) -> str:
+    def _within(self) -> Verdict:
         """The verdict on what is left beside numbers of each robot's or run's own."""
         if self._all_doubtful:
             return "model_adequate"

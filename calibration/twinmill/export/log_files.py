@@ -56,7 +56,14 @@ def default_name(log: Path, to: LogFormat) -> Path:
 
 
 def export_log(
-    log: Path, to: LogFormat, out: Path, *, model: native.Model, command: str, force: bool
+    log: Path,
+    to: LogFormat,
+    out: Path,
+    *,
+    model: native.Model,
+    command: str,
+    force: bool,
+    data: bytes | None = None,
 ) -> ExportedLog:
     """Writes a log for other programs, whole or not at all.
 
@@ -67,12 +74,13 @@ def export_log(
         model: says how large the robots are and how far they see.
         command: recorded in the files.
         force: replace what is there.
+        data: what the log holds, if it is in no file.
 
     Raises:
         LogError: the log cannot be read.
         ValueError: `out` is there, or cannot be written.
     """
-    recording = read_recording(log)
+    recording = read_recording(log, data)
     provenance = {
         "command": command,
         "version": f"twinmill {__version__}",

@@ -63,13 +63,17 @@ class Recording:
         return min(m.utime_us for channel in self.channels for m in channel.messages)
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path, data: bytes | None = None) -> Recording:
     """Reads a log up to where it breaks off.
+
+    Args:
+        path: of the file, or name of the log.
+        data: what the log holds; by default what its file holds.
 
     Raises:
         LogError: it cannot be read, is no LCM log, or holds no message of ours.
     """
-    data = read_bytes(path)
+    data = read_bytes(path) if data is None else data
     events = split_events(data, path.name)
     channels, warnings, strange = [], list(events.warnings), []
     for name, payloads in sorted(events.by_channel.items()):

@@ -8,15 +8,18 @@ the model's other effects of the camera.
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
+from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.detection_fit import DetectionFit
 from twinmill.fitting.equations import check_states
 from twinmill.fitting.fit import (
+    Choice,
     base_names,
     common_clock,
     effects_free,
@@ -25,7 +28,6 @@ from twinmill.fitting.fit import (
     time_notes,
     unsteady_clocks,
     with_estimates,
-    without_held,
 )
 from twinmill.fitting.formula_start import sized, with_time_constants
 from twinmill.fitting.heldout import HeldOut
@@ -40,7 +42,7 @@ from twinmill.fitting.opening import (
 )
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.starts import Left, projected, starts_of
-from twinmill.model.child_file import Fitted, write_child
+from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
     CAMERA_STAGES,
@@ -79,7 +81,7 @@ class AddResult:
         heldout_before: the model as given.
         heldout_refit: its quantities refitted without the effect.
         heldout_after: refitted with it.
-        path: of the new model.
+        child: the new model.
         blocks_t: how well left-out blocks agree that it predicts them better, as a t.
         robot_id: of the robot that alone has it; None if all have.
         time_notes: a sentence where numbers of time are not fitted.
@@ -93,10 +95,15 @@ class AddResult:
     heldout_before: HeldOut
     heldout_refit: HeldOut
     heldout_after: HeldOut
-    path: Path
+    child: ModelFile
     blocks_t: float
     robot_id: int | None = None
     time_notes: Sequence[str] = ()
+
+    @property
+    def path(self) -> Path:
+        """Of the new model."""
+        return self.child.path
 
     @property
     def of_camera(self) -> bool:
@@ -148,18 +155,14 @@ class AddResult:
         }
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a state may grow at some numbers that are tried
 def add(
     effect: str,
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     *,
     out: Path,
-    command: str,
-    texts: dict[str, str] | None = None,
-    held: Collection[str] = (),
-    robot_id: int | None = None,
     force: bool = True,
+    **options: Any,
 ) -> AddResult:
     """Adds an effect and writes the new model.
 
@@ -168,25 +171,52 @@ def add(
         measurements: what it is fitted to.
         model_file: the model that lacks it.
         out: the new model file.
+        force: replace a file that has come to be there.
+        options: as of `add_to_model`.
+
+    Raises:
+        ValueError: as of `add_to_model`.
+        ModelError: likewise, or the new file cannot be written.
+    """
+    result = add_to_model(effect, measurements, model_file, path=Path(out), **options)
+    result.child.write(force)
+    return result
+
+
+@np.errstate(over="ignore", invalid="ignore")  # a state may grow at some numbers that are tried
+def add_to_model(
+    effect: str,
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    *,
+    path: Path,
+    command: str,
+    texts: dict[str, str] | None = None,
+    held: Collection[str] = (),
+    robot_id: int | None = None,
+) -> AddResult:
+    """Adds an effect; nothing is written.
+
+    Args:
+        effect: its name; of one robot also `OWN_GAINS`.
+        measurements: what it is fitted to.
+        model_file: the model that lacks it.
+        path: where the new model may be written.
         command: recorded in it.
         texts: the effect's formula and the like, by name.
         held: names of quantities that keep their values; beside an effect of the camera all of the
             motion do.
         robot_id: of the robot that alone has it; by default all have.
-        force: replace a file that has come to be there.
 
     Raises:
         ValueError: no such effect, it is made for another drive, or a text makes no sense; of the
             camera: the model has it, no log has detections, or one robot is to have it.
-        ModelError: the new file cannot be written, `held` names what is not fitted, or the robot
-            is not in the logs or has such gains.
+        ModelError: `held` names no quantity, or the robot is not in the logs or has such gains.
     """
     if is_of_camera(effect):
         if robot_id is not None:
             raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
-        return _add_to_camera(
-            effect, measurements, model_file, out, command=command, held=held, force=force
-        )
+        return _add_to_camera(effect, measurements, model_file, path, command=command, held=held)
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
@@ -194,7 +224,8 @@ def add(
     _check_told(effect, judged(opened), told)
     base = base_parameters(model_file.model, base_names(model_file.model, judged(opened), told))
     _check_not_new(held, fresh)
-    old = without_held([*base, *effects_free(model_file.model, judged(opened))], held)
+    usual = [*base, *effects_free(model_file.model, judged(opened))]
+    old = Choice(held).of(usual, model_file.model)
     without = fitted(opened, old)[1]
     fresh = begun_at_best(effect, fresh, without, robot_id)
     enlarged = [o.with_model(richer) for o in opened]
@@ -210,37 +241,31 @@ def add(
     _check_acts(found, fresh, texts or {})
     held = [HeldOut.of(f) for f in (fitted(opened, [])[1], without, found)]
     before = comparison(model_file, opened)
-    after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
+    after = comparison(model_file, [o.realigned() for o in moved], path.name)
     after = replace(after, about=robot_id)
     estimates = [*found.shared_estimates(), *found.first_phases]
     own = _own_estimates(found, fresh) if robot_id is not None else []
-    write_child(
-        model_file,
-        Fitted(
-            model=with_estimates(richer, estimates),
-            estimates=[e for e in estimates if e.seen],
-            logs=logs,
-            score_before=before.score,
-            score_after=after.score,
-            noise=noise_of(after),
-            clock=common_clock(found),
-            base_told=bool(told),
-            robots={} if robot_id is None else {robot_id: own},
-            covariance=found.shared_covariance(),
-            shares={name: _takes(*held)},
-        ),
-        out,
-        command,
-        force=force,
+    kept = lag_is_kept(judged(opened), told)
+    news = Fitted(
+        model=with_estimates(richer, estimates),
+        estimates=[e for e in estimates if e.seen],
+        logs=logs,
+        score_before=before.score,
+        score_after=after.score,
+        noise=noise_of(after),
+        clock=common_clock(found),
+        base_told=bool(told),
+        robots={} if robot_id is None else {robot_id: own},
+        covariance=found.shared_covariance(),
+        shares={name: _takes(*held)},
     )
+    child = child_of(model_file, news, path, command)
     estimates += own
     return AddResult(
-        *(name, before.model_name, before, after, estimates, *held, Path(out)),
+        *(name, before.model_name, before, after, estimates, *held, child),
         blocks_t=found.against(without)[2],
         robot_id=robot_id,
-        time_notes=time_notes(
-            judged(opened), unsteady_clocks(found), lag_is_kept(judged(opened), told)
-        ),
+        time_notes=time_notes(judged(opened), unsteady_clocks(found), kept),
     )
 
 
@@ -263,13 +288,12 @@ def _check_told(effect: str, opened: Sequence[Opened], told: Collection[str]) ->
 
 def _add_to_camera(
     effect: str,
-    measurements: list[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
-    out: Path,
+    path: Path,
     *,
     command: str,
     held: Collection[str],
-    force: bool,
 ) -> AddResult:
     if effect in model_file.model.effects:
         raise ValueError(
@@ -294,11 +318,11 @@ def _add_to_camera(
     before, after = (compare_detections(cameras, m) for m in (model, fitted_model))
     logs = {m.log_name: m.log_sha256 for m in measurements}
     shares = {effect: _takes(*heldout)}
-    child = Fitted(fitted_model, found.estimates, logs, before.score, after.score, shares=shares)
-    write_child(model_file, child, out, command, force=force)
+    told = Fitted(fitted_model, found.estimates, logs, before.score, after.score, shares=shares)
+    child = child_of(model_file, told, path, command)
     name = model_file.path.name
     blocks_t = found.against(without)[2]
-    return AddResult(effect, name, before, after, found.estimates, *heldout, Path(out), blocks_t)
+    return AddResult(effect, name, before, after, found.estimates, *heldout, child, blocks_t)
 
 
 def with_effect(

@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits the base model, and the effects it has, to measurements."""
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
 
+from twinmill.chance import t_quantile
 from twinmill.data.measurement import Measurement
-from twinmill.fitting.compare import Comparison, comparison
+from twinmill.data.steady_table import SteadyTable
+from twinmill.fitting.compare import Comparison, RobotComparison, comparison
 from twinmill.fitting.floor import acting_gains
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
@@ -20,13 +24,18 @@ from twinmill.fitting.opening import (
     of_few_commands,
     open_measurements,
 )
+from twinmill.fitting.residuals import Residuals, residuals_of
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.model.model_file import ModelError, ModelFile
+from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
+from twinmill.model.covariance import Covariance
+from twinmill.model.model_file import ModelError, ModelFile, quantity_names
 from twinmill.model.parameters import (
+    ALIGNMENT,
     BASE_GAINS,
     CLOCK,
     CLOCK_RATE,
     LAG,
+    NORMAL_95,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
@@ -36,9 +45,48 @@ from twinmill.model.parameters import (
     duty_table,
     gains_of,
 )
-from twinmill.predict.steady_states import SteadyStates
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.noise import Noise
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """How the estimates of a fit scatter, and what it leaves.
+
+    Attributes:
+        covariance: of all that was fitted; its diagonal is the square of each `std`.
+        degrees: of freedom of Student's t in the intervals: blocks less one.
+        log_likelihood: of errors over floors, at the best scale of each data set.
+        nobs: number of independent errors, which is less than that of residuals.
+        converged: the fit ended before its last round.
+        residuals: of each data set.
+    """
+
+    covariance: Covariance
+    degrees: int
+    log_likelihood: float
+    nobs: float
+    converged: bool
+    residuals: list[Residuals]
+
+    @classmethod
+    def of(cls, fit: ScoreFit) -> "Statistics":
+        """Of a finished fit."""
+        return cls(
+            fit.whole_covariance,
+            max(fit.blocks - 1, 1),
+            fit.log_likelihood,
+            float(fit.sizes.sum()),
+            fit.converged,
+            residuals_of(fit),
+        )
+
+    def half_width(self, std: np.ndarray, alpha: float) -> np.ndarray:
+        """Half an interval of that chance to miss; `std` is half of one of 95 % over 1.96."""
+        wider = t_quantile(1 - alpha / 2, self.degrees) / t_quantile(0.975, self.degrees)
+        return NORMAL_95 * wider * std
 
 
 @dataclass(frozen=True)
@@ -50,7 +98,8 @@ class FitResult:
         heldout: errors on parts of the data that were not fitted to.
         parameters: estimates.
         clock: offset that all logs share, or None.
-        path: of the new model.
+        child: the new model.
+        statistics: how the estimates scatter, and what is left.
         notes: sentences on where it holds.
     """
 
@@ -59,10 +108,16 @@ class FitResult:
     heldout: HeldOut
     parameters: list[ParameterEstimate]
     clock: ParameterEstimate | None
-    path: Path
+    child: ModelFile
+    statistics: Statistics
     notes: tuple[str, ...] = ()
 
-    def to_json(self) -> dict:
+    @property
+    def path(self) -> Path:
+        """Of the new model."""
+        return self.child.path
+
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         return {
             "model": str(self.path),
@@ -75,19 +130,69 @@ class FitResult:
         }
 
 
-def without_held(free: Sequence[Parameter], held: Collection[str]) -> list[Parameter]:
-    """The quantities but for those that keep their values.
+@dataclass(frozen=True)
+class Choice:
+    """What a fit moves, and what is known before.
 
-    Raises:
-        ModelError: one that is to be held is not among them.
+    Attributes:
+        hold: names that keep their values: quantities, or effects and tables as a whole.
+        free: likewise, what alone is moved; None: all that the measurements move.
+        priors: mean and standard deviation by name, in place of the usual ones.
     """
-    names = [p.name for p in free]
-    for name in held:
-        if name not in names:
+
+    hold: Collection[str] = ()
+    free: Collection[str] | None = None
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def of(self, usual: Sequence[Parameter], model: native.Model) -> list[Parameter]:
+        """What is fitted, of what usually is.
+
+        Raises:
+            ModelError: a name is of nothing that a fit of the motion can move.
+        """
+        known = quantity_names(model)
+        for name in (*self.hold, *(self.free or ()), *self.priors):
+            _check_name(name, known)
+        chosen = list(usual)
+        if self.free is not None:
+            others = [n for n in known if n.startswith(MOTION) and _among(n, self.free)]
+            others = [n for n in others if n not in {p.name for p in usual}]
+            chosen = [p for p in usual if _among(p.name, self.free)]
+            chosen += base_parameters(model, sorted(others))
+            for name in self.free:
+                if not any(_among(p.name, (name,)) for p in chosen):
+                    raise ModelError(f"{name}: moves nothing in these measurements; leave it out.")
+        return [self._informed(p) for p in chosen if not _among(p.name, self.hold)]
+
+    def _informed(self, p: Parameter) -> Parameter:
+        """With its prior."""
+        if p.name not in self.priors:
+            return p
+        mean, std = self.priors[p.name]
+        if not (std > 0 and p.min <= mean <= p.max):
             raise ModelError(
-                f"{name}: is not fitted, so it is held anyway; {', '.join(names)} are."
+                f"{p.name}: a prior of {mean:g} +- {std:g} cannot be; its mean must be within "
+                f"{p.min:g} to {p.max:g} and its standard deviation above 0."
             )
-    return [p for p in free if p.name not in held]
+        return replace(p, usual=float(mean), std=float(std))
+
+
+MOTION = ("base.", "robot.")  # sections whose numbers say how a robot moves
+
+
+def _among(name: str, given: Collection[str]) -> bool:
+    """Whether a quantity is named, or what it is a part of."""
+    return any(name == g or name.startswith(f"{g}.") for g in given)
+
+
+def _check_name(name: str, known: Collection[str]) -> None:
+    if name in ALIGNMENT:
+        raise ModelError(
+            f"{name}: is of each log, not of the robot; say of a log that one clock stamped it."
+        )
+    if not any(_among(k, (name,)) for k in known):
+        (near,) = get_close_matches(name, sorted(known), n=1, cutoff=0)
+        raise ModelError(f"{name}: the model has no such quantity; the nearest is {near}.")
 
 
 def base_names(
@@ -119,27 +224,41 @@ def effects_free(model: native.Model, opened: Sequence[Opened]) -> list[Paramete
 
 def _gains(own: Opened, model: native.Model) -> list[str]:
     """Gains of the base that this measurement moves."""
-    steady = isinstance(own.data, SteadyStates)
-    return gains_of(model) if steady else acting_gains(own.data, model)
+    if isinstance(own.data, Trajectory):
+        return acting_gains(own.data, model)
+    return gains_of(model)
 
 
 def fitted(
-    opened: Sequence[Opened], free: Sequence[Parameter], fresh: Sequence[Parameter] = ()
+    opened: Sequence[Opened],
+    free: Sequence[Parameter],
+    fresh: Sequence[Parameter] = (),
+    *,
+    informed: Collection[str] = (),
+    settings: FitSettings = FIT_SETTINGS,
 ) -> tuple[list[Opened], ScoreFit]:
     """The measurements with their models fitted together; never to a worse score.
 
     Those without a floor get the shared quantities alone. The fit begins at the best of several
     strengths of what is `fresh`.
+
+    Args:
+        opened: measurements.
+        free: what is fitted.
+        fresh: what of it is new.
+        informed: names of what has a prior of the user's own.
+        settings: when the fit ends.
     """
     known = judged(opened)
     data, models = [o.data for o in known], [o.model for o in known]
     near = ScoreFit(data, models, free).nearer()
+    near = {name: value for name, value in near.items() if name not in informed}
     fit = ScoreFit(data, models, begun_about(free, near))
     if fresh:
         fit.begin_at_best(fresh)
-    fit.fit()
-    models = iter(fit.models)
-    moved = [replace(o, model=next(models)) if o.data is not None else o for o in opened]
+    fit.fit(settings.rounds, settings.tolerance)
+    found = iter(fit.models)
+    moved = [replace(o, model=next(found)) if o.data is not None else o for o in opened]
     shared = {e.name: e.value for e in fit.shared_values}
     for own in moved:
         if own.data is None:
@@ -149,7 +268,7 @@ def fitted(
 
 
 def fit(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
     out: Path,
     command: str,
@@ -169,52 +288,81 @@ def fit(
 
     Raises:
         LogError: no measurement can be judged.
-        ModelError: the new file cannot be written, or `held` names what is not fitted.
+        ModelError: the new file cannot be written, or `held` names no quantity.
     """
-    from twinmill.model.child_file import Fitted, write_child  # slow to import, for a fit alone
+    result = fit_model(measurements, model_file, Path(out), command, choice=Choice(held))
+    result.child.write(force)  # last, so that Ctrl-C leaves no file of which nothing is told
+    return result
+
+
+def fit_model(
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    path: Path,
+    command: str,
+    *,
+    choice: Choice,
+    settings: FitSettings = FIT_SETTINGS,
+) -> FitResult:
+    """Fits the model to all measurements; nothing is written.
+
+    Args:
+        measurements: what it is fitted to.
+        model_file: the model.
+        path: where the new model may be written.
+        command: recorded in it.
+        choice: what is fitted, and what is known of it.
+        settings: when the fit ends.
+
+    Raises:
+        LogError: no measurement can be judged.
+        ModelError: the choice names what cannot be fitted.
+    """
+    from twinmill.model.child_file import Fitted, child_of  # slow to import, for a fit alone
 
     opened = open_measurements(measurements, model_file)
     model = model_file.model
     kept = lag_is_kept(judged(opened), _told(model_file, measurements))
     names = [n for n in base_names(model, judged(opened)) if n != LAG or not kept]
-    base = base_parameters(model, names)
-    free = without_held([*base, *effects_free(model, judged(opened))], held)
-    moved, found = fitted(opened, free)
+    usual = [*base_parameters(model, names), *effects_free(model, judged(opened))]
+    free = choice.of(usual, model)
+    moved, found = fitted(opened, free, informed=choice.priors, settings=settings)
     before = comparison(model_file, opened)
-    after = comparison(model_file, [o.realigned() for o in moved], Path(out).name)
+    after = comparison(model_file, [o.realigned() for o in moved], path.name)
     estimates = [*found.shared_estimates(), *found.first_phases]
     clock = common_clock(found)
-    heldout = HeldOut.of(found)
     few = of_few_commands(judged(opened))
     notes = (*([few] if few else []), *time_notes(judged(opened), unsteady_clocks(found), kept))
-    write_child(  # last, so that Ctrl-C leaves no file of which nothing is told
-        model_file,
-        Fitted(
-            model=with_estimates(model, estimates),
-            estimates=[e for e in estimates if e.seen],
-            logs={m.log_name: m.log_sha256 for m in measurements},
-            score_before=before.score,
-            score_after=after.score,
-            noise=noise_of(after),
-            clock=clock,
-            covariance=found.shared_covariance(),
-        ),
-        out,
-        command,
-        force=force,
+    told = Fitted(
+        model=with_estimates(model, estimates),
+        estimates=[e for e in estimates if e.seen],
+        logs={m.log_name: m.log_sha256 for m in measurements},
+        score_before=before.score,
+        score_after=after.score,
+        noise=noise_of(after),
+        clock=clock,
+        covariance=found.shared_covariance(),
     )
-    return FitResult(before, after, heldout, estimates, clock.get(CLOCK), Path(out), notes)
+    child = child_of(model_file, told, path, command)
+    return FitResult(
+        *(before, after, HeldOut.of(found), estimates, clock.get(CLOCK)),
+        child=child,
+        statistics=Statistics.of(found),
+        notes=notes,
+    )
 
 
-def _told(model_file: ModelFile, measurements: Sequence[Measurement]) -> Collection[str]:
+def _told(
+    model_file: ModelFile, measurements: Sequence[Measurement | SteadyTable]
+) -> Collection[str]:
     """Names of what other logs told of the base."""
     return model_file.known_from_other_logs([m.log_sha256 for m in measurements])
 
 
-def noise_of(after: Comparison):
+def noise_of(after: Comparison) -> Noise | None:
     """Of the first log that has a score; None of tables."""
-    logs = (r.modelled for r in after.robots if r.modelled.noise and np.isfinite(r.score))
-    return next((log.noise_at_speed for log in logs), None)
+    logs = [r for r in after.robots if isinstance(r, RobotComparison) and np.isfinite(r.score)]
+    return next((r.modelled.noise_at_speed for r in logs if r.modelled.noise), None)
 
 
 def with_estimates(model: native.Model, estimates: Sequence[ParameterEstimate]) -> native.Model:
@@ -245,7 +393,8 @@ def common_clock(fit: ScoreFit) -> dict[str, ParameterEstimate]:
 
 def unsteady_clocks(fit: ScoreFit) -> list[str]:
     """Labels of logs whose clocks are found, and whose offset changes within them."""
-    own = [d.measurement for d in fit.datasets if CLOCK in {p.name for p in d.own}]
+    logs = [d for d in fit.datasets if isinstance(d, Trajectory)]
+    own = [d.measurement for d in logs if CLOCK in {p.name for p in d.own}]
     return [m.label for m in own if not m.steady]
 
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import twinmill_native as native
@@ -12,7 +13,8 @@ from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.equations import check_states
 from twinmill.fitting.floor import NoiseFloor, coarse_offset_s, no_floor, noise_floor, too_poor
-from twinmill.fitting.score_fit import ROUNDS, ScoreFit
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.settings import FIT_SETTINGS
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     CLOCK,
@@ -82,7 +84,10 @@ class Opened:
         return ModelledLog.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
 
     def aligned(
-        self, model: native.Model, offset_s: float | None = None, rounds: int = ROUNDS
+        self,
+        model: native.Model,
+        offset_s: float | None = None,
+        rounds: int = FIT_SETTINGS.rounds,
     ) -> "Opened":
         """The same with another model, on the clock, heading, angles and phases that suit it.
 
@@ -253,7 +258,14 @@ def untold_parts(opened: Sequence[Opened], told: Collection[str]) -> list[str]:
     return [*lag, "delay", "clock"] if lateness_changes(opened) else []
 
 
-def judged(opened: Sequence[Opened]) -> list[Opened]:
+@dataclass(frozen=True)
+class Judged(Opened):
+    """One that has a floor; a name for type checkers alone, that no object is made of."""
+
+    data: Trajectory | SteadyStates
+
+
+def judged(opened: Sequence[Opened]) -> list[Judged]:
     """Those that have a floor.
 
     Raises:
@@ -262,7 +274,7 @@ def judged(opened: Sequence[Opened]) -> list[Opened]:
     known = [o for o in opened if o.data is not None]
     if not known:
         raise LogError(f"{' '.join(o.floor.reason for o in opened if o.floor)}.")
-    return known
+    return cast("list[Judged]", known)
 
 
 def of_few_commands(opened: Sequence[Opened]) -> str:

@@ -18,6 +18,7 @@ import twinmill_native as native
 
 from twinmill.chance import f_above, t_quantile
 from twinmill.fitting.gaps import gaps_s, known_to_gap
+from twinmill.fitting.settings import FIT_SETTINGS
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ALIGNMENT,
@@ -39,8 +40,6 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import FEWEST_BLOCKS, PARTS, ErrorDataset, Trajectory, errors_of
 
-ROUNDS = 12
-CONVERGED = 1e-2  # change of the cost that decides nothing
 FEW_ROWS = 2000  # of all data sets: below it every part is fitted anew
 LEAST_SQUARE = 0.25  # of a squared score: errors far below the floor tell nothing more
 # Strengths at which a fit of something new may begin, times the usual, from where nothing happens.
@@ -120,6 +119,7 @@ class ScoreFit:
         ]
         self.names = [[parts[c].name for c in own] for own in self.columns]
         self.passes = 0
+        self.converged = False
         self._thinned: dict[int, ScoreFit] = {}
         # (P,) values at which the rows of each data set are known.
         self._known: tuple[np.ndarray, list[np.ndarray]] | None = None
@@ -401,9 +401,12 @@ class ScoreFit:
         best = int(np.argmin(cost))
         return within[best], [r[best] for r in rows]
 
-    def fit(self, rounds: int = ROUNDS) -> "ScoreFit":
-        """Minimises the cost and leaves the values in the models."""
+    def fit(
+        self, rounds: int = FIT_SETTINGS.rounds, tolerance: float = FIT_SETTINGS.tolerance
+    ) -> "ScoreFit":
+        """Minimises the cost and leaves the values in the models; see `FitSettings`."""
         x, damping = self.x, 1e-3
+        self.converged = not len(x)
         self.__dict__.pop("state", None)
         self._thinned.clear()
         if len(x):
@@ -422,13 +425,14 @@ class ScoreFit:
                         break
                     damping *= 10
                 if moved is None:
+                    self.converged = True
                     self.__dict__["state"] = (rows, slopes)
                     break
                 fell = cost - trial_cost
                 x, cost, damping = moved, trial_cost, max(damping / 10, 1e-9)
                 self._known = x, then
-                converged = fell < CONVERGED * max(1.0, self.sizes.sum() * 1e-2)
-                if converged or done == rounds:  # slopes are found where they are asked for
+                self.converged = fell < tolerance * max(1.0, self.sizes.sum() * 1e-2)
+                if self.converged or done == rounds:  # slopes are found where they are asked for
                     break
                 rows, slopes = self._slopes(x)
         self.x = x
@@ -820,11 +824,25 @@ class ScoreFit:
         """Of the quantities that all data sets share."""
         return self.estimates[: sum(1 for u in self.unknowns if u.parameter in self.shared)]
 
+    @property
+    def whole_covariance(self) -> Covariance:
+        """Of what all data sets share, as wide as the stds."""
+        shared = self.shared_estimates()
+        values = self._intervals[: len(shared), : len(shared)]
+        return Covariance(tuple(e.name for e in shared), values)
+
     def shared_covariance(self) -> Covariance:
-        """Of what all data sets share and these tell, alone or together, as wide as the stds."""
-        told = [c for c, e in enumerate(self.shared_estimates()) if e.seen or e.together]
-        values = self._intervals[np.ix_(told, told)]
-        return Covariance(tuple(self.estimates[c].name for c in told), values)
+        """The same of what these tell, alone or together with others."""
+        return self.whole_covariance.of([e.name for e in self.shared_estimates() if e.told])
+
+    @property
+    def log_likelihood(self) -> float:
+        """Of the errors over their floors, at the best scale of each data set, without priors.
+
+        The cost is minus twice this, but for what is constant, and the priors' part.
+        """
+        misfit = sum(self._misfit(i, rows) for i, rows in enumerate(self.state[0]))
+        return -0.5 * float(misfit + self.sizes.sum() * (1 + np.log(2 * np.pi)))
 
     @property
     def first_phases(self) -> list[ParameterEstimate]:

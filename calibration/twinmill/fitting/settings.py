@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The numbers that decide the noise floor, in one record: reports and JSON output print it.
+"""The numbers that decide the noise floor, and when a fit ends; reports and JSON output print them.
 
 Which features a response may use, and the grids that are searched, stand where they are used.
 """
@@ -33,3 +33,14 @@ class FloorSettings(Numbers):
 
 
 FLOOR_SETTINGS = FloorSettings()
+
+
+@dataclass(frozen=True)
+class FitSettings(Numbers):
+    """When a fit ends."""
+
+    rounds: int = number(12, "steps of Levenberg and Marquardt, at most")
+    tolerance: float = number(1e-2, "fall of the cost, of 100 independent errors, that ends a fit")
+
+
+FIT_SETTINGS = FitSettings()

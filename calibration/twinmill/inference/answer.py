@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.defaults import Certainty, Verdict
 from twinmill.inference.posterior import Belief, beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Table
@@ -30,7 +31,7 @@ class Named:
     probability: float
     group: tuple[str, ...]
     group_probability: float
-    certainty: str
+    certainty: Certainty
     numbers: dict[str, tuple[float, float]]
 
     def to_json(self) -> dict:
@@ -62,7 +63,7 @@ class Answer:
         share: of the excess squared error that the likeliest dependence takes.
     """
 
-    verdict: str
+    verdict: Verdict
     findings: list[Named]
     nothing: float
     outside: float
@@ -145,7 +146,7 @@ def _named(name: str, best: tuple[str, ...], every: list[Belief], table: Table) 
     )
     group = (name, *likely)[:LARGEST_GROUP]
     total = sum(b.probability for b in every if set(group) & set(b.effects))
-    certainty = "doubtful"
+    certainty: Certainty = "doubtful"
     if p >= PRIORS.sure:
         certainty, group = "sure", (name,)
     elif total >= PRIORS.sure and len(group) > 1:

@@ -23,7 +23,10 @@ from twinmill.model.parameters import (
 class NoiseTable(Protocol):
     """Noise of a log, as far as a model file records it."""
 
-    speed_mps: float
+    @property
+    def speed_mps(self) -> float:
+        """RMS speed at which it was seen."""
+        ...
 
     def to_json(self) -> dict[str, float]:
         """Keys and values of the table `[noise]`."""
@@ -62,17 +65,6 @@ class Fitted:
     shares: Mapping[str, float] = field(default_factory=dict)
 
 
-def write_child(
-    parent: ModelFile, fitted: Fitted, path: Path, command: str, *, force: bool = True
-) -> None:
-    """Writes the fitted model to a new file: whole or not at all; `force` replaces one.
-
-    Raises:
-        ModelError: the file cannot be written.
-    """
-    child_of(parent, fitted, path, command).write(force)
-
-
 def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> ModelFile:
     """The fitted model as its file has it, before that is written."""
     document = tomlkit.parse(parent.text)
@@ -108,8 +100,7 @@ def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> Mod
         document["fit"]["left_over"] = old
     if covariance.names:
         document["fit"]["covariance"] = covariance.to_toml()
-    text = tomlkit.dumps(document)
-    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+    return ModelFile.of(Path(path), tomlkit.dumps(document))
 
 
 def _short(value: float) -> float:

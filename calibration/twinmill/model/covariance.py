@@ -51,7 +51,7 @@ class Covariance:
         kept = [i for i, name in enumerate(self.names) if name in names]
         return Covariance(tuple(self.names[i] for i in kept), self.values[np.ix_(kept, kept)])
 
-    def to_toml(self) -> dict[str, list]:
+    def to_toml(self) -> dict[str, list[Any]]:
         """As `from_toml` reads it, six digits."""
         rows = [[float(f"{v:.6g}") for v in row] for row in self.values]
         return {"names": list(self.names), "values": rows}

@@ -9,6 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import twinmill_native as native
 
@@ -40,8 +41,7 @@ class ModelFile:
         """
         try:
             path = Path(native.find_model_file(str(name)))
-            text = path.read_text()
-            loaded = cls(path, text, native.Model.from_toml(text, str(name)))
+            loaded = cls.of(path, path.read_text(), str(name))
         except UnicodeDecodeError as error:
             raise ModelError(
                 f"{name}: is no text, so it is no model file; check the name."
@@ -55,6 +55,20 @@ class ModelFile:
             )
         return loaded
 
+    @classmethod
+    def of(cls, path: Path, text: str, origin: str = "") -> "ModelFile":
+        """A model that is in no file yet.
+
+        Args:
+            path: where it will be.
+            text: TOML.
+            origin: named in errors; by default the path.
+
+        Raises:
+            ValueError: it is no valid model.
+        """
+        return cls(path, text, native.Model.from_toml(text, origin or str(path)))
+
     def write(self, force: bool = True) -> None:
         """Writes its file, whole or not at all; `force` replaces one that is there.
 
@@ -64,7 +78,7 @@ class ModelFile:
         write_whole(self.path, self.text, force)
 
     @cached_property
-    def _document(self) -> dict:
+    def _document(self) -> dict[str, Any]:
         """What the text says, without how it says it, which takes tomlkit long to read."""
         return tomllib.loads(self.text)
 

@@ -26,40 +26,61 @@ INDEPENDENT_S = 2.0  # predictions that start so far apart share nothing
 
 
 class Dataset(Protocol):
-    """What all kinds have.
+    """What all kinds have."""
 
-    Attributes:
-        label: short name.
-        robot_id: of the robot.
-        stages: of the catalogue, whose effects this kind of data shows.
-        block: (R,) number of the block that each row belongs to; blocks count as independent.
-    """
+    @property
+    def label(self) -> str:
+        """Short name."""
+        ...
 
-    label: str
-    robot_id: int
-    stages: Collection[str]
-    block: np.ndarray
+    @property
+    def robot_id(self) -> int:
+        """Number of the robot."""
+        ...
+
+    @property
+    def stages(self) -> Collection[str]:
+        """Stages of the catalogue whose effects this kind of data shows."""
+        ...
+
+    @property
+    def block(self) -> np.ndarray:
+        """(R,) number of the block of each row; blocks count as independent."""
+        ...
 
 
 class ErrorDataset(Dataset, Protocol):
-    """One that has errors over a floor.
+    """One that has errors over a floor."""
 
-    Attributes:
-        own: quantities of this data set alone (its clock, its robot's gains), fitted with the rest.
-        part: (R,) number of the part of the data with which each row is left out.
-        channel: (R,) number of the channel that each row belongs to.
-        judged: (R,) share of the squared score that each row would make up if all were 1.
-        n_eff: (C,) number of independent errors of each channel.
-        by_run: what its robot has of its own holds for this data set alone, not for the robot's
-            others.
-    """
+    @property
+    def own(self) -> Sequence[Parameter]:
+        """Quantities of this data set alone, as its clock or its robot's gains."""
+        ...
 
-    own: Sequence[Parameter]
-    by_run: bool
-    part: np.ndarray
-    channel: np.ndarray
-    judged: np.ndarray
-    n_eff: np.ndarray
+    @property
+    def by_run(self) -> bool:
+        """What its robot has of its own is of this data set alone, not of the robot's others."""
+        ...
+
+    @property
+    def part(self) -> np.ndarray:
+        """(R,) number of the part of the data with which each row is left out."""
+        ...
+
+    @property
+    def channel(self) -> np.ndarray:
+        """(R,) number of the channel that each row belongs to."""
+        ...
+
+    @property
+    def judged(self) -> np.ndarray:
+        """(R,) share of the squared score that each row would make up if all were 1."""
+        ...
+
+    @property
+    def n_eff(self) -> np.ndarray:
+        """(C,) number of independent errors of each channel."""
+        ...
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
         """(B, R) errors over floor for B rows of values; squares add up to the score's."""

@@ -12,6 +12,7 @@ from twinmill.files import REPORT, check_report, made_folder
 from twinmill.foreign_text import printable
 from twinmill.model.model_file import write_whole
 from twinmill.provenance import Provenance
+from twinmill.report.canvas import Svg
 from twinmill.report.tables import Table, Tone
 
 
@@ -19,7 +20,7 @@ from twinmill.report.tables import Table, Tone
 class Figure:
     """A picture as SVG text, and what is to be seen in it, in plain words."""
 
-    svg: str
+    svg: Svg
     title: str
     caption: str
 

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import Any
 
@@ -173,9 +172,9 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.experiment.design import check, design
     from twinmill.files import plain
-    from twinmill.fitting.add import add
+    from twinmill.fitting.add import add_to_model
     from twinmill.fitting.compare import compare
-    from twinmill.fitting.fit import fit
+    from twinmill.fitting.fit import Choice, fit_model
     from twinmill.model.model_file import ModelFile
 
     model = native.Model.from_toml(work.text, work.model)
@@ -198,22 +197,22 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     if work.kind == "compare":
         say("comparing")
         return Done(work, plain(compare(measurements, model_file).to_json()))
-    with TemporaryDirectory(prefix="twinmill-") as folder:
-        out = Path(folder) / "made.toml"
-        say(f"adding {work.effect}" if work.effect else "fitting")
-        if work.kind == "add":
-            result = add(
-                work.effect,
-                measurements,
-                model_file,
-                out=out,
-                command=work.command,
-                held=work.held,
-                robot_id=work.robot_id,
-            )
-        else:
-            result = fit(measurements, model_file, out, work.command, held=work.held)
-        return Done(work, plain(result.to_json()), out.read_text())
+    path = Path("made.toml")
+    say(f"adding {work.effect}" if work.effect else "fitting")
+    if work.kind == "add":
+        result = add_to_model(
+            work.effect,
+            measurements,
+            model_file,
+            path=path,
+            command=work.command,
+            held=work.held,
+            robot_id=work.robot_id,
+        )
+    else:
+        choice = Choice(work.held)
+        result = fit_model(measurements, model_file, path, work.command, choice=choice)
+    return Done(work, plain(result.to_json()), result.child.text)
 
 
 def _limits(options: Mapping[str, Any]) -> Any:

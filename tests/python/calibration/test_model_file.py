@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twinmill.model.child_file import Fitted, write_child
+from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import ModelError, ModelFile, write_whole
 from twinmill.model.parameters import ParameterEstimate
@@ -46,7 +46,7 @@ def fitted(parent):
 @pytest.fixture
 def child(parent, fitted, tmp_path):
     path = tmp_path / "child.toml"
-    write_child(parent, fitted, path, "twinmill add")
+    child_of(parent, fitted, path, "twinmill add").write()
     return path
 
 
@@ -71,7 +71,7 @@ def test_child_holds_every_value_of_the_fit(child, parent, fitted):
 def test_child_holds_what_the_log_hardly_tells_without_an_error(parent, fitted, tmp_path):
     """The score was told of a model that had it."""
     seen = [e for e in fitted.estimates if not e.name.startswith("base.")]
-    write_child(parent, replace(fitted, estimates=seen), tmp_path / "child.toml", "")
+    child_of(parent, replace(fitted, estimates=seen), tmp_path / "child.toml", "").write()
     written = ModelFile.load(str(tmp_path / "child.toml"))
     assert written.model.get("base.wheel_speed_mps.4") == 0.41
     assert written.model.get("base.motor_lag_s") == 0.08
@@ -109,7 +109,7 @@ def test_standard_errors_of_a_table_stand_at_their_own_speeds(child):
 
 def test_parent_stays_as_it_is(parent, fitted, tmp_path):
     before = parent.path.read_bytes()
-    write_child(parent, fitted, tmp_path / "child.toml", "")
+    child_of(parent, fitted, tmp_path / "child.toml", "").write()
     assert parent.path.read_bytes() == before
     assert sorted(os.listdir(tmp_path)) == ["child.toml"]
 
@@ -118,7 +118,7 @@ def test_grandchild_names_its_parent_and_keeps_its_effects_errors(child, fitted,
     file = ModelFile.load(str(child))
     path = tmp_path / "grandchild.toml"
     again = replace(fitted, model=file.model.copy(), score_before=1.1, score_after=1.0)
-    write_child(file, again, path, "twinmill fit")
+    child_of(file, again, path, "twinmill fit").write()
     data = tomllib.loads(path.read_text())
     assert data["parent"] == hashlib.sha256(child.read_bytes()).hexdigest()
     assert data["effect"][1]["error_after"] == 1.1
@@ -161,11 +161,11 @@ def test_a_covariance_is_kept_and_a_later_fit_replaces_its_own_part(parent, fitt
         ("dead_zone.width", "floor_tilt.drift_x_mps"), np.array([[16.0, -2], [-2, 1]])
     )
     path = tmp_path / "once.toml"
-    write_child(parent, replace(fitted, covariance=first), path, "")
+    child_of(parent, replace(fitted, covariance=first), path, "").write()
     once = ModelFile.load(str(path))
     assert once.covariance.names == first.names
     np.testing.assert_allclose(once.covariance.values, first.values, rtol=1e-5)
-    write_child(once, replace(fitted, covariance=then), tmp_path / "twice.toml", "")
+    child_of(once, replace(fitted, covariance=then), tmp_path / "twice.toml", "").write()
     twice = ModelFile.load(str(tmp_path / "twice.toml")).covariance
     assert twice.names == ("base.motor_lag_s", *then.names)
     np.testing.assert_allclose(twice.values, [[4e-6, 0, 0], [0, 16, -2], [0, -2, 1]], rtol=1e-5)

@@ -1,35 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes poses and commands of foreign measurements as a log that looks like a robot's own."""
+"""Poses and commands of foreign measurements as a log that looks like a robot's own."""
 
 import heapq
+import struct
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import turbopi
 
 from twinmill.data.importers.series import CommandSeries, DetectionSeries, PoseSeries
-from twinmill.data.lcm_log import log_file
 from twinmill.data.log import KINDS
 from twinmill.version import __version__
 
 CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, new or held
 
+# Head of an event of LCM's log format: sync word, number, stamp in us, sizes of channel and data.
+HEAD, SYNC = struct.Struct(">Iqqii"), 0xEDA1DA01
+
 Event = tuple[int, str, bytes]  # stamp, channel, encoded message
 
 
-def write_log(
-    path: Path,
+def log_bytes(
     poses: list[PoseSeries],
     commands: list[CommandSeries],
     *,
     config_toml: str,
     detections: list[DetectionSeries] | None = None,
-) -> None:
-    """Writes a log in order of stamps.
+) -> bytes:
+    """Content of a log file, in order of stamps.
 
     Args:
-        path: replaced if it exists.
         poses: one per robot.
         commands: one per robot; held duties are repeated every CONTROL_PERIOD_US to the last pose.
         config_toml: where all this comes from, for run_t.
@@ -45,9 +45,11 @@ def write_log(
             if series.kind == "duty" and not np.any(series.value % 1)  # a board's own, in percent
             else _drive_events(series)
         )
-    with log_file(path) as log:
-        for event in heapq.merge(*streams, key=lambda event: event[0]):
-            log.write_event(*event)
+    parts: list[bytes] = []
+    for number, event in enumerate(heapq.merge(*streams, key=lambda event: event[0])):
+        stamp_us, channel, data = event[0], event[1].encode(), event[2]
+        parts += [HEAD.pack(SYNC, number, stamp_us, len(channel), len(data)), channel, data]
+    return b"".join(parts)
 
 
 def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Logs of numbers in memory: numpy arrays, or the columns of a data frame, without a file."""
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal, get_args
+
+import numpy as np
+import tomlkit
+import turbopi
+
+from twinmill.data.importers.log_writer import log_bytes
+from twinmill.data.importers.plain import STEERED, VALUES
+from twinmill.data.importers.series import (
+    CommandSeries,
+    PoseSeries,
+    quaternion_from_heading,
+    velocities_of_steering,
+)
+from twinmill.data.log import Log, LogError, log_of
+
+Kind = Literal["twist", "duty", "wheel_speed", "steering"]
+# Columns that an array of commands may have, by its kind: the least and the most.
+WIDTHS: dict[Kind, tuple[int, int]] = {
+    "twist": (2, 3),
+    "duty": (1, 4),
+    "wheel_speed": (1, 4),
+    "steering": (2, 2),
+}
+COLUMNS: dict[Kind, tuple[str, ...]] = {
+    "twist": VALUES["twist"],
+    "duty": VALUES["duty"],
+    "wheel_speed": VALUES["wheel_speed"],
+    "steering": STEERED,
+}
+POSE = ("x_m", "y_m", "theta_rad")
+FULL_DUTY_PCT = 100.0
+MOST_ROBOTS = 100  # their numbers have two digits in the names of channels
+
+
+def poses_of(robot_id: int, t_s: Any, pose: Any) -> PoseSeries:
+    """Poses of one robot.
+
+    Args:
+        robot_id: 0..99.
+        t_s: (N,) s, or stamps of numpy's datetime64; ascending.
+        pose: (N, 3) x_m, y_m, theta_rad; or (N, 2) without headings. A row with NaN is a lost pose.
+
+    Raises:
+        LogError: they are no such arrays.
+    """
+    utime_us = _stamps_us("t_s", t_s)
+    values = _rows("pose", pose, len(utime_us), (2, 3))
+    valid = np.isfinite(values).all(axis=1)
+    if not valid.any():
+        raise LogError("pose: has no row that is all numbers; give x_m, y_m and theta_rad.")
+    heading = values[:, 2] if values.shape[1] == 3 else np.full(len(values), np.nan)
+    position_m = np.column_stack([values[:, :2], np.zeros(len(values))])
+    orientation = quaternion_from_heading(heading)
+    position_m[~valid] = orientation[~valid] = np.nan
+    return PoseSeries(robot_id, utime_us, position_m, orientation, valid)
+
+
+def commands_of(
+    robot_id: int, t_s: Any, commands: Any, *, kind: Kind, wheelbase_m: float | None = None
+) -> CommandSeries:
+    """Commands of one robot; each row is held until the next.
+
+    Args:
+        robot_id: 0..99.
+        t_s: (M,) as of poses.
+        commands: (M, K) by kind. twist: vx_mps, vy_mps, omega_radps, or vx_mps, omega_radps; duty:
+            percent, wheel_speed: rad/s, of each driven wheel in the model's order; steering:
+            vx_mps, steering_rad.
+        kind: of the commands.
+        wheelbase_m: distance of the axles, of a robot told steering angles.
+
+    Raises:
+        LogError: they are no such arrays.
+    """
+    if kind not in get_args(Kind):
+        raise LogError(f"kind: is {kind!r}, and must be one of {', '.join(get_args(Kind))}.")
+    utime_us = _stamps_us("commands_t_s", t_s)
+    values = _rows("commands", commands, len(utime_us), WIDTHS[kind])
+    if not np.isfinite(values).all():
+        raise LogError("commands: have NaN; leave such rows out, the one before is held.")
+    if kind == "duty" and np.abs(values).max() > FULL_DUTY_PCT:
+        raise LogError(f"commands: a duty is {np.abs(values).max():g} %; give -100 to 100.")
+    if kind == "steering":
+        values = velocities_of_steering("commands", values[:, 0], values[:, 1], wheelbase_m)
+    elif kind == "twist" and values.shape[1] == 2:
+        values = np.insert(values, 1, 0.0, axis=1)
+    count = len(values)
+    return CommandSeries(
+        robot_id=robot_id,
+        utime_us=utime_us,
+        kind="twist" if kind == "steering" else kind,
+        value=np.pad(values, ((0, 0), (0, 4 - values.shape[1]))),
+        repeat=kind == "duty",
+        inputs=np.full((count, 2), np.nan),
+        detected=np.zeros((count, 2), int),
+        mode=turbopi.telemetry_t.MODE_SCRIPT,
+    )
+
+
+def log_of_series(
+    poses: Iterable[PoseSeries], commands: Iterable[CommandSeries], name: str, same_clock: bool
+) -> Log:
+    """A log of some robots, in memory.
+
+    Args:
+        poses: one per robot.
+        commands: one per robot, overlapping its poses in time.
+        name: of the log.
+        same_clock: one clock stamped both.
+
+    Raises:
+        LogError: a robot has no poses while it is commanded.
+    """
+    poses, commands = list(poses), list(commands)
+    ends = {p.robot_id: p.utime_us[[0, -1]] / 1e6 for p in poses}
+    for own in commands:
+        start_s, end_s = own.utime_us[[0, -1]] / 1e6
+        first_s, last_s = ends.get(own.robot_id, (np.inf, -np.inf))
+        if last_s < start_s or (not own.repeat and first_s > end_s):
+            raise LogError(
+                f"robot {own.robot_id}: its poses go from {first_s:g} to {last_s:g} s and its "
+                f"commands from {start_s:g} to {end_s:g} s; give both in one time."
+            )
+    source = tomlkit.dumps({"import": {"files": [], "same_clock": same_clock}})
+    return log_of(log_bytes(poses, commands, config_toml=source), name)
+
+
+def log_of_frames(
+    poses: Any,
+    commands: Any,
+    *,
+    kind: Kind | None,
+    robot_id: int,
+    wheelbase_m: float | None,
+    name: str,
+    same_clock: bool,
+) -> Log:
+    """A log of two data frames, dictionaries or datasets, in memory.
+
+    Args:
+        poses: columns t_s and POSE, the last of them optional; optional robot_id and valid.
+        commands: columns t_s and one group of COLUMNS; optional robot_id.
+        kind: of the commands; None: by their columns.
+        robot_id: of frames that do not say.
+        wheelbase_m: see `commands_of`.
+        name: of the log.
+        same_clock: one clock stamped both.
+
+    Raises:
+        LogError: a column is missing, or the numbers make no run.
+    """
+    kind = _kind_of(commands) if kind is None else kind
+    headed = POSE if POSE[-1] in poses else POSE[:-1]
+    pose = _columns(poses, headed, "poses")
+    if "valid" in poses:
+        pose[~np.asarray(poses["valid"], bool)] = np.nan
+    value = _columns(commands, COLUMNS.get(kind, ()), "commands")
+    pose_t_s, command_t_s = _times(poses, "poses"), _times(commands, "commands")
+    return log_of_series(
+        [
+            poses_of(robot, pose_t_s[rows], pose[rows])
+            for robot, rows in _by_robot(poses, len(pose_t_s), robot_id)
+        ],
+        [
+            commands_of(robot, command_t_s[rows], value[rows], kind=kind, wheelbase_m=wheelbase_m)
+            for robot, rows in _by_robot(commands, len(command_t_s), robot_id)
+        ],
+        name,
+        same_clock,
+    )
+
+
+def _kind_of(frame: Any) -> Kind:
+    found = [kind for kind, names in COLUMNS.items() if all(name in frame for name in names)]
+    if len(found) != 1:
+        known = "; ".join(", ".join(names) for names in COLUMNS.values())
+        has = f"those of {' and of '.join(found)}" if found else "none of them whole"
+        raise LogError(f"commands: must have one of these groups of columns: {known}; has {has}.")
+    return found[0]
+
+
+def _times(frame: Any, what: str) -> np.ndarray:
+    if "t_s" not in frame:
+        raise LogError(f"{what}: has no column t_s, the times in s.")
+    return np.asarray(frame["t_s"])
+
+
+def _columns(frame: Any, names: Iterable[str], what: str) -> np.ndarray:
+    """(rows, K) numbers."""
+    columns = []
+    for name in names:
+        if name not in frame:
+            raise LogError(f"{what}: has no column {name}.")
+        try:
+            columns.append(np.asarray(frame[name], float))
+        except (TypeError, ValueError) as error:
+            raise LogError(f"{what}: column {name} is not all numbers ({error}).") from error
+    return np.column_stack(columns)
+
+
+def _by_robot(frame: Any, rows: int, robot_id: int) -> Iterator[tuple[int, np.ndarray]]:
+    """Each robot_id with (rows,) bool."""
+    ids = np.asarray(frame["robot_id"]) if "robot_id" in frame else np.full(rows, robot_id)
+    for number in np.unique(ids).tolist():
+        if number not in range(MOST_ROBOTS):
+            raise LogError(f"robot_id: is {number!r}, and must be a whole number within 0 to 99.")
+        yield int(number), ids == number
+
+
+def _stamps_us(name: str, t_s: Any) -> np.ndarray:
+    stamps = np.asarray(t_s)
+    if stamps.ndim != 1 or len(stamps) < 2:
+        raise LogError(f"{name}: has shape {stamps.shape}, and must be a row of two times or more.")
+    if stamps.dtype.kind == "M":
+        utime_us = stamps.astype("datetime64[us]").astype(np.int64)
+    else:
+        try:
+            times = stamps.astype(float)
+        except (TypeError, ValueError) as error:
+            raise LogError(f"{name}: is not all numbers ({error}).") from error
+        if not np.isfinite(times).all():
+            raise LogError(f"{name}: has times that are no numbers; leave such rows out.")
+        utime_us = np.round(times * 1e6).astype(np.int64)
+    if (np.diff(utime_us) <= 0).any():
+        row = int(np.argmax(np.diff(utime_us) <= 0)) + 1
+        raise LogError(f"{name}: row {row} is not later than the one before; sort, and drop twins.")
+    return utime_us
+
+
+def _rows(name: str, values: Any, count: int, widths: tuple[int, int]) -> np.ndarray:
+    least, most = widths
+    try:
+        array = np.array(values, float)
+    except (TypeError, ValueError) as error:
+        raise LogError(f"{name}: is not all numbers ({error}).") from error
+    array = array[:, None] if array.ndim == 1 else array
+    if array.ndim != 2 or len(array) != count or not least <= array.shape[1] <= most:
+        width = f"{least}" if least == most else f"{least} to {most}"
+        raise LogError(
+            f"{name}: has shape {array.shape}, and must have {count} rows, one for each time, and "
+            f"{width} columns."
+        )
+    return array

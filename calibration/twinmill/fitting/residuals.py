@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a fitted model leaves of each prediction, in its own unit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.predict import steady_states, windows
+from twinmill.predict.datasets import Trajectory
+from twinmill.predict.steady_states import SteadyStates
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Measured less predicted, of one robot in one log or table.
+
+    Attributes:
+        log_name, robot_id: whose they are.
+        start_s: (W,) when predictions start, capture's clock; NaN in a table.
+        horizon_s: (H,) how far they go; NaN in a table.
+        channels: C names with their units.
+        errors: (W, H, C); NaN where there is none that is judged.
+        floor: (W, H, C) errors that count as one.
+    """
+
+    log_name: str
+    robot_id: int
+    start_s: np.ndarray
+    horizon_s: np.ndarray
+    channels: tuple[tuple[str, str], ...]
+    errors: np.ndarray
+    floor: np.ndarray
+
+    def columns(self) -> dict[str, np.ndarray | str | int]:
+        """Columns of a table with a row for each error."""
+        known = np.isfinite(self.errors)
+        start, horizon, channel = np.nonzero(known)
+        names, units = np.array(self.channels).T
+        return {
+            "log": self.log_name,
+            "robot_id": self.robot_id,
+            "t_s": self.start_s[start],
+            "horizon_s": self.horizon_s[horizon],
+            "channel": names[channel],
+            "unit": units[channel],
+            "residual": self.errors[known],
+            "floor": self.floor[known],
+        }
+
+
+def residuals_of(fit: ScoreFit) -> list[Residuals]:
+    """Of each data set of a finished fit."""
+    found: list[Residuals] = []
+    for data, model, rows in zip(fit.datasets, fit.models, fit.state[0], strict=True):
+        if isinstance(data, Trajectory):
+            errors = data.as_errors(rows)
+            floor = np.broadcast_to(data.floor, errors.shape)
+            start_s, horizon_s = data.start_s, np.array(windows.HORIZONS_S)
+            channels = windows.CHANNELS
+        elif isinstance(data, SteadyStates):
+            errors, floor = data.fitted(model).errors()[:, None], data.floor()[:, None]
+            start_s, horizon_s = np.full(len(errors), np.nan), np.array([np.nan])
+            channels = steady_states.CHANNELS
+        else:
+            raise TypeError(f"{data.label}: has no errors in a unit of its own.")
+        name = data.measurement.log_name
+        found.append(
+            Residuals(name, data.robot_id, start_s, horizon_s, tuple(channels), errors, floor)
+        )
+    return found

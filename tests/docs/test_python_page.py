@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page on Python: its blocks run in their order, and do what the page says of them."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib import pyplot as plt
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs"))
+from site_hooks import run  # noqa: E402
+
+BLOCK = re.compile(r"^```python\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def test_all_blocks_of_the_page_run(tmp_path, monkeypatch):
+    run(f"python {ROOT}/examples/make_recording.py", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(ROOT / "build/bin"), prepend=":")
+    names: dict = {}
+    blocks = BLOCK.findall((ROOT / "docs/python.md").read_text())
+    assert len(blocks) == 10  # eight tasks, two with a second one
+    for block in blocks:
+        exec(block, names)
+    plt.close(names["figure"])
+    assert "base.yaw_gain" not in names["fit"].params
+    # As examples/make_recording.py hides it.
+    table = names["table"]
+    assert table.index[0] == "with coasting" and table.loc["as fitted", "p_chance"] < 0.05
+    found = names["added"].table().set_index("name").loc["coasting.deceleration_mps2"]
+    assert found["value"] == pytest.approx(0.7, abs=3 * found["std"])
+    assert {"range_m", "seed", "circliness"} == set(names["rows"][0])
+    assert len(names["seen"]) == len(names["poses"])
+    made = {"residuals.png", "params.csv", "tables", "turbopi.urdf", "better.toml", "report"}
+    assert made <= {path.name for path in tmp_path.iterdir()}

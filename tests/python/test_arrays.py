@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Logs from numbers in memory: what went in comes out, and what makes no run is refused."""
+
+import lcm
+import numpy as np
+import pandas as pd
+import pytest
+import turbopi
+
+import twinmill as tm
+
+RADIUS_M, OMEGA_RADPS = 0.5, 0.4
+T_S = np.arange(0, 30, 0.02)
+# By algebra: a robot that drives at v and omega is on a circle of radius v / omega.
+POSE = np.column_stack(
+    [
+        RADIUS_M * np.sin(OMEGA_RADPS * T_S),
+        RADIUS_M * (1 - np.cos(OMEGA_RADPS * T_S)),
+        OMEGA_RADPS * T_S,
+    ]
+)
+COMMANDS_T_S = np.arange(0, 30, 0.1)
+COMMANDS = np.tile([RADIUS_M * OMEGA_RADPS, OMEGA_RADPS], (len(COMMANDS_T_S), 1))
+POSES_FRAME = {"t_s": T_S, "x_m": POSE[:, 0], "y_m": POSE[:, 1], "theta_rad": POSE[:, 2]}
+COMMANDS_FRAME = {
+    "t_s": COMMANDS_T_S,
+    "vx_mps": COMMANDS[:, 0],
+    "vy_mps": np.zeros(len(COMMANDS)),
+    "omega_radps": COMMANDS[:, 1],
+}
+
+
+def circle(**options) -> tm.Log:
+    return tm.Log.from_arrays(T_S, POSE, COMMANDS_T_S, COMMANDS, **{"kind": "twist", **options})
+
+
+def test_what_went_in_comes_out():
+    log = circle(robot_id=7, name="circle", same_clock=True)
+    table, commands = log.table(), log.commands()
+    assert repr(log) == "Log(circle: robot 7, 30 s)"
+    np.testing.assert_allclose(table[["x_m", "y_m", "theta_rad"]], POSE, atol=1e-12)
+    np.testing.assert_allclose(table["t_s"], T_S, atol=1e-6)  # stamps are whole microseconds
+    np.testing.assert_array_equal(commands[["vx_mps", "omega_radps"]], COMMANDS)
+    (run,) = log.measurements()
+    assert run.same_clock and not circle().measurements()[0].same_clock
+
+
+def test_a_pose_has_the_command_that_was_in_force():
+    frame = tm.Log.from_arrays(
+        T_S, POSE, [1.0, 2.0], [[0.1, 0.0], [0.2, 0.0]], kind="twist"
+    ).to_pandas()
+    told = frame.set_index("t_s")["vx_mps"]
+    assert told[0.98:0.99].isna().all() and told[1.0] == 0.1 == told[1.98] and told[2.0] == 0.2
+    assert len(frame) == len(T_S)
+
+
+def frames(kind: str):
+    if kind == "dictionary":
+        return POSES_FRAME, COMMANDS_FRAME
+    package = pytest.importorskip(kind)
+    make = package.Dataset.from_dataframe if kind == "xarray" else package.DataFrame
+    if kind == "xarray":
+        return make(pd.DataFrame(POSES_FRAME)), make(pd.DataFrame(COMMANDS_FRAME))
+    return make(POSES_FRAME), make(COMMANDS_FRAME)
+
+
+@pytest.mark.parametrize("kind", ["dictionary", "pandas", "polars", "xarray"])
+def test_frames_of_any_kind_give_the_log_of_the_arrays(kind):
+    log = tm.Log.from_frames(*frames(kind), name="arrays")
+    assert log.to_pandas().equals(circle().to_pandas())
+
+
+def test_frames_hold_several_robots_and_lost_poses():
+    two = pd.concat([pd.DataFrame(POSES_FRAME).assign(robot_id=k) for k in (3, 5)])
+    told = pd.concat([pd.DataFrame(COMMANDS_FRAME).assign(robot_id=k) for k in (3, 5)])
+    two["valid"] = (two["robot_id"] == 3) | (two["t_s"] > 2)
+    log = tm.Log.from_frames(two, told)
+    assert log.robots == [3, 5]
+    lost = log.table().query("not valid")
+    assert set(lost["robot_id"]) == {5} and lost["x_m"].isna().all()
+    assert len(lost) == np.count_nonzero(T_S <= 2)
+
+
+def test_stamps_of_pandas_are_the_epochs():
+    stamps = pd.to_datetime("2026-05-04T12:00:00") + pd.to_timedelta(T_S, unit="s")
+    log = tm.Log.from_arrays(stamps, POSE, stamps, np.tile([0.2, 0.4], (len(T_S), 1)), kind="twist")
+    assert log.measurements()[0].recorded_utime_us == 1_777_896_000_000_000  # date -d ... +%s
+    assert log.duration_s == pytest.approx(T_S[-1])
+
+
+def test_steering_turns_as_a_bicycle():
+    angle_rad = np.arctan(0.25 * OMEGA_RADPS / COMMANDS[0, 0])
+    told = np.column_stack([COMMANDS[:, 0], np.full(len(COMMANDS), angle_rad)])
+    log = tm.Log.from_arrays(T_S, POSE, COMMANDS_T_S, told, kind="steering", wheelbase_m=0.25)
+    np.testing.assert_allclose(log.commands()["omega_radps"], OMEGA_RADPS)
+
+
+def test_a_saved_log_is_one_of_lcm(tmp_path):
+    circle().save(tmp_path / "circle.lcmlog")
+    events = [e for e in lcm.EventLog(str(tmp_path / "circle.lcmlog"), "r")]
+    poses = [turbopi.pose_t.decode(e.data) for e in events if e.channel == "R00_POSE"]
+    assert [e.eventnum for e in events] == list(range(len(events)))
+    np.testing.assert_array_equal([p.position_m[:2] for p in poses], POSE[:, :2])
+    again = tm.load(tmp_path / "circle.lcmlog")
+    assert again.to_pandas().drop(columns="log").equals(circle().to_pandas().drop(columns="log"))
+    files = circle().export(tmp_path / "tables", to="csv")
+    assert len(pd.read_csv(next(f for f in files if f.name == "pose.csv"), comment="#")) == len(T_S)
+
+
+BACK_S = np.r_[T_S[1], T_S[0], T_S[2:]]
+WRONG = {
+    "widths": ((T_S, POSE[:, :1], COMMANDS_T_S, COMMANDS), "pose: has shape .* 2 to 3 columns"),
+    "lengths": ((T_S, POSE[1:], COMMANDS_T_S, COMMANDS), r"pose: has shape \(1499, 3\), .* 1500"),
+    "order": ((BACK_S, POSE, COMMANDS_T_S, COMMANDS), "t_s: row 1 is not later"),
+    "NaN": ((T_S, POSE, COMMANDS_T_S, COMMANDS * np.nan), "commands: have NaN"),
+    "no pose": ((T_S, POSE * np.nan, COMMANDS_T_S, COMMANDS), "pose: has no row"),
+    "apart": ((T_S - 1e3, POSE, COMMANDS_T_S, COMMANDS), "poses go from -1000 to .* in one time"),
+    "words": ((T_S, POSE, COMMANDS_T_S, [["a", "b"]]), "commands: is not all numbers"),
+}
+
+
+@pytest.mark.parametrize(("arrays", "said"), WRONG.values(), ids=WRONG)
+def test_what_makes_no_run_is_refused_in_a_sentence(arrays, said):
+    with pytest.raises(tm.LogError, match=said) as refused:
+        tm.Log.from_arrays(*arrays, kind="twist")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_frame_that_lacks_a_column_is_refused_by_its_name():
+    with pytest.raises(tm.LogError, match="poses: has no column y_m"):
+        tm.Log.from_frames({"t_s": T_S, "x_m": T_S}, COMMANDS_FRAME)
+    with pytest.raises(tm.LogError, match="commands: must have one of these groups"):
+        tm.Log.from_frames(POSES_FRAME, {"t_s": T_S, "speed": T_S})
+    with pytest.raises(tm.LogError, match="kind: is 'velocity'"):
+        circle(kind="velocity")
+    with pytest.raises(tm.LogError, match="robot_id: is 100"):
+        circle(robot_id=100)
