@@ -16,7 +16,9 @@ from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
+from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 XY = ("x_m", "y_m")
@@ -62,6 +64,31 @@ def test_a_point_tracked_far_off_the_axle_is_told_with_its_lever(judged, lever_m
     advised = ModelFile(file.path, text, native.Model.from_toml(text, "advised"))
     assert compare(found, advised).score < compare(found, file).score / 5
     assert not check_tracks(found.tracks, advised.model)
+
+
+@pytest.mark.parametrize(
+    ("lever_m", "commands"),
+    [((0.6, 0.0), "commands"), ((0.0, 1.0), "wheels"), ((1.8, -0.4), "commands")],
+)
+def test_a_lever_of_any_length_is_named_and_found_to_the_millimetre(
+    judged, cases, tmp_path, lever_m, commands
+):
+    """Poses of the point 0.3 m ahead are moved to another one of the same rigid body."""
+    table = np.loadtxt(cases / "lever_as_swap/poses_0.3m.csv", delimiter=",", skiprows=1)
+    moved_m = (complex(*lever_m) - 0.3) * np.exp(1j * table[:, 4])
+    table[:, 2:4] += np.column_stack([moved_m.real, moved_m.imag])
+    header = "t_s,robot_id,x_m,y_m,theta_rad"
+    np.savetxt(tmp_path / "p.csv", table, delimiter=",", header=header, comments="", fmt="%.5f")
+    model = "twist" if commands == "commands" else "diff_wheels"
+    runs, file = judged("lever_as_swap", tmp_path / "p", commands, model)
+    found = diagnose(runs, file).findings[0]
+    assert (found.effect, found.certainty) == ("marker_offset", "sure")
+    assert [p.value for p in found.parameters] == pytest.approx(lever_m, abs=1e-3)
+    out = tmp_path / "better.toml"
+    added = add("marker_offset", runs, file, out=out, command="add")
+    again = fit(runs, ModelFile.load(str(out)), out=tmp_path / "again.toml", command="fit")
+    for told in (added.added, [p for p in again.parameters if "marker" in p.name]):
+        assert [p.value for p in told] == pytest.approx(lever_m, abs=1e-3)
 
 
 @pytest.mark.parametrize("drive", "abc")
