@@ -6,6 +6,7 @@ from the table by a regression, as the README in each folder says.
 """
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,17 @@ def test_a_point_tracked_far_off_the_axle_is_told_with_its_lever(judged, lever_m
     assert not check_tracks(found.tracks, advised.model)
 
 
+def _of_another_point(cases, folder, lever_m, front_deg=0.0):
+    """Poses of the point 0.3 m ahead, moved on the same body, its front turned to the left."""
+    table = np.loadtxt(cases / "lever_as_swap/poses_0.3m.csv", delimiter=",", skiprows=1)
+    moved_m = (complex(*lever_m) - 0.3) * np.exp(1j * table[:, 4])
+    table[:, 2:4] += np.column_stack([moved_m.real, moved_m.imag])
+    table[:, 4] -= np.radians(front_deg)
+    header = "t_s,robot_id,x_m,y_m,theta_rad"
+    np.savetxt(folder / "p.csv", table, delimiter=",", header=header, comments="", fmt="%.5f")
+    return folder / "p"
+
+
 @pytest.mark.parametrize(
     ("lever_m", "commands"),
     [((0.6, 0.0), "commands"), ((0.0, 1.0), "wheels"), ((1.8, -0.4), "commands")],
@@ -75,14 +87,9 @@ def test_a_point_tracked_far_off_the_axle_is_told_with_its_lever(judged, lever_m
 def test_a_lever_of_any_length_is_named_and_found_to_the_millimetre(
     judged, cases, tmp_path, lever_m, commands
 ):
-    """Poses of the point 0.3 m ahead are moved to another one of the same rigid body."""
-    table = np.loadtxt(cases / "lever_as_swap/poses_0.3m.csv", delimiter=",", skiprows=1)
-    moved_m = (complex(*lever_m) - 0.3) * np.exp(1j * table[:, 4])
-    table[:, 2:4] += np.column_stack([moved_m.real, moved_m.imag])
-    header = "t_s,robot_id,x_m,y_m,theta_rad"
-    np.savetxt(tmp_path / "p.csv", table, delimiter=",", header=header, comments="", fmt="%.5f")
+    poses = _of_another_point(cases, tmp_path, lever_m)
     model = "twist" if commands == "commands" else "diff_wheels"
-    runs, file = judged("lever_as_swap", tmp_path / "p", commands, model)
+    runs, file = judged("lever_as_swap", poses, commands, model)
     found = diagnose(runs, file).findings[0]
     assert (found.effect, found.certainty) == ("marker_offset", "sure")
     assert [p.value for p in found.parameters] == pytest.approx(lever_m, abs=1e-3)
@@ -112,6 +119,30 @@ def test_a_heading_that_is_turned_and_a_shift_are_told_together(judged):
         judged("turned_short", *tables, same_clock=False, pose_shift_s=4.0)
     shift_s = float(str(told.value).split("--pose-shift-s R01=")[1].split()[0])
     assert shift_s == pytest.approx(-4.0, abs=0.1)  # a lag of the search is in it
+
+
+@pytest.mark.parametrize(
+    ("lever_m", "front_deg", "shift_s"),
+    [
+        ((-0.2, 0.0), 90, 0.0),
+        ((0.5, 0.1), -90, 3.0),
+        ((1.0, 0.0), 180, 0.0),
+        ((0.4, 0.0), 30, -2.0),
+    ],
+)
+def test_a_turned_heading_of_a_point_off_the_axle_is_told_with_any_shift(
+    judged, cases, tmp_path, lever_m, front_deg, shift_s
+):
+    poses = _of_another_point(cases, tmp_path, lever_m, front_deg)
+    given = dict(same_clock=False, pose_shift_s=shift_s)
+    with pytest.raises(LogError) as told:
+        judged("lever_as_swap", poses, "wheels", "diff_wheels", **given)
+    said = str(told.value)
+    off_deg = float(re.search(r"--heading-offset-deg=(-?\d+)", said)[1])
+    assert (off_deg - front_deg + 180) % 360 - 180 == pytest.approx(0, abs=1.5)
+    if shift_s:
+        found_s = float(said.split("--pose-shift-s R01=")[1].split()[0])
+        assert found_s == pytest.approx(-shift_s, abs=0.1)  # a lag of the search is in it
 
 
 def test_a_sideways_speed_that_is_hardly_told_tells_no_unit(judged):

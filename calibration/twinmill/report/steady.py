@@ -12,8 +12,8 @@ from twinmill.report.tables import Cell, Table, number, tone
 
 STANDING = " Standing side: rim speed predicted where a side was seen to stand still."
 BY_VENDOR = (
-    "Inputs as the vendor writes them (90° is forward, turn positive clockwise); rates are positive "
-    "counter-clockwise."
+    "Inputs as the vendor writes them (90° is forward, turn positive clockwise); rates are "
+    "positive counter-clockwise."
 )
 HEADS = {  # of inputs and values, by column
     "speed_input": "speed",
