@@ -49,7 +49,7 @@ from twinmill.data.log import Log as RecordedLog
 from twinmill.data.log import LogError, RobotLog, log_of, read_log
 from twinmill.data.measurement import Measurements, load_measurements
 from twinmill.data.multi_log import multi_log_of
-from twinmill.data.steady_table import INPUTS, SteadyTable, is_steady_table, read_steady_tables
+from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
 from twinmill.defaults import (
     ALARM_RATE,
     DEFAULT_MODEL,
@@ -2194,7 +2194,7 @@ def _rows(logs: list[RecordedLog], columns: Callable[[RobotLog], dict[str, Any]]
 
 
 def _steady_rows(told: SteadyTable) -> pd.DataFrame:
-    table = pd.DataFrame(told.inputs, columns=list(INPUTS))
+    table = pd.DataFrame(told.inputs, columns=list(told.input_names))
     table.insert(0, "log", told.log_name)
     table.insert(1, "robot_id", told.robot_id)
-    return table.assign(runs=told.runs, speed_mps=told.value[:, 0], turn_radps=told.value[:, 1])
+    return table.assign(runs=told.runs, **dict(zip(told.columns, told.value.T, strict=True)))

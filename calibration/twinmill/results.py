@@ -401,7 +401,7 @@ def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
     """
     last = results[-1][1]
     if last.shown in (tables := comparisons.steady_comparisons(last)):
-        return steady.values(tables).svg.picture
+        return steady.values(steady.kinds(tables)[0]).svg.picture
     robot = last.robots.index(last.shown)
     robots = [(label, result.robots[robot]) for label, result in results]
     same = [(label, own) for label, own in robots if isinstance(own, _compare.RobotComparison)]

@@ -5,18 +5,23 @@ The logs are simulated without Twinmill; each expected value is that of the simu
 from the table by a regression, as the README in each folder says.
 """
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import twinmill_native as native
 
+import twinmill as tm
 from twinmill.data.checks import check_tracks
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
+from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
+from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 
 XY = ("x_m", "y_m")
@@ -64,6 +69,37 @@ def test_a_point_tracked_far_off_the_axle_is_told_with_its_lever(judged, lever_m
     assert not check_tracks(found.tracks, advised.model)
 
 
+def _of_another_point(cases, folder, lever_m, front_deg=0.0):
+    """Poses of the point 0.3 m ahead, moved on the same body, its front turned to the left."""
+    table = np.loadtxt(cases / "lever_as_swap/poses_0.3m.csv", delimiter=",", skiprows=1)
+    moved_m = (complex(*lever_m) - 0.3) * np.exp(1j * table[:, 4])
+    table[:, 2:4] += np.column_stack([moved_m.real, moved_m.imag])
+    table[:, 4] -= np.radians(front_deg)
+    header = "t_s,robot_id,x_m,y_m,theta_rad"
+    np.savetxt(folder / "p.csv", table, delimiter=",", header=header, comments="", fmt="%.5f")
+    return folder / "p"
+
+
+@pytest.mark.parametrize(
+    ("lever_m", "commands"),
+    [((0.6, 0.0), "commands"), ((0.0, 1.0), "wheels"), ((1.8, -0.4), "commands")],
+)
+def test_a_lever_of_any_length_is_named_and_found_to_the_millimetre(
+    judged, cases, tmp_path, lever_m, commands
+):
+    poses = _of_another_point(cases, tmp_path, lever_m)
+    model = "twist" if commands == "commands" else "diff_wheels"
+    runs, file = judged("lever_as_swap", poses, commands, model)
+    found = diagnose(runs, file).findings[0]
+    assert (found.effect, found.certainty) == ("marker_offset", "sure")
+    assert [p.value for p in found.parameters] == pytest.approx(lever_m, abs=1e-3)
+    out = tmp_path / "better.toml"
+    added = add("marker_offset", runs, file, out=out, command="add")
+    again = fit(runs, ModelFile.load(str(out)), out=tmp_path / "again.toml", command="fit")
+    for told in (added.added, [p for p in again.parameters if "marker" in p.name]):
+        assert [p.value for p in told] == pytest.approx(lever_m, abs=1e-3)
+
+
 @pytest.mark.parametrize("drive", "abc")
 def test_a_smooth_drive_with_slip_does_not_belie_one_clock(judged, drive):
     found, _ = judged("smooth_one_clock", f"poses_{drive}", f"commands_{drive}")
@@ -83,6 +119,30 @@ def test_a_heading_that_is_turned_and_a_shift_are_told_together(judged):
         judged("turned_short", *tables, same_clock=False, pose_shift_s=4.0)
     shift_s = float(str(told.value).split("--pose-shift-s R01=")[1].split()[0])
     assert shift_s == pytest.approx(-4.0, abs=0.1)  # a lag of the search is in it
+
+
+@pytest.mark.parametrize(
+    ("lever_m", "front_deg", "shift_s"),
+    [
+        ((-0.2, 0.0), 90, 0.0),
+        ((0.5, 0.1), -90, 3.0),
+        ((1.0, 0.0), 180, 0.0),
+        ((0.4, 0.0), 30, -2.0),
+    ],
+)
+def test_a_turned_heading_of_a_point_off_the_axle_is_told_with_any_shift(
+    judged, cases, tmp_path, lever_m, front_deg, shift_s
+):
+    poses = _of_another_point(cases, tmp_path, lever_m, front_deg)
+    given = dict(same_clock=False, pose_shift_s=shift_s)
+    with pytest.raises(LogError) as told:
+        judged("lever_as_swap", poses, "wheels", "diff_wheels", **given)
+    said = str(told.value)
+    off_deg = float(re.search(r"--heading-offset-deg=(-?\d+)", said)[1])
+    assert (off_deg - front_deg + 180) % 360 - 180 == pytest.approx(0, abs=1.5)
+    if shift_s:
+        found_s = float(said.split("--pose-shift-s R01=")[1].split()[0])
+        assert found_s == pytest.approx(-shift_s, abs=0.1)  # a lag of the search is in it
 
 
 def test_a_sideways_speed_that_is_hardly_told_tells_no_unit(judged):
@@ -139,6 +199,27 @@ def test_bodies_that_a_tracker_exchanged_are_given_back_and_told(judged, cases, 
     for m in found:
         own = right[right[:, 1] == m.track.robot_id]
         assert m.track.pose[:, :2] == pytest.approx(own[:, 2:4], abs=1e-6)
+
+
+def test_an_effect_takes_one_share_wherever_it_is_told(judged, cases, tmp_path, twinmill):
+    """Turning by half is nearly all of the error; 0.04 s of lag beside it are a few percent."""
+    judged("export_share", model="diff_wheels")
+    found = tm.explain(str(tmp_path / "x.lcmlog"), str(cases / "models/diff_wheels.toml"))
+    of = {f["effect"]: f["share"] for f in found.to_json()["findings"]}
+    assert set(of) == {"refit", "motor_lag"}
+    assert 0.02 < of["motor_lag"] < 0.05 and sum(of.values()) == pytest.approx(1, abs=0.005)
+    told = f"{100 * of['motor_lag']:.0f} %"
+    assert f"motor_lag ({told})" in " ".join(str(found).split())
+    assert f"motor_lag ({told})" in found.report(tmp_path / "report").read_text()
+    model = tmp_path / "e.toml"
+    found.model.save(model)
+    for target in ("mjcf", "sdf", "urdf", "ros2_control"):
+        words = ("export-model", model, "--to", target, "-o", tmp_path / f"robot.{target}")
+        said = json.loads(twinmill(*words, "--json", "--force")[1])
+        shares = {left["name"]: left["share"] for left in said["not_carried"]}
+        assert shares.get("motor_lag", of["motor_lag"]) == pytest.approx(of["motor_lag"], rel=1e-4)
+    assert "motor_lag" in shares  # no controller of ROS has it
+    assert f"motor_lag ({told} of the squared error)" in twinmill(*words, "--force")[1]
 
 
 @pytest.mark.parametrize(("name", "width"), [("slow", 0.04), ("fast", 0.08)])

@@ -113,5 +113,5 @@ def test_a_table_of_wheels_on_the_bench_is_told_with_its_way_out(tmp_path):
     path = tmp_path / "bench.csv"
     rows = "".join(f"{k},{2 * k},{2 * k}\n" for k in range(9))
     path.write_text(f"duty_pct,left_rpm,right_rpm\n{rows}")
-    with pytest.raises(LogError, match="bench test; write it as a steady-state table"):
+    with pytest.raises(LogError, match="bench test; it needs no import: give it to compare"):
         import_log(path, None, tmp_path / "o.lcmlog", options=ImportOptions(robot_id=1))

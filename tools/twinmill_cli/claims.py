@@ -99,6 +99,11 @@ def _claims(
     if strange := [turn for turn in odd_turn or [] if not abs(turn) <= MOST_TURN]:
         raise ValueError(f"--odd-turn {strange[0]:g}: must be from -{MOST_TURN} to {MOST_TURN}.")
     sheets = read_steady_tables(actuation_table) if actuation_table else []
+    if any(sheet.of_wheels for sheet in sheets):
+        raise ValueError(
+            f"--actuation {actuation_table}: is a bench test of wheels, and the claim is on how "
+            "robots move; give a table of measured speeds and turns."
+        )
     if mujoco_seeds and not out:
         raise ValueError("--mujoco-seeds needs --out DIR, where its runs are kept.")
     if out:

@@ -92,6 +92,11 @@ class Measurement:
         return next((f.lateness for f in self.findings if f.lateness), None)
 
     @property
+    def lever_m(self) -> tuple[float, float] | None:
+        """The tracked point ahead and left of the point that the robot turns about, if far off."""
+        return next((f.lever_m for f in self.findings if f.lever_m), None)
+
+    @property
     def lateness_changes(self) -> bool:
         """No one number of lag, delay or clock holds for the whole log, nor for another one."""
         return not all(f.steady for f in self.findings)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads steady-state tables: per robot and input the median of its runs, and how far to trust it.
 
+They tell how a robot moves, or how its wheels turn on a bench.
+
 Errors of typing and timing are common in such tables, so medians are taken, of runs as well as of
 their scatter: a wrong number hardly moves them.
 """
@@ -15,12 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from twinmill.chance import chi2_median
+from twinmill.data.bench_table import bench_readings, is_bench
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, read_table
-from twinmill.data.units import UNITS, plain_name, split_unit
+from twinmill.data.readings import Readings
 
 INPUTS = ("speed_input", "direction_deg", "turn_input")
-COLUMNS = ("robot_id", *INPUTS, "run", "speed_mps", "turn_radps", "note")
+MOTION = ("speed_mps", "turn_radps")
+COLUMNS = ("robot_id", *INPUTS, "run", *MOTION, "note")
 LIMITS = {"robot_id": (0, 99), "speed_input": (-100, 100), "turn_input": (-2, 2)}
 # Half a wheel's turn in a circle, and 3 degrees in a second, pass for "on the spot" and "straight".
 READ_AS_ZERO = (0.05, 0.05)  # m/s, rad/s
@@ -45,26 +49,30 @@ class SteadyTable:
     """One robot in one table; U inputs in their order of appearance.
 
     Attributes:
-        inputs: (U, 3) as INPUTS, vendor's convention: 90 is forward, turn positive clockwise.
-        value: (U, 2) median m/s and rad/s (counter-clockwise); NaN where not measured.
-        floor: (U, 2) standard deviation to be expected of it about a model of its kind.
+        input_names, columns: of I inputs and of C values: INPUTS and MOTION, or of a bench test
+            duties and speeds of wheels.
+        inputs: (U, I) by vendor's convention: 90 is forward, turn positive clockwise.
+        value: (U, C) median m/s, rad/s (counter-clockwise); NaN where not measured.
+        floor: (U, C) standard deviation to be expected of it about a model of its kind.
         runs: (U,) how many.
         still: (U,) bool: a note says that one side of the robot stood still.
-        cell_spread: (U, 2) relative standard deviation over robots at this input; NaN for one.
-        spread: of speed and turn, over all inputs and robots of the table.
+        cell_spread: (U, C) relative standard deviation over robots at this input; NaN for one.
+        spread: of each column, over all inputs and robots of the table.
         fold: 0 or 1, the half that this robot belongs to; None if the table has only one.
     """
 
     log_name: str
     log_sha256: str
     robot_id: int
+    input_names: tuple[str, ...]
+    columns: tuple[str, ...]
     inputs: np.ndarray
     value: np.ndarray
     floor: np.ndarray
     runs: np.ndarray
     still: np.ndarray
     cell_spread: np.ndarray
-    spread: tuple[Spread, Spread]
+    spread: tuple[Spread, ...]
     fold: int | None
     warnings: list[str]
     recorded_utime_us: int = 0
@@ -74,6 +82,11 @@ class SteadyTable:
     def label(self) -> str:
         """Short name of table and robot."""
         return f"{self.log_name} R{self.robot_id:02d}"
+
+    @property
+    def of_wheels(self) -> bool:
+        """Whether it is of wheels on a bench, which tell nothing of how the robot moves."""
+        return self.columns != MOTION
 
     def __repr__(self) -> str:
         return f"SteadyTable({self.label})"
@@ -91,16 +104,14 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
         LogError: no such table, or a wrong cell, with its row.
     """
     path = Path(path)
-    table = read_table(path, frozenset(COLUMNS))
-    missing = [name for name in COLUMNS if not table.has(name)]
-    if missing:
-        refuse_bench(path.name, table.header)
-        raise LogError(
-            f"{path}: column {missing[0]} is missing; a steady-state table has {','.join(COLUMNS)} "
-            "(poses and commands become a log by `twinmill import`)."
+    readings = _readings(path, read_table(path, frozenset(COLUMNS)))
+    cells = _cells(readings)
+    channels = [
+        _channel(cells, c, *known)
+        for c, known in enumerate(
+            zip(readings.unit, readings.as_zero, readings.reading, strict=True)
         )
-    cells = _cells(table)
-    channels = [_channel(cells, k) for k in (0, 1)]
+    ]
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     robots = sorted({robot for robot, _ in cells})
     sheets = []
@@ -112,13 +123,15 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
                 log_name=path.name,
                 log_sha256=sha256,
                 robot_id=robot,
+                input_names=readings.input_names,
+                columns=readings.columns,
                 inputs=np.array([key[1] for key in keys]),
                 value=np.column_stack([o[:, 0] for o in own]),
                 floor=np.column_stack([o[:, 1] for o in own]),
-                runs=np.array([len(cells[key].speed) for key in keys]),
+                runs=np.array([len(cells[key].values) for key in keys]),
                 still=np.array([cells[key].still for key in keys]),
                 cell_spread=np.column_stack([o[:, 2] for o in own]),
-                spread=(channels[0][1], channels[1][1]),
+                spread=tuple(channel[1] for channel in channels),
                 fold=place % 2 if len(robots) > 1 else None,
                 warnings=[],
             )
@@ -127,59 +140,72 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
     return sheets
 
 
-def refuse_bench(name: str, header: list[str]) -> None:
-    """Raises LogError where a table is of a bench test: duties and wheel speeds, no places."""
-    names = [plain_name(column) for column in header]
-    units = {unit for unit in (split_unit(column)[1] for column in header) if unit}
-    kinds = {UNITS[unit][0] for unit in units}
-    duties = "pct" in kinds or any("duty" in own or "pwm" in own for own in names)
-    turning = "radps" in kinds or any("rpm" in own for own in names)
-    placed = "m" in kinds or {"x", "y"} <= {*names}
-    if duties and turning and not placed:
-        raise LogError(
-            f"{name}: has duties and wheel speeds and no poses, as a bench test; write it as a "
-            "steady-state table and give that to compare, fit or diagnose: "
-            f"{','.join(COLUMNS)}, with the duty as speed_input, 90, 0, and the wheel's speed "
-            "times its radius as speed_mps."
-        )
+def _readings(path: Path, table: Table) -> Readings:
+    """Rows of a table of drives, or of a bench test."""
+    missing = [name for name in COLUMNS if not table.has(name)]
+    if not missing:
+        return _of_drives(table)
+    if is_bench(table.header):
+        return bench_readings(table)
+    raise LogError(
+        f"{path}: column {missing[0]} is missing; a steady-state table has {','.join(COLUMNS)} "
+        "(poses and commands become a log by `twinmill import`), or the duties and the speeds of "
+        "wheels (duty_pct,left_rpm,right_rpm)."
+    )
 
 
-@dataclass
-class _Cell:
-    """Runs of one robot at one input."""
-
-    speed: list[float]
-    turn: list[float]
-    still: bool = False
-
-    def runs(self, channel: int) -> list[float]:
-        """Those that were measured; the tape knows no backwards."""
-        values = [self.turn, [abs(v) for v in self.speed]][channel == 0]
-        return [v for v in values if np.isfinite(v)]
-
-
-Key = tuple[int, tuple[float, ...]]
-
-
-def _cells(table: Table) -> dict[Key, _Cell]:
+def _of_drives(table: Table) -> Readings:
     robot, inputs = table.finite("robot_id"), [table.finite(name) for name in INPUTS]
     for name, values in zip(("robot_id", *INPUTS), (robot, *inputs), strict=True):
         low, high = LIMITS.get(name, (-360, 360))
         table.refuse((values < low) | (values > high), name, values, f"must lie in {low}..{high}")
     table.refuse(robot % 1 != 0, "robot_id", robot, "must be a whole number")
-    speed, turn = table.numbers("speed_mps", True), table.numbers("turn_radps", True)
-    notes = [row[table.header.index("note")] for row in table.rows]
-    cells: dict[Key, _Cell] = defaultdict(lambda: _Cell([], []))
-    for k, note in enumerate(notes):
-        cell = cells[int(robot[k]), tuple(float(values[k]) for values in inputs)]
-        cell.speed.append(speed[k])
-        cell.turn.append(turn[k])
-        cell.still |= bool(re.search(r"\bside\b", note)) and np.isnan(speed[k])
+    speed, turn = (table.numbers(name, True) for name in MOTION)
+    sided = [bool(re.search(r"\bside\b", note)) for note in table.cells("note")]
+    return Readings(
+        INPUTS,
+        MOTION,
+        robot,
+        np.column_stack(inputs),
+        np.column_stack([np.abs(speed), turn]),  # the tape knows no backwards
+        np.array(sided) & np.isnan(speed),
+        (1.0, 1.0),
+        READ_AS_ZERO,
+        READING,
+    )
+
+
+@dataclass
+class _Cell:
+    """Runs of one robot at one input, of C values each."""
+
+    values: list[np.ndarray]
+    still: bool = False
+
+    def runs(self, channel: int) -> list[float]:
+        """Those that were measured."""
+        return [float(v[channel]) for v in self.values if np.isfinite(v[channel])]
+
+
+Key = tuple[int, tuple[float, ...]]
+
+
+def _cells(readings: Readings) -> dict[Key, _Cell]:
+    cells: dict[Key, _Cell] = defaultdict(lambda: _Cell([]))
+    for k, robot in enumerate(readings.robot):
+        cell = cells[int(robot), tuple(readings.inputs[k].tolist())]
+        cell.values.append(readings.values[k])
+        cell.still |= bool(readings.still[k])
     return cells
 
 
-def _channel(cells: dict[Key, _Cell], k: int) -> tuple[dict[Key, tuple], Spread]:
-    """For each cell median, floor, relative spread over robots; and the spread of all."""
+def _channel(
+    cells: dict[Key, _Cell], k: int, unit: float, zero: float, reading: float
+) -> tuple[dict[Key, tuple], Spread]:
+    """For each cell median, floor, relative spread over robots; and the spread of all.
+
+    Args: k of the value; unit, zero, reading as in Readings.
+    """
     runs = {key: cell.runs(k) for key, cell in cells.items()}
     middle = {key: float(np.median(r)) if r else np.nan for key, r in runs.items()}
     by_input: dict[tuple, list[float]] = defaultdict(list)
@@ -188,7 +214,8 @@ def _channel(cells: dict[Key, _Cell], k: int) -> tuple[dict[Key, tuple], Spread]
             by_input[inputs].append(value)
     pooled = Spread(_scatter(runs.values()), _scatter(by_input.values()))
     known = np.nan_to_num(pooled.runs), np.nan_to_num(pooled.robots)
-    reading = READING[k] if np.isnan(pooled.runs) else _digit(runs.values()) / np.sqrt(12)
+    if not np.isnan(pooled.runs):
+        reading = unit * _digit(np.concatenate([*runs.values()]) / unit) / np.sqrt(12)
     found = {}
     for key, value in middle.items():
         robots = np.array(by_input[key[1]])
@@ -197,15 +224,14 @@ def _channel(cells: dict[Key, _Cell], k: int) -> tuple[dict[Key, tuple], Spread]
             POOLED + max(len(relative) - 1, 0)
         )
         variance = between + known[0] ** 2 / max(len(runs[key]), 1)
-        floor = READ_AS_ZERO[k] if value == 0 else np.hypot(reading, abs(value) * variance**0.5)
+        floor = zero if value == 0 else np.hypot(reading, abs(value) * variance**0.5)
         seen = float(relative.std(ddof=1)) if len(relative) else np.nan
         found[key] = (value, floor, seen)
     return found, pooled
 
 
-def _digit(groups: Iterable[list[float]]) -> float:
+def _digit(values: np.ndarray) -> float:
     """Unit of the last digit to which values are written."""
-    values = np.concatenate([np.array(group, float) for group in groups])
     digits = (10.0**-d for d in range(7))
     return next((d for d in digits if np.allclose(values / d, np.round(values / d))), 1e-6)
 

@@ -20,6 +20,7 @@ from twinmill.model.parameters import (
     base_lag_is_identifiable,
     base_parameters,
     begun_about,
+    begun_at,
     catalogue_name,
     effect_names,
     effect_parameters,
@@ -220,7 +221,7 @@ def with_effects(
         for model in models:
             model.add_effect(name)
         fresh = effect_parameters(models[0], effect_names(models[0])[-1], fresh=True)
-        fresh = [p.at((start or {}).get(p.name, p.value)) for p in fresh]
+        fresh = begun_at(fresh, start or {})
         for model in models:
             for p in fresh:
                 model.set(p.name, p.value)

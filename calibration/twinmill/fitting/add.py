@@ -47,11 +47,13 @@ from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
     CAMERA_STAGES,
     GAINS,
+    LEVER_EFFECT,
     WHERE_OR_WHEN,
     Parameter,
     ParameterEstimate,
     all_effect_parameters,
     base_parameters,
+    begun_at,
     effect_names,
     effect_parameters,
     is_of_camera,
@@ -348,7 +350,7 @@ def with_effect(
 def begun_at_best(
     effect: str, fresh: Sequence[Parameter], without: ScoreFit, robot_id: int | None
 ) -> list[Parameter]:
-    """What is new, its place or moments begun where it takes most of what is left.
+    """What is new, its place, moments or lever begun where it takes most of what is left.
 
     Args:
         effect: its name.
@@ -361,14 +363,16 @@ def begun_at_best(
         for i, d in enumerate(without.datasets)
         if isinstance(d, Trajectory) and robot_id in (None, d.robot_id)
     ]
-    if not members or not any(with_role(effect, role) for role in WHERE_OR_WHEN):
+    searched = effect == LEVER_EFFECT or any(with_role(effect, role) for role in WHERE_OR_WHEN)
+    if not members or not searched:
         return list(fresh)
     rows, models, datasets = (
         [of[i] for i in members] for of in (without.state[0], without.models, without.datasets)
     )
     starts = starts_of(effect, models, datasets, rows)
-    best = starts.best(Left.of(without, *projected(without)).at(members))
-    return [p.at(best.get(p.name, p.value)) for p in fresh]
+    if starts is None:
+        return list(fresh)
+    return begun_at(fresh, starts.best(Left.of(without, *projected(without)).at(members)))
 
 
 def _begun(model: native.Model, fresh: Sequence[Parameter]) -> native.Model:

@@ -204,12 +204,16 @@ def base_names(
         model: whose base it is.
         opened: measurements.
         told: names of what other logs told; of these only the gains are free, since batteries and
-            floors change. Without any, the speeds of the duty table stand for the forward gain.
+            floors change. Without any, the speeds of the duty table stand for the forward gain;
+            wheels on a bench tell them apart from it.
     """
     acting = {n for o in opened for n in _gains(o, model)}
     gains = [n for n in BASE_GAINS if n in acting]
-    table = [] if told else duty_table(model)
-    if len(table) > 1:
+    bench = [_of_wheels(o) for o in opened]
+    table = [] if told and not all(bench) else duty_table(model)
+    if any(bench):
+        gains = [*table, *gains]
+    elif len(table) > 1:
         gains = [*table, *(n for n in gains if n != BASE_GAINS[0])]
     kept = LAG in told or lag_is_kept(opened, told)
     changes = any(o.floor for o in opened) and not kept
@@ -224,9 +228,16 @@ def effects_free(model: native.Model, opened: Sequence[Opened]) -> list[Paramete
 
 def _gains(own: Opened, model: native.Model) -> list[str]:
     """Gains of the base that this measurement moves."""
+    if _of_wheels(own):
+        return []
     if isinstance(own.data, Trajectory):
         return acting_gains(own.data, model)
     return gains_of(model)
+
+
+def _of_wheels(own: Opened) -> bool:
+    """Whether it is a bench test, which tells speeds of wheels and no motion."""
+    return isinstance(own.data, SteadyStates) and own.data.measurement.of_wheels
 
 
 def fitted(

@@ -16,6 +16,7 @@ import twinmill_native as native
 
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
+    LEVER_EFFECT,
     Parameter,
     catalogue,
     effect_names,
@@ -194,7 +195,9 @@ def starts_of(
     if with_role(name, "place"):
         return _places(candidate, rows) if candidate.logs else None
     if with_role(name, "radius"):
-        return Told.of(candidate) if candidate.logs else None
+        return Told.of_radius(candidate) if candidate.logs else None
+    if name == LEVER_EFFECT:
+        return Told.of_lever(candidate)
     return Grid.of(candidate, rows) if with_role(name, "limit") else None
 
 
@@ -205,11 +208,20 @@ class Told:
     start: dict[str, float]
 
     @classmethod
-    def of(cls, candidate: Candidate) -> "Told":
-        """Of an effect of wheels whose radius the logs tell; the median of those that do."""
+    def of_radius(cls, candidate: Candidate) -> "Told":
+        """Of wheels whose radius the logs tell; the median of those that do."""
         told = [d.radius_ratio for d in candidate.logs if d.radius_ratio != 1.0]
         ratio = float(np.median(told)) if told else 1.0
         return cls(dict.fromkeys(candidate.named("radius"), ratio))
+
+    @classmethod
+    def of_lever(cls, candidate: Candidate) -> "Told | None":
+        """Where the point is tracked, the median of the logs whose check tells it; None if none."""
+        told = [lever_m for d in candidate.logs if (lever_m := d.measurement.lever_m)]
+        if not told:
+            return None
+        names = [f"{candidate.instance}.{key}" for key in ("x_m", "y_m")]
+        return cls(dict(zip(names, np.median(told, axis=0).tolist(), strict=True)))
 
     def best(self, left: Left) -> dict[str, float]:
         """See Starts."""

@@ -20,6 +20,7 @@ NORMAL_95 = 1.96  # standard errors to either side
 GAINS = ("theta_a1", "theta_a2")  # of one robot: speed, and rate of turn
 BASE_GAINS = ("base.forward_gain", "base.sideways_gain", "base.yaw_gain")
 LAG = "base.motor_lag_s"
+LEVER_EFFECT = "marker_offset"  # its x_m and y_m are where the tracked point is
 LAG_EFFECT = "motor_lag"  # adds to LAG: beside it only their sum can be told
 
 # Standard deviations of the base's priors: as robots differ from their data sheets.
@@ -380,6 +381,20 @@ def begun_about(parameters: Iterable[Parameter], near: Mapping[str, float]) -> l
     ]
 
 
+def begun_at(parameters: Iterable[Parameter], start: Mapping[str, float]) -> list[Parameter]:
+    """Quantities begun where a start says; a place in the room is usual where it begins."""
+    return [_told_lever(p.at(start.get(p.name, p.value))) for p in parameters]
+
+
+def _told_lever(p: Parameter) -> Parameter:
+    """A lever that a model or a log tells may be as long as it is, however long levers usually are.
+
+    Other quantities as they are.
+    """
+    of_lever = catalogue_name(p.name) == LEVER_EFFECT
+    return replace(p, std=max(p.std, abs(p.value))) if of_lever else p
+
+
 def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -> list[Parameter]:
     """Free quantities of one effect of a model; a fresh one begins at its defaults.
 
@@ -400,18 +415,20 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
         strength = p["default"] - p["neutral"]
         value = p["default"] if fresh else model.get(full)
         found.append(
-            Parameter(
-                name=full,
-                unit=p["unit"],
-                value=value,
-                min=p["min"],
-                max=p["max"],
-                usual=p["neutral"],
-                std=UNKNOWN * max(1.0, abs(value)) if texts else p["usual_size"],
-                step=EFFECT_STEP * abs(strength),
-                central=p["unit"] == "s",
-                role=p["role"],
-                strength=strength,
+            _told_lever(
+                Parameter(
+                    name=full,
+                    unit=p["unit"],
+                    value=value,
+                    min=p["min"],
+                    max=p["max"],
+                    usual=p["neutral"],
+                    std=UNKNOWN * max(1.0, abs(value)) if texts else p["usual_size"],
+                    step=EFFECT_STEP * abs(strength),
+                    central=p["unit"] == "s",
+                    role=p["role"],
+                    strength=strength,
+                )
             )
         )
     return found

@@ -9,10 +9,11 @@ import twinmill_native as native
 
 from twinmill.data.steady_table import SteadyTable
 from twinmill.predict.regimes import Regime
-from twinmill.predict.steady_states import CHANNELS, SteadyStates
+from twinmill.predict.steady_states import SteadyStates
 
 SLOW, FAST = 0.45, 0.75  # duty below and above which an input counts as slow and fast
 SPOT_MPS = 0.05
+ON_BENCH = "wheels"  # the group of what a bench test has
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class SteadyComparison:
 
     Attributes:
         modelled: table and model.
-        predicted, errors: (U, 3); m/s, rad/s, m/s.
+        predicted, errors: (U, C), as the channels of `modelled`.
         floor: where it comes from.
         where: regimes.
     """
@@ -56,7 +57,7 @@ class SteadyComparison:
 
     @property
     def ratios(self) -> np.ndarray:
-        """(U, 3) errors over floor."""
+        """(U, C) errors over floor."""
         return self.modelled.ratios()
 
     @property
@@ -72,7 +73,7 @@ class SteadyComparison:
     def error_rows(self) -> list[dict]:
         """errors[] of the interface; a ratio is the RMS of each input's own."""
         rows = []
-        for c, (channel, unit) in enumerate(CHANNELS):
+        for c, (channel, unit) in enumerate(self.modelled.channels):
             known = np.isfinite(self.errors[:, c])
             if known.any():
                 parts = (self.errors, self.modelled.floor(), self.ratios)
@@ -88,19 +89,22 @@ class SteadyComparison:
         return rows
 
     def cells(self) -> list[dict]:
-        """One entry per input, in the vendor's convention; a spread is relative, over robots."""
+        """One entry per input, in the vendor's convention; a spread is relative, over robots.
+
+        Of a bench test by duties, with the speed of each wheel.
+        """
         sheet = self.measurement
-        names = ("speed_input", "direction_deg", "turn_input")
         keys = ("measured", "predicted", "floor", "ratio")
         entries = []
         for u, inputs in enumerate(sheet.inputs):
             entry = {
-                **dict(zip(names, inputs.tolist(), strict=True)),
+                **dict(zip(sheet.input_names, inputs.tolist(), strict=True)),
                 "runs": int(sheet.runs[u]),
-                "side_stands_still": bool(sheet.still[u]),
-                "standing_side_predicted_mps": float(self.predicted[u, 2]),
             }
-            for c, channel in enumerate(("speed_mps", "turn_radps")):
+            if not sheet.of_wheels:
+                entry["side_stands_still"] = bool(sheet.still[u])
+                entry["standing_side_predicted_mps"] = float(self.predicted[u, 2])
+            for c, channel in enumerate(sheet.columns):
                 values = (
                     sheet.value[u, c],
                     self.predicted[u, c],
@@ -128,7 +132,7 @@ class SteadyComparison:
             "time_offset_s": None,
             "spread": {
                 name: {"within_robot": s.runs, "between_robots": s.robots}
-                for name, s in zip(("speed", "turn"), sheet.spread, strict=True)
+                for (name, _), s in zip(self.modelled.channels, sheet.spread, strict=False)
             },
             "cells": self.cells(),
         }
@@ -147,7 +151,7 @@ def compare_steady(states: SteadyStates) -> SteadyComparison:
 
 
 def _where(states: SteadyStates, ratios: np.ndarray) -> list[Regime]:
-    """By path and by the smallest duty, the worst first."""
+    """By path and by the smallest duty, the worst first; wheels on a bench have no path."""
     count = np.isfinite(ratios).sum(axis=1)
     squares = np.nansum(ratios**2, axis=1)
     regimes = [
@@ -165,7 +169,18 @@ def _where(states: SteadyStates, ratios: np.ndarray) -> list[Regime]:
 
 
 def _masks(states: SteadyStates) -> Iterator[tuple[str, str, np.ndarray]]:
-    sheet = states.measurement
+    duty = np.abs(states.commands)
+    if states.measurement.of_wheels:
+        of, size = ON_BENCH, duty.max(axis=1)
+    else:
+        yield from _by_path(states.measurement)
+        of, size = "slowest wheel", duty.min(axis=1)
+    yield of, f"duty below {SLOW:.0%}", size < SLOW
+    yield of, f"duty {SLOW:.0%} to {FAST:.0%}", (size >= SLOW) & (size <= FAST)
+    yield of, f"duty above {FAST:.0%}", size > FAST
+
+
+def _by_path(sheet: SteadyTable) -> Iterator[tuple[str, str, np.ndarray]]:
     turns = sheet.inputs[:, 2] != 0
     along = np.isin(sheet.inputs[:, 1] % 180, (90,))
     spot = turns & (np.nan_to_num(sheet.value[:, 0], nan=1.0) < SPOT_MPS)
@@ -173,7 +188,3 @@ def _masks(states: SteadyStates) -> Iterator[tuple[str, str, np.ndarray]]:
     yield "path", "straight, sideways or diagonal", ~turns & ~along
     yield "path", "on the spot", spot
     yield "path", "in a circle", turns & ~spot
-    slowest = np.abs(states.commands).min(axis=1)
-    yield "slowest wheel", f"duty below {SLOW:.0%}", slowest < SLOW
-    yield "slowest wheel", f"duty {SLOW:.0%} to {FAST:.0%}", (slowest >= SLOW) & (slowest <= FAST)
-    yield "slowest wheel", f"duty above {FAST:.0%}", slowest > FAST

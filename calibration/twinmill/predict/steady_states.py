@@ -14,17 +14,19 @@ from twinmill.model.parameters import MOTION_STAGES
 from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
+ON_BENCH = tuple((f"wheel {k}", "rad/s") for k in (1, 2, 3, 4))
 
 # Times the usual error, or the floor: beyond it the table is wrong rather than the model. Such an
 # error counts by its logarithm: a single one decides little, and has a slope to follow.
 TYPING_ERROR = 10.0
+DRIVEN_BY = {"wheel_speed": "measured wheel speeds", "twist": "velocities of the body"}
 
 
 @dataclass
 class SteadyStates:
-    """One robot of a table with its model: a data set. Values are (U, 3), as CHANNELS.
+    """One robot of a table with its model: a data set. Values are (U, C), as `channels`.
 
-    The third is the rim speed of the slower side where a note says that it stood still: an input
+    The third of CHANNELS is the rim speed of the slower side where a note says that it stood still: an input
     that could not be measured tells something, too. NaN is not measured.
     """
 
@@ -53,6 +55,11 @@ class SteadyStates:
         return f"{self.measurement.log_name} R{self.robot_id:02d}"
 
     @property
+    def channels(self) -> tuple[tuple[str, str], ...]:
+        """Names and units."""
+        return ON_BENCH if self.measurement.of_wheels else CHANNELS
+
+    @property
     def robot_id(self) -> int:
         """Number of the robot in the table."""
         return self.measurement.robot_id
@@ -60,7 +67,7 @@ class SteadyStates:
     @property
     def block(self) -> np.ndarray:
         """(R,) the input of each row: what the runs at one input have in common."""
-        return np.repeat(np.arange(len(self.commands)), len(CHANNELS))
+        return np.repeat(np.arange(len(self.commands)), len(self.channels))
 
     @property
     def part(self) -> np.ndarray:
@@ -70,8 +77,8 @@ class SteadyStates:
 
     @property
     def channel(self) -> np.ndarray:
-        """(R,) which of CHANNELS each row is."""
-        return np.tile(np.arange(len(CHANNELS)), len(self.commands))
+        """(R,) which of `channels` each row is."""
+        return np.tile(np.arange(len(self.channels)), len(self.commands))
 
     @property
     def n_eff(self) -> np.ndarray:
@@ -87,15 +94,15 @@ class SteadyStates:
         return replace(self, model=model)
 
     def predicted(self) -> np.ndarray:
-        """(U, 3) what the model predicts, as CHANNELS."""
+        """(U, C) what the model predicts, as `channels`."""
         return self._predicted(self.model, [], np.zeros((1, 0)))[0]
 
     def errors(self) -> np.ndarray:
-        """(U, 3) measured less predicted."""
+        """(U, C) measured less predicted."""
         return self._measured() - self.predicted()
 
     def ratios(self) -> np.ndarray:
-        """(U, 3) errors over their floor, for scores: large ones count by their logarithm.
+        """(U, C) errors over their floor, for scores: large ones count by their logarithm.
 
         What was only seen to be zero, and is predicted so, was not measured: NaN.
         """
@@ -136,16 +143,22 @@ class SteadyStates:
         return float(np.sqrt(np.sum(self.rows(model, [], np.zeros((1, 0))) ** 2)))
 
     def floor(self) -> np.ndarray:
-        """(U, 3) standard deviations of measured values, as CHANNELS."""
+        """(U, C) standard deviations of measured values, as `channels`."""
+        if self.measurement.of_wheels:
+            return self.measurement.floor
         still = np.full(len(self.commands), STILL_MPS)
         return np.column_stack([self.measurement.floor, still])
 
     def _measured(self) -> np.ndarray:
+        if self.measurement.of_wheels:
+            return self.measurement.value
         still = np.where(self.measurement.still, 0.0, np.nan)
         return np.column_stack([self.measurement.value, still])
 
     def _predicted(self, model: native.Model, names: list[str], rows: np.ndarray) -> np.ndarray:
         steady = native.steady(model, self.commands, names, rows)
+        if self.measurement.of_wheels:
+            return steady[..., 3:] / model.get("robot.wheel_radius_m")
         vx, vy, turn = np.moveaxis(steady[..., :3], -1, 0)
         rim = steady[..., 3:]
         forward, left = _direction(self.measurement.inputs)
@@ -167,14 +180,21 @@ def _direction(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _commands(sheet: SteadyTable, model: native.Model) -> np.ndarray:
     """(U, 4) commands in the unit of the model's drive; whose program rounds them no table says."""
+    if sheet.of_wheels and model.drive == "duty":
+        return sheet.inputs / 100.0
     if model.drive == "duty":
         asked = np.array([asked_by_vendor_move(*row) for row in sheet.inputs])
         return np.clip(asked / 100.0, -1, 1)
-    if model.drive == "twist":
+    if model.drive == "twist" and not sheet.of_wheels:
         forward, left = _direction(sheet.inputs)
         speed = np.abs(sheet.inputs[:, 0]) * model.get("base.speed_per_input_mps")
         turn = -sheet.inputs[:, 2] * model.get("base.turn_per_input_radps")
         return np.column_stack([forward * speed, left * speed, turn, np.zeros(len(turn))])
+    if sheet.of_wheels:
+        raise LogError(
+            f"{sheet.log_name}: the model is driven by {DRIVEN_BY[model.drive]}, and a bench test "
+            'has duties; take a model with drive = "duty".'
+        )
     raise LogError(
         f"{sheet.log_name}: the model is driven by measured wheel speeds, and a steady-state table "
         'has inputs; take a model with drive = "duty" or "twist".'

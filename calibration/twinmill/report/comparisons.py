@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from twinmill.fitting.compare import GOOD, SUSPECT, Comparison
 from twinmill.model.parameters import catalogue_of
-from twinmill.predict.steady_errors import SteadyComparison
+from twinmill.predict.steady_errors import ON_BENCH, SteadyComparison
 from twinmill.report import detections, steady, tables
 from twinmill.report.tables import Table, number
 
@@ -46,7 +46,7 @@ def robot_tables(comparison: Comparison) -> list[Table]:
     if not isinstance(comparison.shown, SteadyComparison):
         made += _of_shown(comparison)
     if sheets := steady_comparisons(comparison):
-        made += [steady.errors(sheets), steady.cells(sheets)]
+        made += [table for kind in steady.kinds(sheets) for table in steady.tables(kind)]
     if comparison.detections:
         made += detections.confusion_tables(comparison.detections)
     return made
@@ -93,8 +93,10 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
 
 
 def _steady_advice(robot: SteadyComparison) -> str:
-    worst = max((r for r in robot.where if r.group == "path"), key=lambda r: r.share)
+    first = robot.where[0].group
+    worst = max((r for r in robot.where if r.group == first), key=lambda r: r.share)
+    at = "at " if first == ON_BENCH else ""
     return (
-        f"{100 * worst.share:.0f} % of the error comes {worst.regime} ({number(worst.ratio)} times "
+        f"{100 * worst.share:.0f} % of the error comes {at}{worst.regime} ({number(worst.ratio)} times "
         "the floor); `twinmill diagnose` names what is missing."
     )

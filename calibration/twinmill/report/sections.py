@@ -123,7 +123,8 @@ def robot_pictures(result: Comparison, models: Sequence[tuple] = ()) -> list[Fig
         own = [replace(f, title=f"{f.title}: {robot.measurement.label}") for f in own]
     if sheets:
         number = sheets[0].measurement.robot_id
-        own += [steady.values(sheets), regimes(sheets[0], f"Steady inputs of robot {number}")]
+        own += [*map(steady.values, steady.kinds(sheets))]
+        own += [regimes(sheets[0], f"Steady inputs of robot {number}")]
     return own
 
 

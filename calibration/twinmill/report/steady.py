@@ -6,11 +6,24 @@ from collections import defaultdict
 import numpy as np
 
 from twinmill.predict.steady_errors import SteadyComparison
-from twinmill.predict.steady_states import CHANNELS
 from twinmill.report.canvas import MEASURED, draw, legend_above
 from twinmill.report.html import Figure
 from twinmill.report.tables import Cell, Table, number, tone
 
+STANDING = " Standing side: rim speed predicted where a side was seen to stand still."
+BY_VENDOR = (
+    "Inputs as the vendor writes them (90° is forward, turn positive clockwise); rates are "
+    "positive counter-clockwise."
+)
+HEADS = {  # of inputs and values, by column
+    "speed_input": "speed",
+    "direction_deg": "direction\n°",
+    "turn_input": "turn",
+    "speed_mps": "m/s",
+    "turn_radps": "rad/s",
+    **{f"{wheel}_pct": f"{wheel}\n%" for wheel in ("fl", "fr", "rl", "rr")},
+    **{f"w{k}_radps": f"wheel {k}\nrad/s" for k in (1, 2, 3, 4)},
+}
 WORST = 15  # inputs shown
 
 # Okabe and Ito (2008), one colour a robot.
@@ -27,7 +40,7 @@ def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, st
         ("table", f"{sheet.log_name}, robot{'s' * (len(robots) > 1)} {numbers}"),
         ("holds", f"{runs} runs at {sum(len(r.errors) for r in robots)} steady inputs"),
         ("model", model_name),
-        ("scatter", "; ".join(_scatter(robots[0], c) for c in (0, 1))),
+        ("scatter", "; ".join(_scatter(robots[0], c) for c in _measured(robots))),
         (
             "floor",
             "scatter of repeated runs"
@@ -39,13 +52,31 @@ def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, st
 def _scatter(robot: SteadyComparison, channel: int) -> str:
     spread = robot.measurement.spread[channel]
     between = f", between robots {100 * spread.robots:.1f} %" if np.isfinite(spread.robots) else ""
-    return f"{CHANNELS[channel][0]}: runs of one robot {100 * spread.runs:.1f} %{between}"
+    name, _ = robot.modelled.channels[channel]
+    return f"{name}: runs of one robot {100 * spread.runs:.1f} %{between}"
+
+
+def _measured(robots: list[SteadyComparison]) -> list[int]:
+    """Columns of their tables that have values."""
+    known = np.isfinite(np.concatenate([r.measurement.value for r in robots]))
+    return np.flatnonzero(known.any(axis=0)).tolist()
+
+
+def kinds(robots: list[SteadyComparison]) -> list[list[SteadyComparison]]:
+    """Those of drives, and those of wheels on a bench, if there are such."""
+    parts = ([r for r in robots if r.measurement.of_wheels is of] for of in (False, True))
+    return [part for part in parts if part]
+
+
+def tables(robots: list[SteadyComparison]) -> list[Table]:
+    """Errors by channel and by input, of robots of one kind of table."""
+    return [errors(robots), cells(robots)]
 
 
 def errors(robots: list[SteadyComparison]) -> Table:
     """Errors by channel, over all robots."""
     rows = []
-    for c, (channel, unit) in enumerate(CHANNELS):
+    for c, (channel, unit) in enumerate(robots[0].modelled.channels):
         found = np.concatenate([r.errors[:, c] for r in robots])
         floor = np.concatenate([r.modelled.floor()[:, c] for r in robots])
         known = np.isfinite(found)
@@ -66,19 +97,20 @@ def errors(robots: list[SteadyComparison]) -> Table:
         "How far predictions miss",
         ["channel", "unit", "values", "error", "floor", "ratio"],
         rows,
-        "RMS of medians of runs less prediction; the ratio is that of each value's own. Standing "
-        "side: rim speed predicted where a side was seen to stand still.",
+        "RMS of medians of runs less prediction; the ratio is that of each value's own."
+        + ("" if robots[0].measurement.of_wheels else STANDING),
         (0, 1),
     )
 
 
 def cells(robots: list[SteadyComparison]) -> Table:
     """Measured and predicted by input, mean over robots, the worst first."""
+    sheet, shown = robots[0].measurement, _measured(robots)
     entries = sorted(_by_input(robots), key=lambda e: -e[-1])
     rows = []
     for inputs, measured, predicted, spread, still, ratio in entries[:WORST]:
         row = [Cell(f"{v:g}") for v in inputs]
-        for c in (0, 1):
+        for c in shown:
             row += [
                 Cell(number(measured[c])),
                 Cell(number(predicted[c]), "" if np.isfinite(measured[c]) else "dim"),
@@ -95,28 +127,21 @@ def cells(robots: list[SteadyComparison]) -> Table:
     return Table(
         "By input",
         [
-            "speed",
-            "direction\n°",
-            "turn",
-            "m/s",
-            "model",
-            "robots",
-            "rad/s",
-            "model",
-            "robots",
+            *(HEADS[name] for name in sheet.input_names),
+            *(h for c in shown for h in (HEADS[sheet.columns[c]], "model", "robots")),
             "seen",
             "ratio",
         ],
         rows,
-        "Inputs as the vendor writes them (90° is forward, turn positive clockwise); rates are "
-        "positive counter-clockwise. Robots: how much they differ. Worst first"
+        ("Duties of the wheels." if sheet.of_wheels else BY_VENDOR)
+        + " Robots: how much they differ. Worst first"
         + (f"; {rest} more in --json." if rest else "."),
-        (9,),
+        (len(sheet.input_names) + 3 * len(shown),),
     )
 
 
 def _by_input(robots: list[SteadyComparison]) -> list[tuple]:
-    """Input, measured, predicted and spread (2,), whether a side stood still, RMS ratio."""
+    """Input; measured, predicted and spread by column; whether a side stood still; RMS ratio."""
     groups: dict[tuple, list[tuple[SteadyComparison, int]]] = defaultdict(list)
     for robot in robots:
         for u, inputs in enumerate(robot.measurement.inputs):
@@ -131,7 +156,7 @@ def _by_input(robots: list[SteadyComparison]) -> list[tuple]:
             (
                 inputs,
                 _mean(np.array([s.value[u] for s, u in sheets])),
-                np.mean([r.predicted[u, :2] for r, u in members], axis=0),
+                np.mean([r.predicted[u] for r, u in members], axis=0),
                 _mean(np.array([s.cell_spread[u] for s, u in sheets])),
                 any(s.still[u] for s, u in sheets),
                 float(np.sqrt(np.nanmean(ratios**2))),
@@ -148,9 +173,12 @@ def _mean(values: np.ndarray) -> np.ndarray:
 
 def values(robots: list[SteadyComparison]) -> Figure:
     """Each input once per robot: what the model says, across, and what was measured, up."""
+    shown = _measured(robots)
 
     def paint(panels) -> None:
-        for c, (axes, unit) in enumerate(zip(panels, ("m/s", "rad/s"), strict=True)):
+        panels = np.atleast_1d(panels)
+        for axes, c in zip(panels, shown, strict=True):
+            name, unit = robots[0].modelled.channels[c]
             for k, robot in enumerate(robots):
                 sheet = robot.measurement
                 axes.errorbar(
@@ -169,12 +197,12 @@ def values(robots: list[SteadyComparison]) -> Figure:
             )
             ends = [np.nanmin(known), np.nanmax(known)]
             axes.plot(ends, ends, color=MEASURED, lw=1, ls="--")
-            axes.set(xlabel=f"predicted {unit}", ylabel=f"measured {unit}")
+            axes.set(xlabel=f"predicted {name}, {unit}", ylabel=f"measured {name}, {unit}")
         legend_above(panels[0], len(robots))
 
     return Figure(
-        draw(6.4, paint, nrows=2),
-        "Steady speed and turn rate",
+        draw(3.2 * len(shown), paint, nrows=len(shown)),
+        "Steady speeds",
         "Each dot is one robot at one input; a right model has all dots on the dashed line, within "
         "their bars. Dots of a level row were measured alike but predicted differently.",
     )

@@ -359,17 +359,16 @@ def check_lever(checked: CheckedTrack, search: Search, own: Explained) -> list[I
     if not led_m or own.left > CHECKS.explained:
         return []
     x_m, y_m = led_m.imag, -led_m.real  # a turn to the left leads what is ahead to the left
-    return [
-        checked.finding(
-            f"the tracked point is {abs(led_m):.2f} m from the point that the robot turns about, "
-            f"x {x_m:.2f} m and y {y_m:.2f} m",
-            f"the commands explain {1 - own.left:.0%} of the motion with that",
-            'say so in the model (an [[effect]] with name = "marker_offset", '
-            f"x_m = {x_m:.3f}, y_m = {y_m:.3f}), which a fit makes exact, or move the tracked "
-            "body's origin",
-            fatal=False,
-        )
-    ]
+    told = checked.finding(
+        f"the tracked point is {abs(led_m):.2f} m from the point that the robot turns about, "
+        f"x {x_m:.2f} m and y {y_m:.2f} m",
+        f"the commands explain {1 - own.left:.0%} of the motion with that",
+        'say so in the model (an [[effect]] with name = "marker_offset", '
+        f"x_m = {x_m:.3f}, y_m = {y_m:.3f}), which a fit makes exact, or move the tracked "
+        "body's origin",
+        fatal=False,
+    )
+    return [replace(told, lever_m=(x_m, y_m))]
 
 
 def check_foreign(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:

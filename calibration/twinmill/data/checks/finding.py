@@ -24,6 +24,8 @@ class InputFinding:
             do comes later, or sooner, from some time on.
         lateness: how it changes, where that is known.
         two_clocks: poses and commands were stamped by two clocks, whatever was declared.
+        lever_m: the tracked point ahead and left of the point that the robot turns about, where
+            that is far.
     """
 
     what: str
@@ -36,6 +38,7 @@ class InputFinding:
     steady: bool = True
     lateness: Lateness | None = None
     two_clocks: bool = False
+    lever_m: tuple[float, float] | None = None
 
     def to_json(self) -> dict:
         """Fields of the interface."""

@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 import turbopi
 
+from twinmill.data.bench_table import is_bench
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.columns import Mapping
 from twinmill.data.importers.mapped import read_mapped
@@ -25,7 +26,6 @@ from twinmill.data.importers.series import (
 from twinmill.data.importers.stamps import sound_rows
 from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import LOST, CellError, Table, is_number
-from twinmill.data.steady_table import refuse_bench
 from twinmill.model.mixing import duties_from_inputs
 
 HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
@@ -108,7 +108,11 @@ def read_poses(path: Path, columns: Columns) -> list[PoseSeries]:
 
 
 def _poses(table: Table, columns: Columns) -> list[PoseSeries]:
-    refuse_bench(table.name, table.header)
+    if is_bench(table.header):
+        raise LogError(
+            f"{table.name}: has duties and wheel speeds and no poses, as a bench test; it needs no "
+            "import: give it to compare, fit or diagnose as it is."
+        )
     table, utime_us, ids, notes = _stamped(table, columns)
     height = table.numbers("z_m", True) if table.has("z_m") else np.zeros(len(ids))
     position = np.column_stack([table.numbers("x_m", True), table.numbers("y_m", True), height])
