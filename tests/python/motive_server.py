@@ -2,7 +2,8 @@
 """A NatNet server whose packets are laid out by hand.
 
 Layout: NaturalPoint's NatNet SDK, "Direct Depacketization" and NatNetTypes.h: little-endian,
-packed, and from 4.1 on the size of each part stands behind its count.
+packed, and from 4.1 on the size of each part stands behind its count. The maker's own client reads
+them in interop/capture.py.
 """
 
 import socket
@@ -73,7 +74,9 @@ def frame(number, bodies, version):
     parts = 5 if version >= (4, 1) else 4  # skeletons, assets, labelled markers, plates, devices
     payload += counted([], version) * parts
     stamp_s = START_S + PERIOD_S * number
-    payload += struct.pack("<IIdQQQH", 0, 0, stamp_s, 1, 2, 3, 0) + struct.pack("<I", 0)
+    payload += struct.pack("<IIdQQQ", 0, 0, stamp_s, 1, 2, 3)
+    payload += struct.pack("<II", 4, 5) if version >= (4, 1) else b""  # the precise stamp
+    payload += struct.pack("<HI", 0, 0)
     return packet(7, payload)
 
 

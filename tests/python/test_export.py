@@ -178,6 +178,10 @@ def test_csv_of_a_robot_that_starts_at_rest_has_numbers_for_readers_that_guess_b
     volts = pd.read_csv(tmp_path / "t" / "telemetry.csv", keep_default_na=False, na_values=[""])
     assert volts["battery_V"].dtype == float and volts["battery_V"].count() == 40
     assert "nan" not in (tmp_path / "t" / "telemetry.csv").read_text()
+    columns = np.genfromtxt(
+        tmp_path / "t" / "pose.csv", delimiter=",", names=True
+    )  # knows no quotes
+    assert columns["x_m"][-4] == pytest.approx(0.003 * 196) and columns["t_s"][0] == 0
 
 
 def test_parquet_keeps_integers_and_where_it_comes_from(log, tmp_path):

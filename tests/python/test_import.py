@@ -350,9 +350,14 @@ Frame,Time (Seconds),X,X,Y,Z,W,X,Y,Z,
 
 # Saved again by a spreadsheet of a country that writes decimal commas.
 SAVED_AGAIN = MOTIVE.replace(",", ";").replace("0.", "0,")
+# Format 1.25 has a row of parents; with time codes a column stands behind the times.
+WITH_PARENTS = MOTIVE.replace("1.23", "1.25").replace("\n,,Pos", "\n,Parent,,,,,,,,,\n,,Pos")
+WITH_TIME_CODE = re.sub(r"(?m)^(Frame,[^,]*|\d+,[^,]*|,[^,\n]*)", r"\1,", MOTIVE)
 
 
-@pytest.mark.parametrize("take", [MOTIVE, "\ufeff" + MOTIVE, SAVED_AGAIN])
+@pytest.mark.parametrize(
+    "take", [MOTIVE, "\ufeff" + MOTIVE, SAVED_AGAIN, WITH_PARENTS, WITH_TIME_CODE]
+)
 def test_motive_y_up_millimetres_become_z_up_metres(put, tmp_path, take):
     import_log(None, put("c.csv", COMMANDS), tmp_path / "o.lcmlog", motive=put("take.csv", take))
     robot = read_log(tmp_path / "o.lcmlog").robots[4]

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as compute
-import pyarrow.csv
 import pyarrow.parquet
 import turbopi
 
@@ -110,21 +110,11 @@ def _by_kind(value: np.ndarray, kind: np.ndarray) -> Iterator[tuple[str, np.ndar
 
 
 def write_csv(table: pa.Table, path: Path) -> None:
-    """With one header row; numbers of a float keep their point.
+    """With one header row; numbers of a float keep their point, and only words have quotes.
 
-    Readers that guess types by the first rows would take `0` for an integer.
+    Readers that guess types by the first rows would take `0` for an integer, which pyarrow writes.
     """
-    options = pyarrow.csv.WriteOptions(quoting_style="needed")
-    pyarrow.csv.write_csv(
-        pa.table(dict(zip(table.column_names, map(_said, table), strict=True))), path, options
-    )
-
-
-def _said(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """The words of a column of floats; any other column as it is."""
-    if not pa.types.is_floating(column.type):
-        return column
-    return compute.replace_substring_regex(column.cast(pa.string()), r"^(-?\d+)$", r"\1.0")
+    table.to_pandas(types_mapper=pd.ArrowDtype).to_csv(path, index=False)
 
 
 def write_parquet(table: pa.Table, path: Path) -> None:

@@ -141,6 +141,7 @@ def _installed(pinned: list[str]) -> Path:
             "pip",
             "install",
             "--quiet",
+            "--no-compile",
             "--no-warn-conflicts",
             "--upgrade",
             "--target",

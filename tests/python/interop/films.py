@@ -11,7 +11,7 @@ SIZE_PX = (160, 120)
 COUNT, RATE_HZ = 60, 30
 CONTAINERS = ("mkv", "mp4", "avi")
 RATES_HZ = {"even": 30, "slowed": 15}  # of the second half: a webcam, as it gets dark
-TURNED = "turned.mp4"
+TURNED = "turned"
 LONG_ENOUGH = 0.02  # of the duration may be missing
 
 
@@ -25,38 +25,54 @@ def _read(folder: Path) -> Told:
     from twinmill.track.film import Film
 
     told = {}
-    for path in sorted(folder.glob("*_*.*")):
-        rate, container = path.stem.split("_")[0], path.suffix[1:].upper()
+    for path in sorted(folder.glob("*_.*")):
+        rate, container = path.stem[:-1], path.suffix[1:].upper()
         film = Film(path)
+        if rate == TURNED:
+            told[f"{container}, turned by a quarter"] = film.size_px == SIZE_PX[::-1]
+            continue
         stamps_s = [at_s for at_s, _ in film.frames()]
         right = [float(_stamp(k, RATES_HZ[rate])) for k in range(COUNT)]
         told[f"{container}, {rate}: stamps"] = len(stamps_s) == COUNT and all(
             abs(a - b) < 1e-3 for a, b in zip(stamps_s, right, strict=True)
         )
         told[f"{container}, {rate}: whole"] = film.missing_s < LONG_ENOUGH * film.duration_s
-    if (folder / TURNED).exists():
-        told["turned by a quarter"] = Film(folder / TURNED).size_px == SIZE_PX[::-1]
     return told
 
 
 @reads("film", "ffmpeg", "ffmpeg", ours=_read)
 def ffmpeg(folder: Path) -> None:
-    """Debian's program."""
+    """Debian's program, which can say of MP4 alone that it is to be turned."""
+    _write("ffmpeg", folder)
+    turned = ["-c", "copy", "-metadata:s:v", "rotate=90"]
+    _run("ffmpeg", "-i", folder / "even_.mp4", *turned, folder / f"{TURNED}_.mp4")
+
+
+@reads("film", "FFmpeg 9 (imageio-ffmpeg)", "imageio-ffmpeg==0.8.1", ours=_read)
+def ffmpeg_9(folder: Path) -> None:
+    """The newest, as it comes with a wheel."""
+    import imageio_ffmpeg
+
+    program = imageio_ffmpeg.get_ffmpeg_exe()
+    _write(program, folder)
+    for container in CONTAINERS:
+        given = ["-display_rotation", "90", "-i", folder / "even_.mp4", "-c", "copy"]
+        _run(program, *given, folder / f"{TURNED}_.{container}")
+
+
+def _write(program: str, folder: Path) -> None:
+    """Each rate in each container."""
     for rate, second_hz in RATES_HZ.items():
         half = COUNT // 2
         stamp = f"round(if(lt(N,{half}),N/{RATE_HZ},1+(N-{half})/{second_hz})/TB)"
         pictures = f"testsrc=size={SIZE_PX[0]}x{SIZE_PX[1]}:rate={RATE_HZ},setpts='{stamp}'"
         for container in CONTAINERS:
-            given = ["-f", "lavfi", "-i", pictures, "-frames:v", str(COUNT), "-vsync", "vfr"]
-            _ffmpeg(*given, "-c:v", "mpeg4", str(folder / f"{rate}_.{container}"))
-    _ffmpeg(
-        *("-i", str(folder / "even_.mp4"), "-c", "copy", "-metadata:s:v", "rotate=90"),
-        str(folder / TURNED),
-    )
+            given = ["-f", "lavfi", "-i", pictures, "-frames:v", str(COUNT), "-fps_mode", "vfr"]
+            _run(program, *given, "-c:v", "mpeg4", folder / f"{rate}_.{container}")
 
 
-def _ffmpeg(*arguments: str) -> None:
-    subprocess.run(["ffmpeg", "-loglevel", "error", *arguments], check=True)
+def _run(program: str, *arguments: str | Path) -> None:
+    subprocess.run([program, "-loglevel", "error", *arguments], check=True)
 
 
 @reads("film", "PyAV", "av==18.1.0", "numpy==2.4.6", ours=_read)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS bags: read and written by Foxglove's ROS 2 library and by rosbags, without ROS."""
+"""ROS bags: of Foxglove's ROS 2 library, rosbags, PlotJuggler's parser, and ROS 1."""
 
+import os
+import subprocess
 from pathlib import Path
 
 from interop import drive
@@ -81,6 +83,38 @@ def rosbags(folder: Path) -> Told:
     return _told(rows)
 
 
+@writes("rosbag2", "PlotJuggler's parser", "mcap-bag-parser==0.3.1", "mcap==1.6.0", ours=_write)
+def plotjuggler(folder: Path) -> Told:
+    """`rosx_introspection`, whose names of fields are those of PlotJuggler's curves."""
+    import msgpack
+    from mcap.reader import make_reader
+    from rosx_introspection import Parser
+
+    curves: dict[str, list] = {}
+    (path,) = (folder / BAG).glob("*.mcap")
+    with path.open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            parser = Parser(channel.topic, schema.name, schema.data.decode())
+            for name, value in msgpack.unpackb(parser.parse_to_msgpack(message.data)).items():
+                curves.setdefault(name, []).append(value)
+    here = [k for k in range(drive.COUNT) if drive.seen(k)]
+    stamps_us = [
+        sec * 10**6 + nanosec // 1000
+        for sec, nanosec in zip(
+            curves["/r01/pose/header/stamp/sec"],
+            curves["/r01/pose/header/stamp/nanosec"],
+            strict=True,
+        )
+    ]
+    places = zip(here, curves["/r01/pose/pose/position/x"], strict=True)
+    return {
+        "stamps of headers": stamps_us == [drive.START_US + k * drive.STEP_US for k in here],
+        "places": all(abs(x_m - drive.x_m(k)) < 1e-9 for k, x_m in places),
+        "duties": [50 * (k >= drive.STANDS) for k in range(drive.COUNT)]
+        == curves["/r01/duty_pct/data[3]"],
+    }
+
+
 def _reads(name: str):
     def ours(folder: Path) -> Told:
         import twinmill as tm
@@ -153,6 +187,32 @@ def rosbags_writes_ros1(folder: Path) -> None:
             writer.write(of[topic], at_ns, store.serialize_ros1(message, TOPICS[topic]))
 
 
+@reads("rosbag1", "ROS 1, `rosbag`", "python3-rosbag", "python3-geometry-msgs", ours=_reads("ros1"))
+def ros_writes(folder: Path) -> None:
+    """ROS's own library, in the Python that Debian built it for."""
+    code = f"from interop.rosbag import by_ros; by_ros({str(folder / FILES['ros1'])!r})"
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
+    subprocess.run(["/usr/bin/python3", "-c", code], env=environment, check=True)
+
+
+def by_ros(path: str) -> None:
+    """The drive, each message written as a node would."""
+    import rosbag
+    from geometry_msgs.msg import PoseStamped, Twist
+    from rospy import Time
+
+    with rosbag.Bag(path, "w") as bag:
+        for k in range(drive.COUNT):
+            at = Time(*divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9))
+            pose, told = PoseStamped(), Twist()
+            pose.header.stamp, pose.header.frame_id = at, "map"
+            pose.pose.position.x = drive.x_m(k) if drive.seen(k) else float("nan")
+            pose.pose.orientation.w = 1.0
+            told.linear.x = drive.SPEED_MPS * (k >= drive.STANDS)
+            bag.write("/r01/pose", pose, at)
+            bag.write("/r01/cmd_vel", told, at)
+
+
 def _messages(types: dict, **header):
     """Stamps in ns, topics, and messages of rosbags."""
     point, turn, vector = (
@@ -174,6 +234,11 @@ def _messages(types: dict, **header):
 
 
 NOT_RUN = [
-    Cell("rosbag2", "writes", "PlotJuggler", why_not="it is a window and no registry has it"),
+    Cell(
+        "rosbag2",
+        "writes",
+        "PlotJuggler, the program",
+        why_not="no registry has it; its parser was run",
+    ),
     Cell("rosbag2", "reads", "`ros2 bag`", why_not="ROS is in no registry that is used here"),
 ]

@@ -32,8 +32,10 @@ def sdformat(folder: Path) -> Told:
     masses_kg = [float(mass.text) for mass in held.iter("mass")]
     frame = "<fdir1 ignition:expressed_in='base_link' gz:expressed_in='base_link'>"
     check = ctypes.CDLL(ctypes.util.find_library("sdformat12")).cmdCheck
+    _write_room(folder, folder / FILE)
     return {
         "valid by its schema": check(str(folder / FILE).encode()) == 0,
+        "valid in the page's world": check(str(folder / "room.sdf").encode()) == 0,
         "mass": math.isclose(sum(masses_kg), MASS_KG),
         "wheels' joints": len(held.findall("model/joint")) == len(WHEELS),
         "top speed of wheels": held.find(".//limit/velocity") is not None,
@@ -86,9 +88,7 @@ def _drives(folder: Path, wheels: str, velocity: tuple[float, float, float]) -> 
         f"{name}_wheel_joint={rim_mps / WHEEL_RADIUS_M}"
         for name, rim_mps in _rims_mps(wheels, *velocity).items()
     ]
-    page = (ROOT / "docs/simulators.md").read_text()
-    (folder / "room.sdf").write_text(page.split("```xml\n")[1].split("```")[0])
-    shutil.copy(folder / f"{wheels}.sdf", folder / "better.sdf")
+    _write_room(folder, folder / f"{wheels}.sdf")
     engine = f"/usr/lib/{sys.implementation._multiarch}/{ENGINE}"
     command = ["./gazebo_drive", engine, "room.sdf", "second", "base_link", "2", *told]
     printed = subprocess.check_output(command, cwd=folder, text=True).split()
@@ -98,6 +98,13 @@ def _drives(folder: Path, wheels: str, velocity: tuple[float, float, float]) -> 
     x, y = x1 - x0, y1 - y0
     moved = (c * x + s * y, c * y - s * x, turned)
     return all(abs(a / 0.1 - b) < 0.01 for a, b in zip(moved, velocity, strict=True))
+
+
+def _write_room(folder: Path, robot: Path) -> None:
+    """The world of docs/simulators.md, beside the robot that it includes."""
+    page = (ROOT / "docs/simulators.md").read_text()
+    (folder / "room.sdf").write_text(page.split("```xml\n")[1].split("```")[0])
+    shutil.copy(robot, folder / "better.sdf")
 
 
 def _rims_mps(wheels: str, vx: float, vy: float, omega: float) -> dict[str, float]:

@@ -23,6 +23,11 @@ def _write(to: str) -> Callable[[Path], None]:
     return lambda folder: drive.export(folder, to, FOLDER)
 
 
+UNTOLD = "speed_input"  # of this drive, in every row
+UNTOLD_TYPE = "a column without any value, as numbers"
+NAMED_TYPE = f"{UNTOLD_TYPE}, if named"
+
+
 def _told(x_m: list, volts: list, seq: list, float_types: bool, whole_type: bool) -> Told:
     """What is in columns; what is missing is None or NaN."""
     missing = [value is None or value != value for value in x_m]
@@ -58,7 +63,8 @@ def pandas_parquet(folder: Path) -> Told:
 def _of_pandas(poses, told) -> Told:
     floats = poses["x_m"].dtype == told["battery_V"].dtype == poses["y_m"].dtype == float
     whole = poses["seq"].dtype.kind == "i"
-    return _told(list(poses["x_m"]), list(told["battery_V"]), list(poses["seq"]), floats, whole)
+    columns = poses["x_m"], told["battery_V"], poses["seq"]
+    return _told(*map(list, columns), floats, whole) | {UNTOLD_TYPE: told[UNTOLD].dtype == float}
 
 
 @writes("CSV", "polars", POLARS, ours=_write("csv"))
@@ -66,7 +72,11 @@ def polars_csv(folder: Path) -> Told:
     """`read_csv`, which looks at 100 rows."""
     import polars as pl
 
-    return _of_polars(*(pl.read_csv(folder / FOLDER / f"{n}.csv") for n in ("pose", "telemetry")))
+    poses, told = (folder / FOLDER / f"{n}.csv" for n in ("pose", "telemetry"))
+    named = pl.read_csv(told, schema_overrides={UNTOLD: pl.Float64})
+    return _of_polars(pl.read_csv(poses), pl.read_csv(told)) | {
+        NAMED_TYPE: named[UNTOLD].dtype == pl.Float64 and named[UNTOLD].null_count() == drive.COUNT
+    }
 
 
 @writes("Parquet", "polars", POLARS, ours=_write("parquet"))
@@ -82,13 +92,19 @@ def _of_polars(poses, told) -> Told:
     floats = poses["x_m"].dtype.is_float() and told["battery_V"].dtype.is_float()
     whole = poses["seq"].dtype.is_integer()
     columns = poses["x_m"], told["battery_V"], poses["seq"]
-    return _told(*(column.to_list() for column in columns), floats, whole)
+    return _told(*(column.to_list() for column in columns), floats, whole) | {
+        UNTOLD_TYPE: told[UNTOLD].dtype.is_float()
+    }
 
 
 @writes("CSV", "DuckDB", DUCKDB, ours=_write("csv"))
 def duckdb_csv(folder: Path) -> Told:
     """`FROM 'pose.csv'`."""
-    return _of_duckdb(folder, "csv")
+    import duckdb
+
+    told = f"read_csv('{folder / FOLDER}/telemetry.csv', types = {{'{UNTOLD}': 'DOUBLE'}})"
+    (row,) = duckdb.sql(f"SELECT count(*), avg({UNTOLD}) FROM {told}").fetchall()
+    return _of_duckdb(folder, "csv") | {NAMED_TYPE: row == (drive.COUNT, None)}
 
 
 @writes("Parquet", "DuckDB", DUCKDB, ours=_write("parquet"))
@@ -102,7 +118,7 @@ def _of_duckdb(folder: Path, ending: str) -> Told:
 
     file = f"'{folder / FOLDER / 'pose'}.{ending}'"
     poses = duckdb.sql(f"SELECT x_m, seq FROM {file}")
-    told = duckdb.sql(f"SELECT battery_V FROM '{folder / FOLDER / 'telemetry'}.{ending}'")
+    told = duckdb.sql(f"SELECT battery_V, {UNTOLD} FROM '{folder / FOLDER / 'telemetry'}.{ending}'")
     kinds = [str(kind) for kind in (*poses.types, *told.types)]
     x_m, seq = zip(*poses.fetchall(), strict=True)
     volts = [row[0] for row in told.fetchall()]
@@ -110,7 +126,8 @@ def _of_duckdb(folder: Path, ending: str) -> Told:
     lost = duckdb.sql(f"SELECT count(*) FROM {file} WHERE x_m IS NULL").fetchall()
     whole = kinds[1] in ("BIGINT", "INTEGER")
     return _told(list(x_m), volts, list(seq), floats, whole) | {
-        "gaps, asked for": lost == [(drive.LOST,)]
+        "gaps, asked for": lost == [(drive.LOST,)],
+        UNTOLD_TYPE: kinds[3] in ("DOUBLE", "FLOAT"),
     }
 
 
@@ -145,7 +162,9 @@ def _of_pyarrow(poses, told) -> Told:
     floats = {poses["x_m"].type, poses["y_m"].type, told["battery_V"].type} == {pa.float64()}
     whole = pa.types.is_integer(poses["seq"].type)
     columns = poses["x_m"], told["battery_V"], poses["seq"]
-    return _told(*(column.to_pylist() for column in columns), floats, whole)
+    return _told(*(column.to_pylist() for column in columns), floats, whole) | {
+        UNTOLD_TYPE: pa.types.is_floating(told[UNTOLD].type)
+    }
 
 
 def _read(folder: Path) -> Told:

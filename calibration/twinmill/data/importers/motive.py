@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rigid bodies from a CSV export of OptiTrack Motive (format versions 1.21 to 1.24).
+"""Rigid bodies from a CSV export of OptiTrack Motive (format versions 1.21 to 1.25).
 
 Line 1 holds pairs of key and value; then rows of types, names, identifiers and components stand
 over the row `Frame,Time (Seconds),...` that names the axes. Columns are found by these rows, in
