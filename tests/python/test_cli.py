@@ -15,6 +15,7 @@ import typer
 from hypothesis import given
 from hypothesis import strategies as st
 
+from twinmill.extras import missing
 from twinmill.files import plain
 from twinmill.report.tables import number
 from twinmill_cli import main as cli
@@ -476,9 +477,7 @@ def test_a_package_that_is_not_installed_is_one_sentence(monkeypatch, capsys):
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert left.value.code == 1
-    assert capsys.readouterr().err.strip() == (
-        "twinmill: the Python package of 'cv2' is not installed; `make build` does that."
-    )
+    assert capsys.readouterr().err.strip() == (f"twinmill: {missing('cv2')}")
 
 
 @pytest.mark.parametrize(
