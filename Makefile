@@ -46,7 +46,7 @@ demo:
 	@scripts/setup demo
 	@cmake --build build --target twin_run twinmill_native lcm_types_generated
 	@$(INSTALL)
-	@$(PYTHON) -m twinmill_cli.demo
+	@.venv/bin/twinmill demo
 
 # Ourselves against named alternatives, which are installed into .deps, not .venv.
 bench: build

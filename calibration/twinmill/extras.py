@@ -30,15 +30,15 @@ def missing(module: str, extra: str | None = None) -> str:
     """
     package = module.partition(".")[0]
     extra = extra or next((name for name, of in EXTRAS.items() if package in of), None)
-    wanted = f"'twinmill[{extra}]'" if extra else "twinmill"
-    return f"the Python package of '{package}' is not installed; install it with: {_pip()} {wanted}"
+    return f"the Python package of '{package}' is not installed; install it with: {command(extra)}"
 
 
-def _pip() -> str:
-    """The command for this environment, wherever its pip stands on the path."""
+def command(extra: str | None) -> str:
+    """What installs an extra, or without one all that everybody gets, into this environment."""
     pip = shutil.which("pip")
     own = pip and Path(pip).parent == Path(sys.executable).parent
-    return f"{'pip' if own else f'{sys.executable} -m pip'} install"
+    wanted = f"'twinmill[{extra}]'" if extra else "twinmill"
+    return f"{'pip' if own else f'{sys.executable} -m pip'} install {wanted}"
 
 
 class MissingExtra(ModuleNotFoundError):

@@ -140,6 +140,13 @@ def test_a_task_whose_extra_is_missing_names_it_in_one_sentence(program, folder,
     ), done.stderr
 
 
+def test_a_sweep_without_its_extra_names_it(program, folder):
+    sweep = program.replace("twinmill_cli.main", "twinmill_cli.twin_sweep")
+    done = told(sweep, folder, "--x v_mps=0.1,0.2 --out sweep")
+    assert done.returncode == 1 and "install 'twinmill[sweep]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
 def test_the_library_works_without_extras_and_names_the_missing_one(program, folder):
     alone = program.replace("from twinmill_cli.main import main\nmain()", LIBRARY)
     done = subprocess.run([sys.executable, "-c", alone], cwd=folder, capture_output=True, text=True)
