@@ -6,7 +6,7 @@ PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error \
 	    --parallel $(shell expr $$(nproc) + 1)
 
-.PHONY: bench build check check-long demo docs format lint clean paper rivals wheel
+.PHONY: bench build check check-long clean demo docs format lint paper rivals tests wheel
 
 # The native module and the messages into the environment; and our Python compiled: where Python is
 # told to write no bytecode, it would compile a hundred modules at each start.
@@ -15,16 +15,22 @@ INSTALL = cmake --install build --component python --prefix "$(PACKAGES)" >/dev/
 	    $(PYTHON) -m compileall -q calibration tools "$(PACKAGES)/turbopi"
 
 build:
-	@scripts/setup
+	@scripts/setup build
+	@cmake --build build
+	@$(INSTALL)
+
+# With the tests, and what they need beside.
+tests:
+	@scripts/setup check
 	@cmake --build build
 	@$(INSTALL)
 
 # All tests in C, C++ and Python, and the lint.
-check: build
+check: tests
 	@$(CTEST) --label-exclude '^long$$'
 
 # What takes minutes and seldom fails: the emulated robot with a newer kernel and a whole system.
-check-long: build
+check-long: tests
 	@$(CTEST) --label-regex '^long$$'
 
 # What was published of these swarms, part by part, checked, with figures. Most of it is MuJoCo's: with
@@ -40,7 +46,7 @@ demo:
 	@scripts/setup demo
 	@cmake --build build --target twin_run twinmill_native lcm_types_generated
 	@$(INSTALL)
-	@$(PYTHON) -m twinmill_cli.demo
+	@.venv/bin/twinmill demo
 
 # Ourselves against named alternatives, which are installed into .deps, not .venv.
 bench: build
@@ -61,13 +67,13 @@ rivals: build
 	@OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 PYTHONPATH=benchmarks:.deps/rivals $(PYTHON) -m rivals \
 	    $(RIVALS)
 
-format: build
+format: tests
 	@scripts/lint --fix
 	@$(PYTHON) docs/site_hooks.py
 	@$(PYTHON) tests/app/test_states.py
 	@$(PYTHON) tests/python/test_packages.py
 
-lint: build
+lint: tests
 	@scripts/lint
 
 # The documentation site in build/site; what it shows is run. Its generator goes into .deps.

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill watch` on a live bus: robots and twins at once, against what they logged themselves."""
 
+from importlib.util import find_spec
+
 import lcm
 import numpy as np
 import pytest
 import turbopi
 from network import run_twin_session
 
-from twinmill_cli import watch as command
+from twinmill.extras import missing
 
-needs_viewer = pytest.mark.skipif(
-    command.find_spec("rerun") is None, reason=f"no viewer: pip install {command.RERUN}"
-)
+needs_viewer = pytest.mark.skipif(find_spec("rerun") is None, reason=missing("rerun"))
 EVERYONE = ["R00", "R01", "TWIN_R00", "TWIN_R01"]
 DRIVERS = {"robots": "", "twins": "TWIN_"}
 

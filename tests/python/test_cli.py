@@ -15,6 +15,7 @@ import typer
 from hypothesis import given
 from hypothesis import strategies as st
 
+from twinmill.extras import missing
 from twinmill.files import plain
 from twinmill.report.tables import number
 from twinmill_cli import main as cli
@@ -402,6 +403,7 @@ HELPS = [[], *([name] for name, _, _ in cli.COMMANDS), ["swarm", "stop"], ["swar
 def test_no_help_imports_what_only_work_needs():
     code = (
         "import json, sys\n"
+        "sys.argv = ['twinmill', '--help']\n"
         "from twinmill_cli.main import run\n"
         "def loaded(words):\n"
         "    before = set(sys.modules)\n"
@@ -463,9 +465,15 @@ def test_a_command_works_after_its_help_was_shown(twinmill):
     assert code == 0 and strict(out)["name"] == "coasting"
 
 
-def test_help_may_be_the_value_of_an_option(twinmill):
-    code, _, err = twinmill("effects", "--json", "--", "--help")
-    assert code == 1 and "effect '--help': not in the catalogue" in err
+@pytest.mark.parametrize(("line", "code", "says"), [
+    ("effects --json -- --help", 1, "effect '--help': not in the catalogue"),
+    ("add coasting run.lcmlog -o --help", 2, "--help is the value of an option here"),
+])  # fmt: skip
+def test_help_may_be_a_value_and_is_said_to_be_one(line, code, says):
+    program = [sys.executable, "-c", "from twinmill_cli.main import main; main()"]
+    done = subprocess.run([*program, *line.split()], capture_output=True, text=True, check=False)
+    assert done.returncode == code and says in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_a_package_that_is_not_installed_is_one_sentence(monkeypatch, capsys):
@@ -476,9 +484,7 @@ def test_a_package_that_is_not_installed_is_one_sentence(monkeypatch, capsys):
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert left.value.code == 1
-    assert capsys.readouterr().err.strip() == (
-        "twinmill: the Python package of 'cv2' is not installed; `make build` does that."
-    )
+    assert capsys.readouterr().err.strip() == (f"twinmill: {missing('cv2')}")
 
 
 @pytest.mark.parametrize(

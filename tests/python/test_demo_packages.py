@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""With the Python packages of `make demo` alone the loop works, and the rest says what it needs."""
+"""Without extras, as after `make demo`, the loop works, and the rest says which extra it needs."""
 
+import ast
 import re
 import subprocess
 import sys
+import tomllib
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+from twinmill.extras import EXTRAS
 from twinmill.programs import find_program
 from twinmill_cli import main as cli
 
@@ -27,6 +30,18 @@ sys.meta_path.insert(0, Absent())
 from twinmill_cli.main import main
 main()
 """
+LIBRARY = """
+import twinmill as tm
+log = tm.load("swarm.lcmlog")
+assert log.commands().size and log.metrics().size and tm.Model.load("turbopi.toml").table().size
+try:
+    log.export("out", to="parquet")
+except ImportError as error:
+    print(error)
+"""
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+BUILDS = {"nanobind", "scikit-build-core"}  # beside what a wheel needs
+MOST = 10  # packages that everybody gets
 
 
 def name_of(requirement: str) -> str:
@@ -51,15 +66,14 @@ def installed_with(names: list[str]) -> set[str]:
 @pytest.fixture(scope="module")
 def program() -> str:
     """The command line program as `make demo` leaves it."""
-    listed = (ROOT / "scripts/demo-packages.txt").read_text().splitlines()
-    there = installed_with([name for name in listed if name[0] != "#"]) | {"twinmill"}
+    there = installed_with(list(PROJECT["dependencies"])) | {"twinmill"}
     absent = {
         module
         for module, owners in metadata.packages_distributions().items()
         if not {name_of(owner) for owner in owners} & there
     }
-    assert {"pyarrow", "nicegui", "pandas"} <= absent
-    assert not {"numpy", "scipy", "matplotlib", "twinmill_cli", "twinmill_native"} & absent
+    assert {"pyarrow", "nicegui", "rosbags"} <= absent
+    assert not {"numpy", "scipy", "rich", "matplotlib", "twinmill_cli", "twinmill_native"} & absent
     return WITHOUT.format(absent=absent)
 
 
@@ -101,16 +115,73 @@ def test_the_rest_of_the_loop_has_what_it_imports(program, name):
     subprocess.run([sys.executable, "-c", alone], check=True)
 
 
-@pytest.mark.parametrize("line", [
-    "open swarm.lcmlog",
-    "phase sweep",
-    "export swarm.lcmlog --to parquet",
-    "next swarm.lcmlog --for milling -o other.csv",
+@pytest.mark.parametrize(("line", "extra"), [
+    ("open swarm.lcmlog", "workbench"),
+    ("phase sweep", "sweep"),
+    ("next swarm.lcmlog --for milling -o other.csv", "sweep"),
+    ("export swarm.lcmlog --to parquet", "export"),
+    ("export swarm.lcmlog --to mcap", "export"),
+    ("export swarm.lcmlog --to rosbag2", "ros"),
+    ("export-model turbopi.toml --to ros2_control", "ros"),
+    ("import --bag no.bag", "ros"),
+    ("discover --out found", "discover"),
+    ("claims --out claims", "paper"),
+    ("tags --out tags.pdf", "camera"),
+    ("optitrack --server 127.0.0.1", "optitrack"),
+    ("watch swarm.lcmlog --save shown.rrd", "watch"),
 ])  # fmt: skip
-def test_others_name_the_package_and_the_way_to_it(program, folder, line):
+def test_a_task_whose_extra_is_missing_names_it_in_one_sentence(program, folder, line, extra):
     done = told(program, folder, line)
     assert done.returncode == 1
     assert re.fullmatch(
-        r"twinmill: the Python package of '\w+' is not installed; `make build` does that.\n",
+        r"twinmill: the Python package of '\w+' is not installed; install it with: (\S+ -m )?pip "
+        rf"install 'twinmill\[{extra}\]'\n",
         done.stderr,
-    )
+    ), done.stderr
+
+
+def test_a_sweep_without_its_extra_names_it(program, folder):
+    sweep = program.replace("twinmill_cli.main", "twinmill_cli.twin_sweep")
+    done = told(sweep, folder, "--x v_mps=0.1,0.2 --out sweep")
+    assert done.returncode == 1 and "install 'twinmill[sweep]'" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_library_works_without_extras_and_names_the_missing_one(program, folder):
+    alone = program.replace("from twinmill_cli.main import main\nmain()", LIBRARY)
+    done = subprocess.run([sys.executable, "-c", alone], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "pip install 'twinmill[export]'" in done.stdout
+
+
+def test_everybody_gets_few_packages_and_each_extra_what_its_modules_import():
+    """The demo's list is that of everybody, and what builds; each import is in one or the other."""
+    listed = (ROOT / "scripts/demo-packages.txt").read_text().splitlines()
+    everybodys = {name_of(line) for line in PROJECT["dependencies"]}
+    assert {name for name in listed if name[0] != "#"} == everybodys | BUILDS
+    assert len(everybodys) <= MOST
+    owners, extras = metadata.packages_distributions(), PROJECT["optional-dependencies"]
+    for extra, modules in EXTRAS.items():
+        brought = installed_with(list(extras[extra])) | set(map(name_of, extras[extra]))
+        for module in modules:
+            if module in owners:  # the viewer is not
+                assert {name_of(owner) for owner in owners[module]} & brought, module
+    ours = {"twinmill", "twinmill_cli", "twinmill_native", "turbopi"}
+    others = {module for modules in EXTRAS.values() for module in modules}
+    here = installed_with([*everybodys])
+    for module in imported() - ours - others - sys.stdlib_module_names:
+        assert {name_of(owner) for owner in owners[module]} & here, module
+    assert name_of(extras["all"][0]) == "twinmill"
+    assert set(re.findall(r"\w+", extras["all"][0])[1:]) == set(extras) - {"all"}
+
+
+def imported() -> set[str]:
+    """Packages that the library and the commands import."""
+    found = set()
+    for file in [*ROOT.glob("calibration/**/*.py"), *ROOT.glob("tools/**/*.py")]:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                found.add((node.module or "").partition(".")[0])
+    return found

@@ -5,6 +5,7 @@ import json
 import math
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import lcm
@@ -17,15 +18,13 @@ from twinmill.data.log import read_log
 from twinmill.data.measurement import load_measurements
 from twinmill.data.multi_log import RecordedRobot, multi_log_of
 from twinmill.data.stream import Window, from_log
+from twinmill.extras import MissingExtra, missing
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 from twinmill.watch.live_score import WINDOW_S, LiveScorer
-from twinmill_cli import watch as command
 from twinmill_cli.main import run
 
-needs_viewer = pytest.mark.skipif(
-    command.find_spec("rerun") is None, reason=f"no viewer: pip install {command.RERUN}"
-)
+needs_viewer = pytest.mark.skipif(find_spec("rerun") is None, reason=missing("rerun"))
 SEEN_FROM = 70  # pose from which on the robot sees a neighbour
 
 
@@ -150,8 +149,8 @@ def test_window_forgets_what_is_old(log):
 
 
 def test_without_the_viewer_one_sentence_says_how_to_get_it(log, tmp_path, monkeypatch):
-    monkeypatch.setattr(command, "find_spec", lambda name: None)
-    with pytest.raises(ValueError, match=r"install it with: .* -m pip install rerun-sdk=="):
+    monkeypatch.setitem(sys.modules, "rerun", None)  # as if it were not there
+    with pytest.raises(MissingExtra, match=r"install it with: .*pip install 'twinmill\[watch\]'"):
         run(["watch", str(log), "--save", str(tmp_path / "o.rrd")])
     assert not (tmp_path / "o.rrd").exists()
 

@@ -4,34 +4,43 @@
 Prints each command as a user would type it, then its real output; all files go to demo/.
 """
 
-import hashlib
+from __future__ import annotations
+
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-import tomlkit
 import typer
-from rich.text import Text
 
-from twinmill.challenge.script import write_rich_script
-from twinmill.diagnosis.explain import Explanation
-from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import ParameterEstimate
-from twinmill.report import Figure, Section, show, write_report
-from twinmill.report import diagnosis as present
-from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
-from twinmill.report.tables import Cell, Table, number, tone
-from twinmill.terminal import PlainConsole
-from twinmill_cli import main as cli
-from twinmill_cli.frame import provenance
+from twinmill_cli.lazy import working
 
-ROOT = Path(__file__).resolve().parents[2]
+if working():  # not for --help
+    import hashlib
+    import shutil
+    from importlib.util import find_spec
+
+    import numpy as np
+    import tomlkit
+    from rich.text import Text
+
+    from twinmill.challenge.script import write_rich_script
+    from twinmill.diagnosis.explain import Explanation
+    from twinmill.extras import command
+    from twinmill.model.model_file import ModelFile
+    from twinmill.model.parameters import ParameterEstimate
+    from twinmill.programs import find_program
+    from twinmill.report import Figure, Section, show, write_report
+    from twinmill.report import diagnosis as present
+    from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
+    from twinmill.report.tables import Cell, Table, number, tone
+    from twinmill.terminal import PlainConsole
+    from twinmill_cli import main as cli
+    from twinmill_cli.frame import provenance
+
 FOLDER = Path("demo")
 LOG, SEALED, FOUND = "demo/robot.lcmlog", "demo/sealed.toml", "demo/found.toml"
 GIVEN = "turbopi.toml"
@@ -72,21 +81,28 @@ class Hidden:
         return f"{self.effect}.{self.parameter}"
 
 
-def main(
+def register(app: typer.Typer) -> None:
+    """Adds the command to the application."""
+    app.command("demo")(_demo)
+
+
+def _demo(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the lot: another secret.")] = 1,
-    programs: Annotated[Path, typer.Option("--bin", help="Folder of twin_run.")] = Path(
-        "build/bin"
-    ),
 ) -> None:
-    """Entry point of `python -m twinmill_cli.demo`."""
-    os.chdir(ROOT)
+    """Find two effects that were hidden in a simulated robot, and unseal what they were.
+
+    Shows each command with its output; all files go to demo/ here. A minute or
+    two, most of it the diagnosis.
+    """
+    if FOLDER.exists() and not Path(SEALED).exists():
+        raise ValueError(f"{FOLDER}: is there and of no earlier demo; do this in another folder.")
     shutil.rmtree(FOLDER, ignore_errors=True)
     FOLDER.mkdir()
     digest = _hide(seed)
     _say("It drives for a minute and a half; commands and poses are logged")
     write_rich_script(FOLDER / "script.csv", DURATION_S, seed)
     robot = ["--plant", "planar", "--model", SEALED, "--n", "1", "--script", "demo/script.csv"]
-    _shell(str(programs / "twin_run"), *robot, "--seed", str(seed), "--log", LOG)
+    _simulate(*robot, "--seed", str(seed), "--log", LOG)
     _say("How far does the model that we have miss?")
     _twinmill("compare", LOG, "--model", GIVEN)
     _say("What is missing? Kept is only what helps on data not fitted to")
@@ -103,12 +119,22 @@ def main(
     report = write_report(
         FOLDER / "report",
         page.title,
-        provenance(f"python -m twinmill_cli.demo --seed {seed}", ModelFile.load(GIVEN)),
+        provenance(f"twinmill demo --seed {seed}", ModelFile.load(GIVEN)),
         [page, present.section(result.diagnosis)],
     )
     print(f"\nReport: {report.resolve()}")
-    print(f"By hand, in the browser: make build && .venv/bin/twinmill open {LOG} --model {GIVEN}")
-    print(f"Another secret:          .venv/bin/python -m twinmill_cli.demo --seed {seed + 1}")
+    program = _as_typed(Path(sys.argv[0]))
+    first = "" if find_spec("nicegui") else f"{command('workbench')} && "
+    print(f"By hand, in the browser: {first}{program} open {LOG} --model {GIVEN}")
+    print(f"Another secret:          {program} demo --seed {seed + 1}")
+
+
+def _as_typed(program: Path) -> str:
+    """A program as it is started here: by its name where it is on the path."""
+    on_path = shutil.which(program.name)
+    if on_path and os.path.samefile(on_path, program):
+        return program.name
+    return os.path.relpath(program)
 
 
 def _hide(seed: int) -> str:
@@ -240,18 +266,12 @@ def _say(text: str) -> None:
     PlainConsole().rule(Text(text, "bold"), align="left")
 
 
-def _shell(*command: str) -> None:
-    print(f"$ {shlex.join(command)}", flush=True)
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+def _simulate(*words: str) -> None:
+    program = find_program("twin_run")
+    print(f"$ {shlex.join([_as_typed(program), *words])}", flush=True)
+    subprocess.run([program, *words], check=True, stdout=subprocess.DEVNULL)
 
 
 def _twinmill(*arguments: str) -> Any:
     print(f"$ twinmill {shlex.join(arguments)}", flush=True)
     return cli.run(list(arguments))
-
-
-if __name__ == "__main__":
-    try:
-        typer.run(main)
-    except (ValueError, OSError, subprocess.CalledProcessError) as error:
-        sys.exit(f"demo: {error}")

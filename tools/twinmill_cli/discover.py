@@ -20,22 +20,25 @@ if working():  # not for --help
 
     from rich.console import Group
 
+    from twinmill.extras import needing
     from twinmill.files import check_report
     from twinmill.report import Provenance, write_report
-    from twinmill.report.discover import section
-    from twinmill.swarm.discover.entries import (
-        Entry,
-        confirm,
-        confirm_in_mujoco,
-        entries,
-        offer,
-        write_entries,
-    )
-    from twinmill.swarm.discover.kinds import KIND_COLORS
-    from twinmill.swarm.discover.search import Hunt, search
-    from twinmill.swarm.request import without_axes
-    from twinmill.swarm.sweep import make_request
     from twinmill.terminal import progress_bar, whole
+
+    with needing("discover"):
+        from twinmill.report.discover import section
+        from twinmill.swarm.discover.entries import (
+            Entry,
+            confirm,
+            confirm_in_mujoco,
+            entries,
+            offer,
+            write_entries,
+        )
+        from twinmill.swarm.discover.kinds import KIND_COLORS
+        from twinmill.swarm.discover.search import Hunt, search
+        from twinmill.swarm.request import without_axes
+        from twinmill.swarm.sweep import make_request
 
 NOTE = (
     "A search by quality and diversity: of each sort of swarm it keeps the one that does the same "

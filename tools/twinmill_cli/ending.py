@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import typer
 
+from twinmill.extras import MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill_cli.output import STOPPED, begin_telling, has_told, print_object, say
 
@@ -72,10 +73,10 @@ def _told(error: Exception) -> tuple[int, str]:
         sentence, code = error.format_message(), error.exit_code
         more = " (--help lists what can be given)" if sentence and code == 2 else ""
         return code, _short(sentence + more)
-    if isinstance(error, ModuleNotFoundError):  # `make demo` installs a part
+    if isinstance(error, ModuleNotFoundError) and not isinstance(error, MissingExtra):
         if (error.name or "twinmill").startswith("twinmill"):
             raise error
-        return 1, f"the Python package of '{error.name}' is not installed; `make build` does that."
+        return 1, missing(error.name)
     if isinstance(error, OSError) and error.filename:
         return 1, _short(f"{error.filename}: {error.strerror}.")
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:

@@ -6,9 +6,8 @@ and its module imports that below `if working():`.
 """
 
 import gc
+import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -17,12 +16,22 @@ from typer.core import TyperCommand, TyperGroup
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 
-_working = True
+HELP = {"-h", "--help"}
+
+
+def _options() -> list[str]:
+    """Words of this program's command line up to `--`, behind which none is an option."""
+    words = sys.argv[1:]
+    return words[: words.index("--")] if "--" in words else words
+
+
+# Once for the program: help and the shell's completion end it.
+_helps = "_TWINMILL_COMPLETE" in os.environ or bool(HELP & set(_options()))
 
 
 def working() -> bool:
-    """Whether a command's module is imported to work, and not to show its help alone."""
-    return _working
+    """Whether commands are imported to work, and not for their help alone."""
+    return not _helps
 
 
 class LazyCommand(TyperCommand):
@@ -54,36 +63,15 @@ class LazyCommand(TyperCommand):
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **options: Any
     ) -> typer.Context:
-        """That of the subcommand, which is then what runs; for completion it only parses."""
-        if {"-h", "--help"} & set(args):
-            self._show_help(info_name, args, *rest, **options)
-        if options.get("resilient_parsing"):
-            with _looking():
-                return self.command().make_context(info_name, args, *rest, **options)
-        return self.command().make_context(info_name, args, *rest, **options)
+        """That of the subcommand, which is then what runs.
 
-    def _show_help(
-        self, info_name: str | None, args: list[str], *rest: Any, **options: Any
-    ) -> None:
-        """Leaves with typer.Exit, unless --help is no option here but the value of one."""
-        with _looking():
-            command = self.command()
-            context = command.make_context(info_name, [*args], *rest, **options)
-            if isinstance(command, TyperGroup):
-                name, subcommand, others = command.resolve_command(context, [*args])
-                subcommand.make_context(name, others, parent=context)
-
-
-@contextmanager
-def _looking() -> Iterator[None]:
-    """Meanwhile commands are imported without what they need to work; later they are anew."""
-    global _working
-    known = set(sys.modules)
-    _working = False
-    try:
-        yield
-    finally:
-        _working = True
-        for name in set(sys.modules) - known:
-            if name.startswith("twinmill_cli."):
-                del sys.modules[name]
+        Raises:
+            typer.Exit: it showed its help.
+        """
+        words = list(args)
+        context = self.command().make_context(info_name, args, *rest, **options)
+        ends = options.get("resilient_parsing") or isinstance(context.command, TyperGroup)
+        if not (working() or ends):
+            word = next(word for word in words if word in HELP)
+            raise typer.BadParameter(f"{word} is the value of an option here; write ./{word}.")
+        return context

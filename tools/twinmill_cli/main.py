@@ -14,6 +14,11 @@ from twinmill_cli.lazy import LazyCommand
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
     (
+        "demo",
+        "demo",
+        "Find two effects that were hidden in a simulated robot, and unseal what they were.",
+    ),
+    (
         "guide",
         "guide",
         "Ask what you have, and write the plan from an unknown robot to a named effect.",

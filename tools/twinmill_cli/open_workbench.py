@@ -13,10 +13,13 @@ from twinmill_cli.lazy import working
 from twinmill_cli.options import Logs, Model
 
 if working():  # not for --help
-    from twinmill.workbench.bench import Bench
-    from twinmill.workbench.server import serve
-    from twinmill.workbench.session import Session
-    from twinmill.workbench.state_file import StateFile, state_path
+    from twinmill.extras import needing
+
+    with needing("workbench"):
+        from twinmill.workbench.bench import Bench
+        from twinmill.workbench.server import serve
+        from twinmill.workbench.session import Session
+        from twinmill.workbench.state_file import StateFile, state_path
 
 
 def register(app: typer.Typer) -> None:

@@ -9,7 +9,6 @@ import typer
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill.swarm.axes import ALIASES, QUANTITIES
-from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli.ending import leave
 from twinmill_cli.options import SpreadM, Start
 from twinmill_cli.output import AsJson, busy, deliver
@@ -90,6 +89,8 @@ def _command(
 
     Example: twin_sweep --x v_mps=0.1:0.35:6 --y omega_degps=20:90:8 --out sweep
     """
+    from twinmill.swarm.sweep import make_request, sweep  # not for --help
+
     with busy("checking the cells"):
         request = make_request(
             behavior,

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
@@ -17,20 +16,17 @@ from twinmill_cli.options import DurationS, LcmUrl, Model
 from twinmill_cli.output import AsJson, deliver, say
 
 if working():  # not for --help
-    from importlib.util import find_spec
-
     from rich.progress import track
 
     from twinmill.data.multi_log import PREFIXES
     from twinmill.data.stream import from_bus, from_log
+    from twinmill.extras import needing
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
     from twinmill.terminal import PlainConsole
     from twinmill.version import __version__
     from twinmill.watch.live_score import WINDOW_S
     from twinmill_cli.frame import open_model
-
-RERUN = "rerun-sdk==0.41.0"
 
 
 def register(app: typer.Typer) -> None:
@@ -70,7 +66,8 @@ def _watch(
     """
     if sum([save is not None, bool(connect), spawn]) > 1:
         raise ValueError("--save, --connect and --spawn: give one of them.")
-    _need_rerun()
+    with needing("watch"):
+        import rerun  # noqa: F401
     model_file, warnings = open_model(model, None), []
     if save:
         check_new_file(save, force, [log, model_file.path])
@@ -90,14 +87,6 @@ def _watch(
     }
     deliver(data, _text(show, save, warnings), as_json)
     return data
-
-
-def _need_rerun() -> None:
-    if find_spec("rerun") is None:
-        raise ValueError(
-            "the viewer is not installed, since it takes 500 MB; install it with: "
-            f"{sys.executable} -m pip install {RERUN}"
-        )
 
 
 def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | None, *, url: str):

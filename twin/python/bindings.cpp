@@ -482,7 +482,6 @@ NB_MODULE(twinmill_native, m)
     m.def("keep_memory", &KeepMemory,
           "From now on memory that was freed is used again and not given back to the system, which "
           "would hand it out anew, page by page.");
-    BindChance(m);
     BindEvents(m);
     BindHeldOut(m);
     BindProducts(m);

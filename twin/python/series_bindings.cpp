@@ -683,31 +683,6 @@ Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
     return ToNumpy(std::move(solved), {matrices, trials, count});
 }
 
-// Row by row of the identity what lies below the diagonal is taken out.
-Array LowerInverse(Cube lower)
-{
-    const size_t matrices = lower.shape(0), count = lower.shape(1);
-    if (lower.shape(2) != count)
-        throw std::invalid_argument("matrices must be square");
-    std::vector<double> inverse(matrices * count * count);
-    for (size_t m = 0; m < matrices; ++m)
-        for (size_t i = 0; i < count; ++i)
-        {
-            const double *own = lower.data() + (m * count + i) * count;
-            double *rows = inverse.data() + m * count * count, *row = rows + i * count;
-            row[i] = 1;
-            size_t first = 0;
-            for (; first + kTogether <= i; first += kTogether)
-                TakeOut<kTogether>(own + first, rows + first * count, count, 0, first + kTogether,
-                                   row);
-            for (; first < i; ++first)
-                TakeOut<1>(own + first, rows + first * count, count, 0, first + 1, row);
-            for (size_t k = 0; k <= i; ++k)
-                row[k] /= own[i];
-        }
-    return ToNumpy(std::move(inverse), {matrices, count, count});
-}
-
 }  // namespace
 
 void BindSeries(nb::module_ &m)
@@ -741,9 +716,6 @@ void BindSeries(nb::module_ &m)
     m.def("solved_risen", &SolvedRisen, "grams"_a, "rises"_a, "moments"_a,
           "(M, V, F) solutions of symmetric matrices (M, F, F), each with one of (M, V) added to "
           "its diagonal and definite then, for right sides (M, F).");
-    m.def("lower_inverse", &LowerInverse, "lower"_a,
-          "(M, F, F) inverses of lower triangular matrices, of which no more than that half is "
-          "looked at.");
     m.def("swing_of", &SwingOf, "step_s"_a, "rate"_a, "damping"_a,
           "(N, 2) cosine, and sine over the rate, of what swings and fades over each step.");
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "turned"_a, "rate"_a, "damping"_a,

@@ -2,19 +2,16 @@
 """A log for other programs: MCAP for Foxglove, a ROS bag, or one table per message type."""
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import pyarrow as pa
 import twinmill_native as native
 
 from twinmill.defaults import LogFormat
-from twinmill.export.mcap_file import write_mcap
 from twinmill.export.recording import Recording, read_recording
 from twinmill.export.rosbag2_file import left_out, write_rosbag2
 from twinmill.export.script import BAG_FILES
-from twinmill.export.tables import tables_of, write_csv, write_parquet
+from twinmill.extras import needing
 from twinmill.files import check_absent, folder_beside, put_in_place, replacing, replacing_folder
 from twinmill.model.outlines import Body
 from twinmill.version import __version__
@@ -89,6 +86,8 @@ def export_log(
     }
     files, warnings = [out], list(recording.warnings)
     if to is LogFormat.MCAP:
+        with needing("export"):
+            from twinmill.export.mcap_file import write_mcap
         with replacing(out, force, inputs=[log]) as temporary:
             write_mcap(recording, temporary, provenance, Body.of(model))
     elif to is LogFormat.ROSBAG2:
@@ -106,8 +105,10 @@ def _write_tables(
     recording: Recording, provenance: dict, folder: Path, to: LogFormat, *, force: bool
 ) -> list[Path]:
     """One file per table: all are there in the end, or none is new."""
+    with needing("export"):
+        from twinmill.export.tables import tables_of, write_csv, write_parquet
     tables = tables_of(recording, provenance)
-    write: Callable[[pa.Table, Path], None] = write_csv if to is LogFormat.CSV else write_parquet
+    write = write_csv if to is LogFormat.CSV else write_parquet
     check_absent(folder, force)
     files = [folder / f"{name}.{to}" for name in tables]
     with folder_beside(folder) as temporary:

@@ -6,13 +6,15 @@ import json
 from typing import Any
 
 import numpy as np
-import yaml
 
+from twinmill.extras import needing
 from twinmill.model.ranges import Ranges
 
 
 def as_yaml(data: dict[str, Any]) -> str:
     """Rows of numbers one a line."""
+    with needing("export"):
+        import yaml
     return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=10_000)
 
 

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A model as parameters for the controllers of ros2_control; joints as in the URDF."""
 
-import yaml
-
 from twinmill.export.carried import Left, RobotModel
 from twinmill.export.drive import drive_of, left_by_drive, wheel_gains
+from twinmill.extras import needing
 
 TIMEOUT_S = 0.5  # without a command: stop
 
@@ -15,6 +14,8 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     Raises:
         ValueError: ros2_control has no controller for these wheels.
     """
+    with needing("ros"):
+        import yaml
     kind = robot.model.wheel_kind
     if kind not in CONTROLLERS:
         raise ValueError(

@@ -13,6 +13,7 @@ import turbopi
 
 from twinmill.export.recording import Channel, Recording
 from twinmill.export.script import BAG_VERSION
+from twinmill.extras import needing
 
 WORLD = "world"
 WHEELS = ["front_left", "front_right", "rear_left", "rear_right"]
@@ -28,8 +29,9 @@ def write_rosbag2(recording: Recording, folder: Path) -> None:
         recording: what to write.
         folder: of the bag; must not exist.
     """
-    from rosbags.rosbag2 import StoragePlugin, Writer  # slow to import
-    from rosbags.typesys import Stores, get_typestore
+    with needing("ros"):  # slow to import
+        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
     speaker, topics = Speaker(store.types), {}

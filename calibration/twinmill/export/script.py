@@ -14,6 +14,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.experiment.played import Rows
+from twinmill.extras import needing
 from twinmill.files import check_new_file, replacing_folder
 from twinmill.model.model_file import write_whole
 
@@ -70,8 +71,9 @@ def write_bag(script: TwistScript, out: Path, force: bool) -> None:
     Raises:
         ValueError: it exists, or cannot be written.
     """
-    from rosbags.rosbag2 import Writer  # slow to import
-    from rosbags.typesys import Stores, get_typestore
+    with needing("ros"):  # slow to import
+        from rosbags.rosbag2 import Writer
+        from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
     vector, twist = store.types["geometry_msgs/msg/Vector3"], store.types[TWIST]

@@ -55,27 +55,10 @@ def _highest(bins: np.ndarray, signals: Iterable[np.ndarray], count: int) -> np.
     even /= np.maximum(np.bincount(bins), 1)
     tapered = (even - even.mean(axis=1, keepdims=True)) * np.hanning(even.shape[1])
     alone = -(-count // PADDED)  # lines without padding
-    lines = _first_lines(tapered, PADDED * even.shape[1], PADDED * (alone + NEIGHBOURS))
+    lines = np.fft.rfft(tapered, PADDED * even.shape[1])[:, : PADDED * (alone + NEIGHBOURS)]
     power = np.abs(lines) ** 2
     padded = np.pad(power[:, ::PADDED], ((0, 0), (NEIGHBOURS, 0)), mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1, axis=1)
     medians = np.median(around, axis=2)
     noise = np.repeat(medians, PADDED, axis=1)[:, :count] / np.log(2)
     return np.max(power[:, :count] / np.maximum(noise, 1e-30), axis=0)
-
-
-def _first_lines(signals: np.ndarray, length: int, count: int) -> np.ndarray:
-    """(S, K) first lines of the discrete Fourier transform of (S, N) signals, padded to a length.
-
-    As a convolution with a chirp (Bluestein 1970): padded to a length with a large prime factor,
-    signals take numpy ten times as long.
-    """
-    size = signals.shape[1]
-    steps = np.arange(max(size, count))
-    chirp = np.exp(-1j * np.pi * (steps**2 % (2 * length)) / length)
-    room = 1 << (size + count - 2).bit_length()
-    answer = np.zeros(room, complex)
-    answer[:count] = chirp[:count].conj()
-    answer[room - size + 1 :] = chirp[size - 1 : 0 : -1].conj()
-    swept = np.fft.fft(signals * chirp[:size], room) * np.fft.fft(answer)
-    return chirp[:count] * np.fft.ifft(swept)[:, :count]

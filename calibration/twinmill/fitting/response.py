@@ -46,7 +46,6 @@ GROUPS = ("base", "own", "cross", "shape", "product", "room", "place")
 FIRST_RIDGE = dict(base=1e-4, own=1e-2, cross=1e-2)
 THIN_S = 0.03  # between points at which features are taken, beside those where windows end
 GRID_S = 0.01
-WORTH_HALVING = 48  # features in half of a matrix
 WIDE = 32  # features whose rows are made at once
 AXES = ((0, 1), (2,))  # of the plane and of turning
 CHOICE_EVERY = 2  # horizons: those between would choose the same groups
@@ -694,7 +693,7 @@ class _LeftOut:
         self.used = np.flatnonzero(ridge[self.groups] < OUT)
         grams = self.grams[:, self.used[:, None], self.used]
         np.einsum("kuu->ku", grams)[:] += (self.mean * ridge[self.groups])[self.used]
-        self.inverse = _inverse(grams)
+        self.inverse = np.linalg.inv(grams)
         return self._fitted()
 
     def moved(self, group: int, value: float) -> float:
@@ -756,24 +755,6 @@ class _LeftOut:
         left = self.moments[:, own, None] - across.swapaxes(1, 2) @ self.beta[:, self.used]
         found = at_ridges(within, self.mean[own[0]] * np.array(values), left[..., 0]).swapaxes(1, 2)
         return made @ found, found
-
-
-def _inverse(grams: np.ndarray) -> np.ndarray:
-    """(K, F, F) of positive definite matrices, by Cholesky: in a third of the time of numpy's."""
-    lower = _lower_inverse(np.linalg.cholesky(grams))
-    return lower.swapaxes(1, 2) @ lower
-
-
-def _lower_inverse(lower: np.ndarray) -> np.ndarray:
-    """(K, F, F) of triangular matrices, by halves."""
-    half = lower.shape[1] // 2
-    if half < WORTH_HALVING:
-        return native.lower_inverse(np.ascontiguousarray(lower))
-    found = np.zeros_like(lower)
-    found[:, :half, :half] = first = _lower_inverse(lower[:, :half, :half])
-    found[:, half:, half:] = last = _lower_inverse(lower[:, half:, half:])
-    found[:, half:, :half] = -last @ lower[:, half:, :half] @ first
-    return found
 
 
 def _ridge(

@@ -14,6 +14,28 @@ def find_file() -> Path | None:
     return next(filter(Path.is_file, (Path(NAME), config / "twinmill" / NAME)), None)
 
 
+def parse_table(text: str) -> tuple[str, list[int]]:
+    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in the robot's inputs.
+
+    Raises:
+        ValueError: in one sentence.
+    """
+    name, _, rest = text.partition("=")
+    try:
+        unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
+        within = [abs(v) <= 100 for v in (unseen_speed, seen_speed)]
+        within += [abs(v) <= 2 for v in (unseen_turn, seen_turn)]
+        if not name or not all(within):
+            raise ValueError
+    except ValueError:
+        raise ValueError(
+            f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
+            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2)."
+        ) from None
+    milli = [round(unseen_turn * 1000), round(seen_turn * 1000)]
+    return name, [round(unseen_speed), milli[0], round(seen_speed), milli[1]]
+
+
 def read_tables(path: Path) -> dict[str, str]:
     """All tables of a file, by name.
 

@@ -16,9 +16,8 @@ import twinmill_native as native
 from twinmill.data.log import Log
 from twinmill.defaults import FALSE_ALARMS
 from twinmill.programs import available_cores
-from twinmill.swarm.behaviors import find_table
+from twinmill.swarm.behaviors import find_table, parse_table
 from twinmill.swarm.metrics import STEP_S, SwarmSeries, body_velocity
-from twinmill.swarm.sweep import parse_table
 
 BLOCK_S = 2.0  # metrics are means over this
 STARTED_MPS = 0.02

@@ -12,6 +12,7 @@ from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, words
 from twinmill.swarm.axes import parse_axis
+from twinmill.swarm.behaviors import parse_table
 from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
@@ -82,28 +83,6 @@ def _check_size(request: Request) -> None:
         raise ValueError(
             f"--first-seed {request.first_seed}: seeds end at {MOST_SEEDS}; take a smaller one."
         )
-
-
-def parse_table(text: str) -> tuple[str, list[int]]:
-    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in the robot's inputs.
-
-    Raises:
-        ValueError: in one sentence.
-    """
-    name, _, rest = text.partition("=")
-    try:
-        unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
-        within = [abs(v) <= 100 for v in (unseen_speed, seen_speed)]
-        within += [abs(v) <= 2 for v in (unseen_turn, seen_turn)]
-        if not name or not all(within):
-            raise ValueError
-    except ValueError:
-        raise ValueError(
-            f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
-            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2)."
-        ) from None
-    milli = [round(unseen_turn * 1000), round(seen_turn * 1000)]
-    return name, [round(unseen_speed), milli[0], round(seen_speed), milli[1]]
 
 
 def sweep(

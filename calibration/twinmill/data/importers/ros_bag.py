@@ -53,6 +53,7 @@ from twinmill.data.importers.series import (
 from twinmill.data.log import LogError
 from twinmill.data.other_files import refuse_other_file
 from twinmill.data.unpacking import UnpackError, bound_bag_readers
+from twinmill.extras import needing
 from twinmill.terminal import progress_bar
 
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
@@ -315,13 +316,13 @@ def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
 @contextmanager
 def _open(path: Path):
     """The bag, open for reading; what goes wrong inside is one sentence."""
-    from apsw import Error as SqliteError  # slow to import, as the others
-    from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.rosbag1 import ReaderError as Error1
-    from rosbags.rosbag2 import ReaderError as Error2
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
+    with needing("ros"):  # slow to import
+        from apsw import Error as SqliteError
+        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.rosbag1 import ReaderError as Error1
+        from rosbags.rosbag2 import ReaderError as Error2
+        from rosbags.serde import SerdeError
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     store = get_typestore(Stores.ROS2_HUMBLE)
     for kind, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, kind))
