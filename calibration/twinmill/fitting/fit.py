@@ -46,8 +46,8 @@ from twinmill.model.parameters import (
     gains_of,
 )
 from twinmill.predict.datasets import Trajectory
-from twinmill.predict.steady_states import SteadyStates
 from twinmill.predict.noise import Noise
+from twinmill.predict.steady_states import SteadyStates
 
 AGREE_SIGMA = 5.0  # clock offsets of several logs that differ by less are one
 
