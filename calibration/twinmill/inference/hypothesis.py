@@ -26,6 +26,7 @@ TRIES = 5  # dampings within a round
 RUNS_AWAY = 1e6  # m or rad in a step for a unit of a number: no slope, the motion is unstable there
 SETTLED = 0.1  # units of the log posterior: less decides nothing
 LIMIT_SPREAD = 0.5  # prior of a limit about its start on the grid, relative: twice the grid's step
+LIMIT_STEP = 0.02  # of finite differences in a limit, relative: what it cuts off bends with it
 MOVES = (1.0, 1.0, 0.4)  # times the reach, in turn, by which a place or a while is moved
 REACH = {"place": 0.075, "moment": 0.5}  # m, s: half of what a step of the grid leaves open
 
@@ -217,7 +218,7 @@ class Fitter:
             cov=cov,
             low=np.r_[h.low, [p.min for p in free]],
             high=np.r_[h.high, [p.max for p in free]],
-            step=np.r_[h.step, [p.step or 1e-3 for p in free]],
+            step=np.r_[h.step, np.where(limit, LIMIT_STEP * np.abs(start), [p.step for p in free])],
             value=np.r_[base, start],
             one_sided=np.r_[
                 h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
