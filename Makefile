@@ -83,9 +83,11 @@ docs: build
 	    --requirement docs/requirements.lock && cp docs/requirements.lock .deps/docs; }
 	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
-# One file to install with pip where there is no compiler: dist/twinmill-*.whl.
+# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for any glibc from 2.28
+# on. `scripts/wheel dist` alone makes one for this machine's.
 wheel: build
-	@scripts/wheel dist
+	@[ -d .deps/wheel-root ] || scripts/make_wheel_root .deps/wheel-root
+	@scripts/wheel dist .deps/wheel-root
 
 # Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
 clean:

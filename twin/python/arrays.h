@@ -52,7 +52,6 @@ void BindEvents(nb::module_ &m);
 // Adds sums and filters over time.
 void BindSeries(nb::module_ &m);
 
-
 // Adds regressions judged on what they were not fitted to.
 void BindHeldOut(nb::module_ &m);
 
