@@ -12,6 +12,8 @@
      .max = highest}
 #define TEXT(name, words) {.key = #name "\0" words, .kind = KEY_TEXT, .offset = FIELD(name)}
 #define YES_NO(name, words) {.key = #name "\0" words, .kind = KEY_BOOL, .offset = FIELD(name)}
+#define BIT(name, index, words) \
+    {.key = name "\0" words, .kind = KEY_TEXT, .offset = FIELD(bits) + CONFIG_TEXT_MAX * (index)}
 #define SIGN(name, wheel, words)                        \
     {.key = name "\0" words,                            \
      .kind = KEY_INTEGER,                               \
@@ -25,8 +27,8 @@ const struct config_key config_keys[] = {
     TEXT(
         table,
         "table of your own, played under the name above: speed and turn input for nothing seen, "
-        "then for seen, as in 100,-0.5,100,0.5; empty: that of this name in the file below, or else "
-        "built in"),
+        "then for seen, as in 100,-0.5,100,0.5, or so for each number of k bits; empty: that of this "
+        "name in the file below, or else built in"),
     TEXT(behaviors,
          "file of such tables, lines name = \"100,-0.5,100,0.5\", which commands can name; empty: "
          "none"),
@@ -43,6 +45,12 @@ const struct config_key config_keys[] = {
     INTEGER(min_blob_px, 0, 1000000, "the target is seen if its largest blob has more pixels"),
     INTEGER(vote_frames, 1, 64, "the vote is over this many frames at most"),
     INTEGER(vote_window_ms, 0, 60000, "and over those of the last ms; 0: of any age"),
+    BIT("bit1", 0,
+        "sector of the picture: all, left or right; and what differs from the keys above: "
+        "y_min,y_max,u_min,u_max,v_min,v_max,min_blob_px,vote_frames,vote_window_ms"),
+    BIT("bit2", 1, "a second bit, for tables of 4 rows; empty: none"),
+    BIT("bit3", 2, "for 8 rows"),
+    BIT("bit4", 3, "for 16 rows"),
     INTEGER(frame_timeout_ms, 1, 10000, "motors stop without a frame for this long"),
     INTEGER(duty_cap_pct, 0, 100, "largest duty of any wheel"),
     TEXT(camera, "V4L2 device, or stub:FILE of YUYV frames, or stub:unix:SOCKET"),
