@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many swarms over a grid of parameters: asked for, run, joined and summed up."""
 
+import itertools
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from twinmill.swarm.workers import run_here, run_on_dask
 from twinmill.terminal import progress_bar
 from twinmill.version import __version__
 
+TABLE_SIZES = (4, 8, 16, 32)  # speed and turn of 2, 4, 8 or 16 rows
 MOST_WORLDS = 10_000_000  # a row of each is in memory at the end
 MOST_SEEDS = 2**63 - 1  # of 64 bits with a sign
 
@@ -85,25 +87,24 @@ def _check_size(request: Request) -> None:
 
 
 def parse_table(text: str) -> tuple[str, list[int]]:
-    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in the robot's inputs.
+    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in inputs, or so for 4, 8 or 16 rows.
 
     Raises:
         ValueError: in one sentence.
     """
     name, _, rest = text.partition("=")
     try:
-        unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
-        within = [abs(v) <= 100 for v in (unseen_speed, seen_speed)]
-        within += [abs(v) <= 2 for v in (unseen_turn, seen_turn)]
-        if not name or not all(within):
+        values = list(map(float, rest.split(",")))
+        within = [abs(v) <= 100 for v in values[::2]] + [abs(v) <= 2 for v in values[1::2]]
+        if not name or not all(within) or len(values) not in TABLE_SIZES:
             raise ValueError
     except ValueError:
         raise ValueError(
             f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
-            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2)."
+            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2), or 4, 8 or 16 such pairs."
         ) from None
-    milli = [round(unseen_turn * 1000), round(seen_turn * 1000)]
-    return name, [round(unseen_speed), milli[0], round(seen_speed), milli[1]]
+    scales = itertools.cycle((1, 1000))
+    return name, [round(value * scale) for value, scale in zip(values, scales, strict=False)]
 
 
 def sweep(
