@@ -219,7 +219,7 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
 }
 
 // Bits without a gap: the first that is empty is the end.
-static bool set_bits(const struct app_config *config, struct fw_config *core)
+static enum fw_err set_bits(const struct app_config *config, struct fw_config *core)
 {
     const struct fw_bit usual = {
         .box = {(uint8_t)config->y_min, (uint8_t)config->y_max, (uint8_t)config->u_min,
@@ -227,17 +227,18 @@ static bool set_bits(const struct app_config *config, struct fw_config *core)
         .min_blob_px = config->min_blob_px,
         .vote = {config->vote_frames, fw_vote_window_us(config->vote_window_ms)},
     };
-    for (int i = 0; i < FW_MAX_BITS; ++i)
+    const enum fw_err err = fw_bit_check(&usual);
+    for (int i = 0; err == FW_OK && i < FW_MAX_BITS; ++i)
     {
         const char *text = config->bits[i];
         core->bits[i] = usual;
         if (text[0] != '\0' && (i > core->bit_count || !fw_bit_parse(text, &core->bits[i])))
         {
-            return false;
+            return FW_ERR_BITS;
         }
         core->bit_count += text[0] != '\0';
     }
-    return true;
+    return err;
 }
 
 enum fw_err config_core(const struct app_config *config, struct fw_config *core)
@@ -259,5 +260,6 @@ enum fw_err config_core(const struct app_config *config, struct fw_config *core)
         .frame_timeout_us = (int64_t)config->frame_timeout_ms * 1000,
         .duty_cap_pct = config->duty_cap_pct,
     };
-    return set_bits(config, core) ? fw_config_check(core) : FW_ERR_BITS;
+    const enum fw_err err = set_bits(config, core);
+    return err != FW_OK ? err : fw_config_check(core);
 }
