@@ -19,10 +19,18 @@ static const uint8_t *frame_at(const uint8_t *frames, int frame_count, int i)
     return frames + (size_t)(i % frame_count) * BENCH_FRAME_BYTES;
 }
 
-int64_t bench_decide_ns(const uint8_t *frames, int frame_count, int count, int *seen)
+int64_t bench_decide_ns(const uint8_t *frames, int frame_count, int bit_count, int count, int *seen)
 {
     static struct fw_ctx ctx;
-    const struct fw_config config = fw_config_default();
+    static const struct fw_color_box others[] = {
+        {40, 235, 0, 124, 165, 255}, {30, 235, 150, 255, 0, 124}, {80, 235, 0, 90, 130, 160}};
+    struct fw_config config = fw_config_default();
+    config.bit_count = bit_count;
+    for (int i = 1; i < bit_count; ++i)
+    {
+        config.bits[i] = config.bits[0];
+        config.bits[i].box = others[i - 1];
+    }
     if (fw_init(&ctx, &config) != FW_OK)
     {
         return -1;
@@ -42,7 +50,7 @@ int64_t bench_decide_ns(const uint8_t *frames, int frame_count, int count, int *
         };
         struct fw_output out;
         fw_step(&ctx, &frame, frame.utime_us, &out);
-        *seen += out.detected_raw;
+        *seen += out.detected_raw & 1;
     }
     return now_ns() - begin_ns;
 }

@@ -27,11 +27,15 @@ class Native:
         self._library.bench_decide_ns.restype = ctypes.c_int64
         self._library.bench_copy_ns.restype = ctypes.c_int64
 
-    def decide_us(self, frames: np.ndarray) -> tuple[float, int]:
+    def decide_us(self, frames: np.ndarray, bits: int = 1) -> tuple[float, int]:
         """Time of one decision, and how many of DECISIONS saw the target."""
         seen = ctypes.c_int()
         took_ns = self._library.bench_decide_ns(
-            frames.ctypes.data_as(ctypes.c_void_p), len(frames), DECISIONS, ctypes.byref(seen)
+            frames.ctypes.data_as(ctypes.c_void_p),
+            len(frames),
+            bits,
+            DECISIONS,
+            ctypes.byref(seen),
         )
         return took_ns / DECISIONS / 1e3, seen.value
 
@@ -71,6 +75,9 @@ def _against_copy(native: Native) -> Iterator[Ratio]:
         pairs = [(native.copy_us(frames), native.decide_us(frames)[0]) for _ in range(REPETITIONS)]
         copies, decisions = np.transpose(pairs)
         yield paired(f"decision : memcpy, {name}", decisions, copies, "us", **goal)
+    frames = _ring(scene.floor, 40)
+    pairs = [[native.decide_us(frames, bits)[0] for bits in (4, 1)] for _ in range(REPETITIONS)]
+    yield paired("4 bits : 1 bit, one robot", *np.transpose(pairs), "us")
 
 
 def _against_peer(native: Native, peer: "peers.Peer") -> Iterator[Ratio]:  # noqa: F821

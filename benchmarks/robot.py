@@ -14,14 +14,17 @@ import scene
 class Robot:
     """The running program, which drives; a context that ends it."""
 
-    def __init__(self, program: Path, folder: Path, lcm_url: str) -> None:
+    def __init__(
+        self, program: Path, folder: Path, lcm_url: str, settings: tuple[str, ...] = ()
+    ) -> None:
+        """Starts it; `settings` are KEY=VALUE of its configuration."""
         camera_path, self._record = folder / "camera", folder / "board.csv"
         for path in (camera_path, self._record):
             path.unlink(missing_ok=True)
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(str(camera_path))
         listener.listen()
-        settings = ("panel=none", f"width_px={scene.WIDTH_PX}", f"height_px={scene.HEIGHT_PX}")
+        settings += ("panel=none", f"width_px={scene.WIDTH_PX}", f"height_px={scene.HEIGHT_PX}")
         self.process = subprocess.Popen(
             [
                 *(str(program), "--config", "/dev/null", "--start"),

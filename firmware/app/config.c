@@ -15,17 +15,19 @@
 void config_default(struct app_config *config)
 {
     const struct fw_config core = fw_config_default();
+    const struct fw_bit bit = core.bits[0];
     *config = (struct app_config){
         .behavior = "milling",
         .behaviors = CONFIG_BEHAVIORS,
-        .y_min = core.box.y_min,
-        .y_max = core.box.y_max,
-        .u_min = core.box.u_min,
-        .u_max = core.box.u_max,
-        .v_min = core.box.v_min,
-        .v_max = core.box.v_max,
-        .min_blob_px = core.min_blob_px,
-        .vote_frames = core.vote.max_frames,
+        .y_min = bit.box.y_min,
+        .y_max = bit.box.y_max,
+        .u_min = bit.box.u_min,
+        .u_max = bit.box.u_max,
+        .v_min = bit.box.v_min,
+        .v_max = bit.box.v_max,
+        .min_blob_px = bit.min_blob_px,
+        .vote_frames = bit.vote.max_frames,
+        .bits = {"all"},
         .frame_timeout_ms = (int32_t)(core.frame_timeout_us / 1000),
         .duty_cap_pct = core.duty_cap_pct,
         .camera = "/dev/video0",
@@ -207,7 +209,7 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
     const char *doc, *name = config_texts;
     for (size_t i = 0; i < config_key_count; ++i, name = text_after(doc))
     {
-        char entry[CONFIG_ERROR_MAX];
+        char entry[2 * CONFIG_ERROR_MAX];
         doc = text_after(name);
         int length = with_docs ? snprintf(entry, sizeof entry, "# %s\n", doc) : 0;
         length += print_value(config, &config_keys[i], name, entry + length,
@@ -221,6 +223,29 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
     }
     text[used] = '\0';
     return used;
+}
+
+// Bits without a gap: the first that is empty is the end.
+static enum fw_err set_bits(const struct app_config *config, struct fw_config *core)
+{
+    const struct fw_bit usual = {
+        .box = {(uint8_t)config->y_min, (uint8_t)config->y_max, (uint8_t)config->u_min,
+                (uint8_t)config->u_max, (uint8_t)config->v_min, (uint8_t)config->v_max},
+        .min_blob_px = config->min_blob_px,
+        .vote = {config->vote_frames, fw_vote_window_us(config->vote_window_ms)},
+    };
+    const enum fw_err err = fw_bit_check(&usual);
+    for (int i = 0; err == FW_OK && i < FW_MAX_BITS; ++i)
+    {
+        const char *text = config->bits[i];
+        core->bits[i] = usual;
+        if (text[0] != '\0' && (i > core->bit_count || !fw_bit_parse(text, &core->bits[i])))
+        {
+            return FW_ERR_BITS;
+        }
+        core->bit_count += text[0] != '\0';
+    }
+    return err;
 }
 
 enum fw_err config_core(const struct app_config *config, struct fw_config *core)
@@ -238,14 +263,10 @@ enum fw_err config_core(const struct app_config *config, struct fw_config *core)
     *core = (struct fw_config){
         .width_px = config->width_px,
         .height_px = config->height_px,
-        .box = {(uint8_t)config->y_min, (uint8_t)config->y_max, (uint8_t)config->u_min,
-                (uint8_t)config->u_max, (uint8_t)config->v_min, (uint8_t)config->v_max},
-        .min_blob_px = config->min_blob_px,
-        .vote = {config->vote_frames,
-                 config->vote_window_ms == 0 ? INT64_MAX : (int64_t)config->vote_window_ms * 1000},
         .table = table,
         .frame_timeout_us = (int64_t)config->frame_timeout_ms * 1000,
         .duty_cap_pct = config->duty_cap_pct,
     };
-    return fw_config_check(core);
+    const enum fw_err err = set_bits(config, core);
+    return err != FW_OK ? err : fw_config_check(core);
 }

@@ -12,7 +12,8 @@
 #include "fw/mixing.h"
 #include "lines.h"
 
-#define CONFIG_TEXT_MAX 112
+// A table of 16 rows, each as in -100,-1.999 with a comma after it, fits.
+#define CONFIG_TEXT_MAX 208
 #define CONFIG_ERROR_MAX LINES_ERROR_MAX
 // Where tables of the user's own are; this file alone need not be there.
 #define CONFIG_BEHAVIORS "/etc/turbopi/behaviors.toml"
@@ -26,6 +27,7 @@ struct app_config
     int32_t y_min, y_max, u_min, u_max, v_min, v_max;
     int32_t min_blob_px;
     int32_t vote_frames, vote_window_ms;
+    char bits[FW_MAX_BITS][CONFIG_TEXT_MAX];
     int32_t frame_timeout_ms, duty_cap_pct;
 
     char camera[CONFIG_TEXT_MAX];

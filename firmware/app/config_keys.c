@@ -4,12 +4,13 @@
 #include <stddef.h>
 
 // One row a key, read twice: for its place and range, and for its texts.
-#define KEYS(INTEGER, TEXT, YES_NO, SIGN)                                                          \
+#define KEYS(INTEGER, TEXT, YES_NO, BIT, SIGN)                                                     \
     INTEGER(robot_id, 0, 99, "number of this robot, in the names of its channels")                 \
     TEXT(behavior, "name of the table that is played")                                             \
     TEXT(table,                                                                                    \
          "table of your own, played under the name above: speed and turn input for nothing"        \
-         " seen, then for seen, as in 100,-0.5,100,0.5; empty: that of this name in the "          \
+         " seen, then for seen, as in 100,-0.5,100,0.5, or so for each number of k bits;"          \
+         " empty: that of this name in the "                                                       \
          "file below, or else built in")                                                           \
     TEXT(behaviors,                                                                                \
          "file of such tables, lines name = \"100,-0.5,100,0.5\", which commands can name;"        \
@@ -26,6 +27,12 @@
     INTEGER(min_blob_px, 0, 1000000, "the target is seen if its largest blob has more pixels")     \
     INTEGER(vote_frames, 1, 64, "the vote is over this many frames at most")                       \
     INTEGER(vote_window_ms, 0, 60000, "and over those of the last ms; 0: of any age")              \
+    BIT(bit1, 0,                                                                                   \
+        "sector of the picture: all, left or right; and what differs from the keys above: "        \
+        "y_min,y_max,u_min,u_max,v_min,v_max,min_blob_px,vote_frames,vote_window_ms")              \
+    BIT(bit2, 1, "a second bit, for tables of 4 rows; empty: none")                                \
+    BIT(bit3, 2, "for 8 rows")                                                                     \
+    BIT(bit4, 3, "for 16 rows")                                                                    \
     INTEGER(frame_timeout_ms, 1, 10000, "motors stop without a frame for this long")               \
     INTEGER(duty_cap_pct, 0, 100, "largest duty of any wheel")                                     \
     TEXT(camera, "V4L2 device, or stub:FILE of YUYV frames, or stub:unix:SOCKET")                  \
@@ -80,14 +87,16 @@
     {.kind = KEY_INTEGER, .offset = FIELD(name), .min = lowest, .max = highest},
 #define TEXT_PLACE(name, words) {.kind = KEY_TEXT, .offset = FIELD(name)},
 #define YES_NO_PLACE(name, words) {.kind = KEY_BOOL, .offset = FIELD(name)},
+#define BIT_PLACE(name, index, words) \
+    {.kind = KEY_TEXT, .offset = FIELD(bits) + CONFIG_TEXT_MAX * (index)},
 #define SIGN_PLACE(name, wheel, words) \
     {.kind = KEY_INTEGER, .offset = FIELD(sign[wheel]), .min = -1, .max = 1},
 
-const struct config_key config_keys[] = {KEYS(INTEGER_PLACE, TEXT_PLACE, YES_NO_PLACE, SIGN_PLACE)};
+const struct config_key config_keys[] = {KEYS(INTEGER_PLACE, TEXT_PLACE, YES_NO_PLACE, BIT_PLACE, SIGN_PLACE)};
 const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];
 
 #define TEXTS(name, words) #name "\0" words "\0"
 #define INTEGER_TEXTS(name, lowest, highest, words) TEXTS(name, words)
 #define SIGN_TEXTS(name, wheel, words) TEXTS(name, words)
 
-const char config_texts[] = KEYS(INTEGER_TEXTS, TEXTS, TEXTS, SIGN_TEXTS);
+const char config_texts[] = KEYS(INTEGER_TEXTS, TEXTS, TEXTS, SIGN_TEXTS, SIGN_TEXTS);

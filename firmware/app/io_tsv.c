@@ -35,7 +35,7 @@ void io_tsv_add(struct whole_file *log, const struct link_report *report)
     const int32_t direction_deg = out->speed_input_pct < 0 ? 270 : 90;
     const int length =
         snprintf(row, sizeof row, "%" PRId64 "\t%d\t%d\t[(%" PRId32 ", %" PRId32 ", %g)]\n",
-                 report->utime_us * 1000, out->detected_raw, out->detected,
+                 report->utime_us * 1000, out->detected_raw & 1, out->detected & 1,
                  (int32_t)labs(out->speed_input_pct), direction_deg,
                  out->turn_input_milli == 0 ? 0.0 : -out->turn_input_milli / 1000.0);
     (void)whole_file_add(log, row, (size_t)length);

@@ -10,8 +10,8 @@
 // @return false on failure, which is told once: then it is not open, and may be tried again.
 bool io_tsv_open(struct whole_file *log, const char *path, int32_t vote_frames);
 
-// Writes one row: Unix time in ns, the frame's bit, the vote's bit, and the move as the vendor says
-// it: speed, direction in degrees (90 = forward, 270 = backward), turn positive clockwise.
+// Writes one row: Unix time in ns, the frame's and the vote's first bit, and the move as the vendor
+// says it: speed, direction in degrees (90 = forward, 270 = backward), turn positive clockwise.
 void io_tsv_add(struct whole_file *log, const struct link_report *report);
 
 #endif

@@ -67,8 +67,15 @@ static bool knows_behavior(const struct loop *loop, const char *name, char *reas
     if (!known)
     {
         (void)snprintf(reason, LINK_REASON_MAX, "no behaviour '%s'", name);
+        return false;
     }
-    return known;
+    const bool sees = table->bit_count <= loop->core.config.bit_count;
+    if (!sees)
+    {
+        (void)snprintf(reason, LINK_REASON_MAX, "'%s' needs bit%d configured", name,
+                       table->bit_count);
+    }
+    return sees;
 }
 
 static bool select_behavior(struct loop *loop, const char *name, char *reason)

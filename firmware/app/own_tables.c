@@ -27,7 +27,7 @@ bool own_tables_add(struct own_tables *own, const char *name, const char *text,
         (void)snprintf(
             error, LINES_ERROR_MAX,
             "table '%.47s' must be speed,turn,speed,turn, for nothing seen and for seen, as in "
-            "100,-0.5,100,0.5 (speed -100..100, turn -2..2)",
+            "100,-0.5,100,0.5 (speed -100..100, turn -2..2), or 4, 8 or 16 such pairs",
             name);
         return false;
     }

@@ -8,9 +8,8 @@ struct fw_config fw_config_default(void)
 {
     return (struct fw_config){.width_px = 640,
                               .height_px = 480,
-                              .box = fw_color_box_green(),
-                              .min_blob_px = 300,
-                              .vote = fw_vote_config_default(),
+                              .bit_count = 1,
+                              .bits = {fw_bit_default()},
                               .table = fw_behavior_find("milling")->table,
                               .frame_timeout_us = 200000,
                               .duty_cap_pct = FW_DUTY_MAX_PCT};
@@ -23,15 +22,6 @@ enum fw_err fw_config_check(const struct fw_config *config)
     {
         return FW_ERR_FRAME_SIZE;
     }
-    const struct fw_color_box *box = &config->box;
-    if (box->y_min > box->y_max || box->u_min > box->u_max || box->v_min > box->v_max)
-    {
-        return FW_ERR_BOX;
-    }
-    if (config->min_blob_px < 0)
-    {
-        return FW_ERR_MIN_BLOB;
-    }
     if (config->frame_timeout_us <= 0)
     {
         return FW_ERR_FRAME_TIMEOUT;
@@ -40,6 +30,14 @@ enum fw_err fw_config_check(const struct fw_config *config)
     {
         return FW_ERR_DUTY_CAP;
     }
-    const enum fw_err err = fw_vote_check(&config->vote);
+    if (config->bit_count < config->table.bit_count || config->bit_count > FW_MAX_BITS)
+    {
+        return FW_ERR_BITS;
+    }
+    enum fw_err err = FW_OK;
+    for (int i = 0; err == FW_OK && i < config->bit_count; ++i)
+    {
+        err = fw_bit_check(&config->bits[i]);
+    }
     return err != FW_OK ? err : fw_table_check(&config->table);
 }

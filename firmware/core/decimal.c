@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "decimal.h"
 
+#include <string.h>
+
 #define MAX_DIGITS 18
 #define MAX_VALUE 1000000000000000
 #define MAX_EXPONENT 1000
@@ -118,4 +120,22 @@ bool fw_decimal_parse(const char *text, size_t length, int places, int64_t *valu
     }
     *value = negative ? -scaled : scaled;
     return true;
+}
+
+int fw_decimal_list(const char *text, const int places[2], int64_t *values, int most)
+{
+    for (int count = 0; count < most; ++count)
+    {
+        const size_t length = strcspn(text, ",");
+        if (!fw_decimal_parse(text, length, places[count % 2], &values[count]))
+        {
+            return 0;
+        }
+        text += length;
+        if (*text++ == '\0')
+        {
+            return count + 1;
+        }
+    }
+    return 0;
 }

@@ -13,6 +13,10 @@
 // @return false, and value untouched, if the text is no number or its result is beyond 1e15.
 bool fw_decimal_parse(const char *text, size_t length, int places, int64_t *value);
 
+// Reads numbers between commas. @param places of the first, the third and so on; of the others.
+// @return how many; 0, if the text is anything else or holds more than `most`.
+int fw_decimal_list(const char *text, const int places[2], int64_t *values, int most);
+
 // value / 10^places, rounded like above. @param places [0, 18]
 int64_t fw_decimal_round(int64_t value, int places);
 

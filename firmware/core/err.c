@@ -16,6 +16,8 @@ const char *fw_err_str(enum fw_err err)
             return "input out of range: speed input in -100..100, turn input in -2..2";
         case FW_ERR_FRAME_TIMEOUT: return "frame time-out out of range: above 0 us";
         case FW_ERR_DUTY_CAP: return "duty cap out of range: 0 to 100 percent";
+        case FW_ERR_BITS:
+            return "bits out of range: 1 to 4, and 2 rows for 1, 4 for 2, 8 for 3, 16 for 4";
         case FW_ERR_NO_DEVICE: return "no such device";
         case FW_ERR_FORMAT: return "device has not the format asked for";
         case FW_ERR_IO: return "device did not take or give the data";

@@ -106,8 +106,8 @@ static enum fw_script_fault fill_row(bool has_duties, const int64_t values[MAX_C
         {
             return FW_SCRIPT_INPUT_RANGE;
         }
-        row->input.speed_input_pct = (int32_t)fw_decimal_round(values[1], PLACES);
-        row->input.turn_input_milli = (int32_t)values[2];
+        row->input.speed_input_pct = (int16_t)fw_decimal_round(values[1], PLACES);
+        row->input.turn_input_milli = (int16_t)values[2];
         return FW_SCRIPT_OK;
     }
     for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)

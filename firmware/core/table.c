@@ -15,41 +15,46 @@ enum fw_err fw_input_check(const struct fw_input *input)
     return FW_OK;
 }
 
-enum fw_err fw_table_check(const struct fw_table *table)
+int fw_table_row_count(const struct fw_table *table)
 {
-    const enum fw_err err = fw_input_check(&table->unseen);
-    return err != FW_OK ? err : fw_input_check(&table->seen);
+    return 1 << table->bit_count;
 }
 
-static size_t until_comma(const char *text)
+enum fw_err fw_table_check(const struct fw_table *table)
 {
-    size_t length = 0;
-    while (text[length] != '\0' && text[length] != ',')
+    if (table->bit_count < 1 || table->bit_count > FW_MAX_BITS)
     {
-        ++length;
+        return FW_ERR_BITS;
     }
-    return length;
+    enum fw_err err = FW_OK;
+    for (int row = 0; err == FW_OK && row < fw_table_row_count(table); ++row)
+    {
+        err = fw_input_check(&table->rows[row]);
+    }
+    return err;
 }
 
 bool fw_table_parse(const char *text, struct fw_table *table)
 {
-    int32_t values[4];
-    for (int i = 0; i < 4; ++i)
+    // A speed is a whole number of percent, a turn one of thousandths.
+    static const int places[] = {0, 3};
+    int64_t values[2 * FW_MAX_ROWS];
+    const int count = fw_decimal_list(text, places, values, 2 * FW_MAX_ROWS);
+    struct fw_table parsed = {0};
+    for (int i = 0; i < count; ++i)
     {
-        const size_t length = until_comma(text);
-        int64_t value;
-        // A speed is a whole number of percent, a turn one of thousandths.
-        if (text[length] != (i < 3 ? ',' : '\0') ||
-            !fw_decimal_parse(text, length, i % 2 == 0 ? 0 : 3, &value) || value < INT32_MIN ||
-            value > INT32_MAX)
+        if (values[i] < INT16_MIN || values[i] > INT16_MAX)
         {
             return false;
         }
-        values[i] = (int32_t)value;
-        text += length + (i < 3);
+        struct fw_input *row = &parsed.rows[i / 2];
+        *(i % 2 == 0 ? &row->speed_input_pct : &row->turn_input_milli) = (int16_t)values[i];
     }
-    const struct fw_table parsed = {{values[0], values[1]}, {values[2], values[3]}};
-    if (fw_table_check(&parsed) != FW_OK)
+    while (2 * fw_table_row_count(&parsed) < count)
+    {
+        ++parsed.bit_count;
+    }
+    if (2 * fw_table_row_count(&parsed) != count || fw_table_check(&parsed) != FW_OK)
     {
         return false;
     }
@@ -57,7 +62,7 @@ bool fw_table_parse(const char *text, struct fw_table *table)
     return true;
 }
 
-struct fw_input fw_table_lookup(const struct fw_table *table, bool detected)
+struct fw_input fw_table_lookup(const struct fw_table *table, uint32_t bits)
 {
-    return detected ? table->seen : table->unseen;
+    return table->rows[bits & ((uint32_t)fw_table_row_count(table) - 1)];
 }

@@ -10,10 +10,18 @@
 //
 //   a  Y0 Ua Y1 Va     b  Y0 Ub Y1 Vb       a >> 8 | b & 0xFF00 in 16 bits  ->  Ua Ub Va Vb
 //
-// The vectors are the compiler's own (gcc and clang, x86 and ARM alike), without intrinsics.
+// For several boxes, a look of its own comes first: sixteen bytes at a time choose, by their upper
+// four bits, entries of a table, whose bits say which boxes take such a U or V.
+//
+// The vectors are the compiler's own (gcc and clang, x86 and ARM alike), but for that choice.
 #include "fw/threshold.h"
 
 #include <string.h>
+#if defined(__SSSE3__)
+#include <tmmintrin.h>
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#endif
 
 #define BLOCK_BYTES (2 * FW_MASK_WORD_PX)
 
@@ -65,7 +73,6 @@ static inline pair_vector test_bytes(byte_vector bytes, byte_vector low, byte_ve
     return (pair_vector)(bytes - low <= span);
 }
 
-// The quick look. @return false only if no pixel is inside the box.
 static bool may_match(const struct fw_threshold *threshold, const uint8_t *yuyv, int length_bytes)
 {
     const byte_vector low = load(threshold->chroma_low), span = load(threshold->chroma_span);
@@ -83,6 +90,51 @@ static bool may_match(const struct fw_threshold *threshold, const uint8_t *yuyv,
     uint64_t halves[2];
     memcpy(halves, &any, sizeof halves);
     return i < length_bytes || (halves[0] | halves[1]) != 0;
+}
+
+bool fw_threshold_look(const struct fw_threshold *threshold, const uint8_t *yuyv, int width_px)
+{
+    return may_match(threshold, yuyv, 2 * width_px);
+}
+
+// Entries of a table; each number is below 16.
+static inline byte_vector choose(byte_vector table, byte_vector numbers)
+{
+#if defined(__SSSE3__)
+    return (byte_vector)_mm_shuffle_epi8((__m128i)table, (__m128i)numbers);
+#elif defined(__ARM_NEON)
+    return (byte_vector)vqtbl1q_u8((uint8x16_t)table, (uint8x16_t)numbers);
+#else
+    byte_vector chosen;
+    for (int i = 0; i < VECTOR_BYTES; ++i)
+    {
+        chosen[i] = table[numbers[i]];
+    }
+    return chosen;
+#endif
+}
+
+uint8_t fw_looks_row(const struct fw_looks *looks, const uint8_t *yuyv, int width_px)
+{
+    const byte_vector u = load(looks->u), v = load(looks->v);
+    const int length_bytes = 2 * width_px;
+    pair_vector any = {0};
+    int i = 0;
+    for (; i + 2 * VECTOR_BYTES <= length_bytes; i += 2 * VECTOR_BYTES)
+    {
+        const half_vector a = (half_vector)load(yuyv + i);
+        const half_vector b = (half_vector)load(yuyv + i + VECTOR_BYTES);
+        const byte_vector numbers =
+            (byte_vector)((pair_vector)(a >> 8 | (b & 0xFF00)) >> 4 & 0x0F0F0F0F);
+        any |= (pair_vector)choose(u, numbers) & (pair_vector)choose(v, numbers) >> 16;
+    }
+    // Bytes that do not fill two vectors are left to the test.
+    uint32_t found = i < length_bytes ? UINT8_MAX : 0;
+    for (int k = 0; k < VECTOR_BYTES / 4; ++k)
+    {
+        found |= any[k] | any[k] >> 8;
+    }
+    return (uint8_t)found;
 }
 
 // The exact test of 32 pixels. @return one bit per pixel.
@@ -115,11 +167,6 @@ bool fw_threshold_row(const struct fw_threshold *threshold, const uint8_t *yuyv,
 {
     const int whole_words = width_px / FW_MASK_WORD_PX;
     const int rest_px = width_px % FW_MASK_WORD_PX;
-    if (!may_match(threshold, yuyv, 2 * width_px))
-    {
-        memset(mask, 0, sizeof *mask * (size_t)(whole_words + (rest_px > 0)));
-        return false;
-    }
     uint32_t any = 0;
     for (int i = 0; i < whole_words; ++i)
     {

@@ -6,6 +6,11 @@ struct fw_vote_config fw_vote_config_default(void)
     return (struct fw_vote_config){.max_frames = 10, .window_us = INT64_MAX};
 }
 
+int64_t fw_vote_window_us(int64_t window_ms)
+{
+    return window_ms == 0 ? INT64_MAX : window_ms * 1000;
+}
+
 enum fw_err fw_vote_check(const struct fw_vote_config *config)
 {
     if (config->max_frames < 1 || config->max_frames > FW_VOTE_MAX_FRAMES || config->window_us <= 0)

@@ -42,10 +42,11 @@ static void test_defaults_are_the_cores(void)
     TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
     TEST_ASSERT_EQUAL(expected.width_px, core.width_px);
     TEST_ASSERT_EQUAL(expected.height_px, core.height_px);
-    TEST_ASSERT_EQUAL_MEMORY(&expected.box, &core.box, sizeof core.box);
-    TEST_ASSERT_EQUAL(expected.min_blob_px, core.min_blob_px);
-    TEST_ASSERT_EQUAL(expected.vote.max_frames, core.vote.max_frames);
-    TEST_ASSERT_EQUAL_INT64(expected.vote.window_us, core.vote.window_us);
+    TEST_ASSERT_EQUAL_MEMORY(&expected.bits[0].box, &core.bits[0].box, sizeof core.bits[0].box);
+    TEST_ASSERT_EQUAL(1, core.bit_count);
+    TEST_ASSERT_EQUAL(expected.bits[0].min_blob_px, core.bits[0].min_blob_px);
+    TEST_ASSERT_EQUAL(expected.bits[0].vote.max_frames, core.bits[0].vote.max_frames);
+    TEST_ASSERT_EQUAL_INT64(expected.bits[0].vote.window_us, core.bits[0].vote.window_us);
     TEST_ASSERT_EQUAL_MEMORY(&expected.table, &core.table, sizeof core.table);
     TEST_ASSERT_EQUAL_INT64(expected.frame_timeout_us, core.frame_timeout_us);
     TEST_ASSERT_EQUAL(expected.duty_cap_pct, core.duty_cap_pct);
@@ -84,21 +85,48 @@ static void test_core_gets_what_was_set(void)
         parse("behavior = orbit\nvote_frames = 64\nvote_window_ms = 150\n"
               "frame_timeout_ms = 100\nduty_cap_pct = 60\nu_max = 100\n"));
     TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
-    TEST_ASSERT_EQUAL(64, core.vote.max_frames);
-    TEST_ASSERT_EQUAL_INT64(150000, core.vote.window_us);
+    TEST_ASSERT_EQUAL(64, core.bits[0].vote.max_frames);
+    TEST_ASSERT_EQUAL_INT64(150000, core.bits[0].vote.window_us);
     TEST_ASSERT_EQUAL_INT64(100000, core.frame_timeout_us);
     TEST_ASSERT_EQUAL(60, core.duty_cap_pct);
-    TEST_ASSERT_EQUAL(100, core.box.u_max);
+    TEST_ASSERT_EQUAL(100, core.bits[0].box.u_max);
     TEST_ASSERT_EQUAL_MEMORY(&fw_behavior_find("orbit")->table, &core.table, sizeof core.table);
     TEST_ASSERT_TRUE(parse("behavior = found_3\ntable = \"-7,1.25,80,0\"\n"));
     TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
-    TEST_ASSERT_EQUAL(-7, core.table.unseen.speed_input_pct);
-    TEST_ASSERT_EQUAL(1250, core.table.unseen.turn_input_milli);
+    TEST_ASSERT_EQUAL(-7, core.table.rows[0].speed_input_pct);
+    TEST_ASSERT_EQUAL(1250, core.table.rows[0].turn_input_milli);
     TEST_ASSERT_TRUE(parse("table = 1,2,3\n"));
     TEST_ASSERT_EQUAL(FW_ERR_INPUT_RANGE, config_core(&config, &core));
     TEST_ASSERT_TRUE(parse("behavior = orbit\ntable = \"\"\n"));
     TEST_ASSERT_TRUE(parse("u_min = 101\n"));
     TEST_ASSERT_EQUAL(FW_ERR_BOX, config_core(&config, &core));
+}
+
+// Without keys of their own bits are those of the keys before there were several.
+static void test_bits_are_the_usual_one_but_for_what_they_state(void)
+{
+    struct fw_config core;
+    TEST_ASSERT_TRUE_MESSAGE(parse("vote_frames = 5\nbit1 = left\n"
+                                   "bit2 = \"right,40,235,0,124,165,255,20,3\"\n"
+                                   "table = 1,0,2,0,3,0,4,0\n"),
+                             error);
+    TEST_ASSERT_EQUAL(FW_OK, config_core(&config, &core));
+    TEST_ASSERT_EQUAL(2, core.bit_count);
+    TEST_ASSERT_EQUAL(FW_SECTOR_LEFT, core.bits[0].sector);
+    TEST_ASSERT_EQUAL(5, core.bits[0].vote.max_frames);
+    TEST_ASSERT_EQUAL(300, core.bits[0].min_blob_px);
+    TEST_ASSERT_EQUAL(FW_SECTOR_RIGHT, core.bits[1].sector);
+    TEST_ASSERT_EQUAL(165, core.bits[1].box.v_min);
+    TEST_ASSERT_EQUAL(20, core.bits[1].min_blob_px);
+    TEST_ASSERT_EQUAL(3, core.bits[1].vote.max_frames);
+    TEST_ASSERT_EQUAL(4, core.table.rows[3].speed_input_pct);
+    const char *const wrong[] = {"bit2 = \"\"\n", "bit2 = middle\n", "bit2 = \"\"\nbit3 = all\n",
+                                 "bit1 = \"\"\nbit2 = all\n"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i)
+    {
+        TEST_ASSERT_TRUE(parse(wrong[i]));
+        TEST_ASSERT_EQUAL_MESSAGE(FW_ERR_BITS, config_core(&config, &core), wrong[i]);
+    }
 }
 
 static void test_mistakes_name_file_line_key_and_what_is_allowed(void)
@@ -231,6 +259,7 @@ int main(void)
     RUN_TEST(test_every_default_is_in_its_own_range);
     RUN_TEST(test_values_comments_and_quotes);
     RUN_TEST(test_core_gets_what_was_set);
+    RUN_TEST(test_bits_are_the_usual_one_but_for_what_they_state);
     RUN_TEST(test_mistakes_name_file_line_key_and_what_is_allowed);
     RUN_TEST(test_long_lines_and_texts_are_refused);
     RUN_TEST(test_any_bytes_are_read_or_refused);

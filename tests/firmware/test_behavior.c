@@ -48,8 +48,8 @@ static void test_every_published_behavior_is_there_with_its_turn_negated(void)
     {
         const struct fw_behavior *behavior = fw_behavior_find(published[i].name);
         TEST_ASSERT_NOT_NULL_MESSAGE(behavior, published[i].name);
-        assert_translated(published[i].seen, behavior->table.seen, published[i].name);
-        assert_translated(published[i].unseen, behavior->table.unseen, published[i].name);
+        assert_translated(published[i].seen, behavior->table.rows[1], published[i].name);
+        assert_translated(published[i].unseen, behavior->table.rows[0], published[i].name);
     }
 }
 
@@ -59,10 +59,10 @@ static void test_self_centering_spins_on_the_spot_against_its_circle(void)
     const struct fw_behavior *behavior = fw_behavior_find("self_centering");
     TEST_ASSERT_NOT_NULL(behavior);
     int8_t duty_pct[FW_WHEEL_COUNT];
-    fw_mix(&behavior->table.unseen, duty_pct);
+    fw_mix(&behavior->table.rows[0], duty_pct);
     TEST_ASSERT_EQUAL_INT(0, duty_pct[FW_FRONT_LEFT] + duty_pct[FW_FRONT_RIGHT]);
-    TEST_ASSERT_TRUE(behavior->table.seen.turn_input_milli > 0);
-    TEST_ASSERT_TRUE(behavior->table.unseen.turn_input_milli < 0);
+    TEST_ASSERT_TRUE(behavior->table.rows[1].turn_input_milli > 0);
+    TEST_ASSERT_TRUE(behavior->table.rows[0].turn_input_milli < 0);
     // 1.5 rad/s lies below the 1.66 rad/s measured at duty 37 and above the dead band at 26.
     TEST_ASSERT_INT_WITHIN(5, 32, duty_pct[FW_FRONT_LEFT]);
 }

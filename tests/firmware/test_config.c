@@ -19,10 +19,10 @@ static void test_default_is_the_authors_robot_and_in_range(void)
     TEST_ASSERT_EQUAL_INT(FW_OK, fw_config_check(&config));
     TEST_ASSERT_EQUAL_INT(640, config.width_px);
     TEST_ASSERT_EQUAL_INT(480, config.height_px);
-    TEST_ASSERT_EQUAL_INT(300, config.min_blob_px);
-    TEST_ASSERT_EQUAL_INT(10, config.vote.max_frames);
-    TEST_ASSERT_EQUAL_INT(100, config.table.seen.speed_input_pct);
-    TEST_ASSERT_EQUAL_INT(500, config.table.seen.turn_input_milli);
+    TEST_ASSERT_EQUAL_INT(300, config.bits[0].min_blob_px);
+    TEST_ASSERT_EQUAL_INT(10, config.bits[0].vote.max_frames);
+    TEST_ASSERT_EQUAL_INT(100, config.table.rows[1].speed_input_pct);
+    TEST_ASSERT_EQUAL_INT(500, config.table.rows[1].turn_input_milli);
 }
 
 static void test_sizes_out_of_range_are_refused(void)
@@ -45,14 +45,14 @@ static void test_each_empty_side_of_the_box_is_refused(void)
         {2, 1, 0, 255, 0, 255}, {0, 255, 2, 1, 0, 255}, {0, 255, 0, 255, 2, 1}};
     for (int i = 0; i < 3; ++i)
     {
-        config.box = boxes[i];
+        config.bits[0].box = boxes[i];
         TEST_ASSERT_EQUAL_INT(FW_ERR_BOX, fw_config_check(&config));
     }
 }
 
 static void test_blob_below_zero_is_refused(void)
 {
-    config.min_blob_px = -1;
+    config.bits[0].min_blob_px = -1;
     TEST_ASSERT_EQUAL_INT(FW_ERR_MIN_BLOB, fw_config_check(&config));
 }
 
@@ -72,9 +72,9 @@ static void test_cap_outside_percent_is_refused(void)
 
 static void test_vote_and_table_are_looked_at(void)
 {
-    config.table.seen.turn_input_milli = 2001;
+    config.table.rows[1].turn_input_milli = 2001;
     TEST_ASSERT_EQUAL_INT(FW_ERR_INPUT_RANGE, fw_config_check(&config));
-    config.vote.max_frames = 0;
+    config.bits[0].vote.max_frames = 0;
     TEST_ASSERT_EQUAL_INT(FW_ERR_VOTE, fw_config_check(&config));
 }
 

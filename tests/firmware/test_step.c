@@ -17,7 +17,7 @@ static struct image image;
 void setUp(void)
 {
     config = fw_config_default();
-    config.vote.max_frames = 1;
+    config.bits[0].vote.max_frames = 1;
     TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
     image = image_make(640, 480, 0);
 }
@@ -183,14 +183,14 @@ static void test_clock_that_steps_back_stops_and_recovers_with_the_next_frame(vo
 
 static void test_votes_from_before_a_gap_do_not_count(void)
 {
-    config.vote.max_frames = 10;
+    config.bits[0].vote.max_frames = 10;
     TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
     for (int i = 1; i <= 10; ++i)
     {
-        fw_step_bit(&ctx, true, i * PERIOD_US, (uint32_t)i, i * PERIOD_US, &out);
+        fw_step_bits(&ctx, true, i * PERIOD_US, (uint32_t)i, i * PERIOD_US, &out);
     }
     TEST_ASSERT_EQUAL_INT(1, out.detected);
-    fw_step_bit(&ctx, false, 20 * PERIOD_US, 20, 20 * PERIOD_US, &out);
+    fw_step_bits(&ctx, false, 20 * PERIOD_US, 20, 20 * PERIOD_US, &out);
     TEST_ASSERT_EQUAL_INT(0, out.detected);
 }
 
@@ -219,7 +219,7 @@ static void test_bit_and_pixels_take_the_same_decisions(void)
         }
         else
         {
-            fw_step_bit(&bare, seen, now_us - 100, (uint32_t)i, now_us, &bare_out);
+            fw_step_bits(&bare, seen, now_us - 100, (uint32_t)i, now_us, &bare_out);
         }
         TEST_ASSERT_EQUAL_INT(out.detected_raw ? 1600 : 0, out.blob_px);
         out.blob_px = bare_out.blob_px;
@@ -232,8 +232,8 @@ static void test_robots_in_one_process_do_not_influence_each_other(void)
 {
     static struct fw_ctx together[2], alone[2];
     struct fw_config configs[2] = {fw_config_default(), fw_config_default()};
-    configs[1].table = (struct fw_table){.unseen = {-50, 0}, .seen = {0, -2000}};
-    configs[1].vote.max_frames = 3;
+    configs[1].table = (struct fw_table){1, {{-50, 0}, {0, -2000}}};
+    configs[1].bits[0].vote.max_frames = 3;
     uint8_t bit[200];
     uint32_t state = 9;
     struct fw_output expected[2][200];
@@ -250,14 +250,14 @@ static void test_robots_in_one_process_do_not_influence_each_other(void)
     {
         for (int i = 0; i < 200; ++i)
         {
-            fw_step_bit(&alone[r], bit[i] >> r & 1, i, (uint32_t)i, i, &expected[r][i]);
+            fw_step_bits(&alone[r], bit[i] >> r & 1, i, (uint32_t)i, i, &expected[r][i]);
         }
     }
     for (int i = 0; i < 200; ++i)
     {
         for (int r = 0; r < 2; ++r)
         {
-            fw_step_bit(&together[r], bit[i] >> r & 1, i, (uint32_t)i, i, &out);
+            fw_step_bits(&together[r], bit[i] >> r & 1, i, (uint32_t)i, i, &out);
             TEST_ASSERT_EQUAL_MEMORY(&expected[r][i], &out, sizeof out);
         }
     }
@@ -309,9 +309,9 @@ static void test_script_needs_no_frames_and_is_capped(void)
 static void test_new_table_acts_at_once_and_a_bad_one_not_at_all(void)
 {
     step_image(1000);
-    const struct fw_table table = {.unseen = {-50, 0}, .seen = {0, 0}};
+    const struct fw_table table = {1, {{-50, 0}, {0, 0}}};
     TEST_ASSERT_EQUAL_INT(FW_OK, fw_set_table(&ctx, &table));
-    const struct fw_table bad = {.unseen = {0, 0}, .seen = {0, 2001}};
+    const struct fw_table bad = {1, {{0, 0}, {0, 2001}}};
     TEST_ASSERT_EQUAL_INT(FW_ERR_INPUT_RANGE, fw_set_table(&ctx, &bad));
     fw_step(&ctx, NULL, 1001, &out);
     assert_duties(-50, -50);
@@ -324,6 +324,126 @@ static void test_init_leaves_the_robot_untouched_on_a_bad_config(void)
     TEST_ASSERT_EQUAL_INT(FW_ERR_DUTY_CAP, fw_init(&ctx, &config));
     TEST_ASSERT_EQUAL_MEMORY(&before, &ctx, sizeof ctx);
     TEST_ASSERT_TRUE(sizeof ctx < 100 * 1024);
+}
+
+// The row of each number of k bits, and what the mixing makes of it by hand: left is speed - 126
+// turn, right is speed + 126 turn.
+static void test_bits_choose_their_row(void)
+{
+    for (uint8_t k = 1; k <= FW_MAX_BITS; ++k)
+    {
+        config.bit_count = k;
+        config.table.bit_count = k;
+        for (int row = 0; row < 1 << k; ++row)
+        {
+            config.table.rows[row] = (struct fw_input){(int16_t)(row - 8), 0};
+        }
+        for (int i = 0; i < k; ++i)
+        {
+            config.bits[i] = config.bits[0];
+        }
+        TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
+        for (int row = 0; row < 1 << k; ++row)
+        {
+            fw_step_bits(&ctx, (uint32_t)row, 1000 * (row + 1), 0, 1000 * (row + 1), &out);
+            TEST_ASSERT_EQUAL_INT(row, out.detected_raw);
+            TEST_ASSERT_EQUAL_INT(row, out.detected);
+            assert_duties(row - 8, row - 8);
+        }
+    }
+}
+
+static void set_bits(int count, const char *const texts[])
+{
+    config.bit_count = count;
+    for (int i = 0; i < count; ++i)
+    {
+        config.bits[i] = config.bits[0];
+        TEST_ASSERT_TRUE_MESSAGE(fw_bit_parse(texts[i], &config.bits[i]), texts[i]);
+    }
+    TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
+}
+
+// sRGB (200, 30, 30) in BT.601 studio range, from the standard's matrix.
+static const uint8_t kRed[3] = {82, 102, 203};
+
+static void test_bits_look_for_their_colour_in_their_sector(void)
+{
+    static const char *const texts[] = {"left", "right", "all,40,235,0,124,165,255",
+                                        "left,40,235,0,124,165,255"};
+    static const struct
+    {
+        int begin_px;
+        const uint8_t *colour;
+        int bits;
+    } cases[] = {{100, kGreen, 1}, {300, kGreen, 3}, {310, kGreen, 2},
+                 {500, kGreen, 2}, {100, kRed, 12},  {500, kRed, 4}};
+    set_bits(4, texts);
+    for (int i = 0; i < (int)(sizeof cases / sizeof cases[0]); ++i)
+    {
+        // 40 px wide: from 300 on, 20 lie left of the middle, from 310 on, 10 do: 300 px are not
+        // more than 300.
+        image_fill(&image, 0, 0, 640, 480, kGrey);
+        image_fill(&image, cases[i].begin_px, 100, cases[i].begin_px + 40, 130, cases[i].colour);
+        step_image(1000 * (i + 1));
+        TEST_ASSERT_EQUAL_INT(cases[i].bits, out.detected_raw);
+    }
+}
+
+// Each bit of several says of any picture what a robot with that bit alone says.
+static void test_several_bits_are_what_each_is_alone(void)
+{
+    static const char *const texts[] = {"left,0,255,0,90,0,120,40", "all,0,255,100,170,100,170,1",
+                                        "right,0,255,130,255,0,128,10", "all,60,70,0,255,0,255,2"};
+    uint32_t state = 5;
+    for (int round = 0; round < 40; ++round)
+    {
+        config.width_px = 2 + 2 * (int)(random_next(&state) % 60);
+        config.height_px = 1 + (int)(random_next(&state) % 20);
+        free(image.yuyv);
+        image = image_make(config.width_px, config.height_px, 0);
+        const uint32_t coarse = random_next(&state) % 2 ? 0xFF : 0xC0;
+        for (size_t i = 0; i < image.length_bytes; ++i)
+        {
+            image.yuyv[i] = (uint8_t)(random_next(&state) & coarse);
+        }
+        set_bits(4, texts);
+        step_image(1000);
+        const int together = out.detected_raw;
+        int apart = 0;
+        for (int i = 0; i < 4; ++i)
+        {
+            set_bits(1, texts + i);
+            step_image(1000);
+            apart |= out.detected_raw << i;
+        }
+        TEST_ASSERT_EQUAL_INT(apart, together);
+    }
+}
+
+static void test_each_bit_has_its_own_vote(void)
+{
+    static const char *const texts[] = {"all,0,255,0,255,0,255,0,1", "all,0,255,0,255,0,255,0,3"};
+    static const int votes[] = {3, 3, 0 + 2, 0, 0};
+    set_bits(2, texts);
+    for (int i = 0; i < 5; ++i)
+    {
+        // Two frames with both, then none: 2 of 2, 2 of 2, 2 of 3, 1 of 3.
+        fw_step_bits(&ctx, i < 2 ? 3 : 0, i + 1, 0, i + 1, &out);
+        TEST_ASSERT_EQUAL_INT(votes[i], out.detected);
+    }
+}
+
+static void test_table_of_more_bits_than_configured_is_refused(void)
+{
+    struct fw_table table = {.bit_count = 2};
+    TEST_ASSERT_EQUAL_INT(FW_ERR_BITS, fw_set_table(&ctx, &table));
+    config.table = table;
+    TEST_ASSERT_EQUAL_INT(FW_ERR_BITS, fw_init(&ctx, &config));
+    config.bit_count = 2;
+    config.bits[1] = config.bits[0];
+    TEST_ASSERT_EQUAL_INT(FW_OK, fw_init(&ctx, &config));
+    TEST_ASSERT_EQUAL_INT(FW_OK, fw_set_table(&ctx, &table));
 }
 
 int main(void)
@@ -347,5 +467,10 @@ int main(void)
     RUN_TEST(test_script_needs_no_frames_and_is_capped);
     RUN_TEST(test_new_table_acts_at_once_and_a_bad_one_not_at_all);
     RUN_TEST(test_init_leaves_the_robot_untouched_on_a_bad_config);
+    RUN_TEST(test_bits_choose_their_row);
+    RUN_TEST(test_bits_look_for_their_colour_in_their_sector);
+    RUN_TEST(test_several_bits_are_what_each_is_alone);
+    RUN_TEST(test_each_bit_has_its_own_vote);
+    RUN_TEST(test_table_of_more_bits_than_configured_is_refused);
     return UNITY_END();
 }

@@ -35,7 +35,9 @@ static void check_output(const struct fw_ctx *ctx, const struct fw_output *out)
     }
     CLAIM(out->mode == (ctx->has_frame ? FW_MODE_TABLE : FW_MODE_FAULT));
     CLAIM(out->blob_px >= 0 && out->blob_px <= ctx->config.width_px * ctx->config.height_px);
-    CLAIM(out->detected_raw == (ctx->has_frame && out->blob_px > ctx->config.min_blob_px));
+    CLAIM((out->detected_raw & 1) ==
+          (ctx->has_frame && out->blob_px > ctx->config.bits[0].min_blob_px));
+    CLAIM(out->detected_raw >> ctx->config.bit_count == 0);
 }
 
 static uint64_t rejected(const struct fw_ctx *ctx)
@@ -55,7 +57,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct fw_config config = fw_config_default();
     config.width_px = 2 + 2 * (int)take(&in, 1) % 80;
     config.height_px = 1 + (int)take(&in, 1) % 16;
-    config.min_blob_px = (int)take(&in, 1);
+    config.bit_count = 1 + (int)take(&in, 1) % FW_MAX_BITS;
+    for (int i = 0; i < config.bit_count; ++i)
+    {
+        const uint8_t y = (uint8_t)take(&in, 1), u = (uint8_t)take(&in, 1);
+        config.bits[i] = fw_bit_default();
+        config.bits[i].box = (struct fw_color_box){y / 2, y, u / 2, u, 255 - u, 255};
+        config.bits[i].sector = (uint8_t)(take(&in, 1) % FW_SECTOR_COUNT);
+        config.bits[i].min_blob_px = (int)take(&in, 1);
+    }
     config.duty_cap_pct = CAP_PCT;
     CLAIM(fw_init(&ctx, &config) == FW_OK);
     int64_t now_us = 0;

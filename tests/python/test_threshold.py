@@ -12,6 +12,7 @@ from scipy import ndimage
 from twinmill.threshold.box import KEYS, Ball, find_ball, fit_box
 from twinmill.threshold.pictures import Picture, from_rgb, read_pictures, split_frames
 from twinmill_cli import main as cli
+from twinmill_cli import threshold
 from twinmill_cli.threshold import write_settings
 
 WIDTH_PX, HEIGHT_PX, MIN_BLOB_PX = 320, 240, 300
@@ -231,3 +232,39 @@ def test_mistakes_get_one_sentence(tmp_path, monkeypatch, arguments, words):
     (tmp_path / "b.png").write_text("no picture")
     with pytest.raises(ValueError, match=words):
         cli.run(["threshold", *arguments])
+
+
+# sRGB of the balls; which colours lie apart is plain from BT.601: red has much V, blue much U.
+BALLS = {"green": (40, 170, 60), "red": (200, 40, 40), "blue": (40, 70, 200)}
+
+
+def coloured(name, seed, rgb):
+    """A picture of one ball of a colour on the floor, with noise."""
+    pixels, truth = scene(seed, (160, 120, 25), noise=0)
+    pixels[truth] = rgb
+    random = np.random.default_rng(seed).normal(0, 4, pixels.shape)
+    return from_rgb(name, np.clip(pixels + random, 0, 255).astype(np.uint8))
+
+
+def test_limits_of_several_colours_take_no_other_ball():
+    pictures = {name: coloured(name, k, rgb) for k, (name, rgb) in enumerate(BALLS.items())}
+    names = list(pictures)
+    balls = [find_ball(pictures[name], name) for name in names]
+    for ball in balls:
+        assert np.hypot(ball.x_px - 160, ball.y_px - 120) < 2
+    found = threshold._fit(list(pictures.values()), names, balls, MIN_BLOB_PX)
+    assert threshold._problem(found) == ""
+    for name, fitted in found.items():
+        for other, picture in pictures.items():
+            blob = native.largest_blob_px(native.inside(picture.yuyv, fitted.box))
+            assert (blob > MIN_BLOB_PX) == (name == other), (name, other)
+    settings = threshold._settings(found)
+    assert list(settings) == [*KEYS, "bit2", "bit3"]
+    assert settings["bit2"] == ",".join(["all", *map(str, found["red"].box)])
+
+
+def test_two_colours_that_are_one_are_named():
+    pictures = [coloured("a", 1, BALLS["red"]), coloured("b", 2, (210, 45, 42))]
+    balls = [find_ball(picture, "red") for picture in pictures]
+    problem = threshold._problem(threshold._fit(pictures, ["red", "orange"], balls, MIN_BLOB_PX))
+    assert "red and orange overlap" in problem

@@ -218,7 +218,7 @@ TEST(CameraSensor, LooksWhereItsPanSays)
     fw_ctx firmware{};
     ASSERT_EQ(fw_init(&firmware, &config), FW_OK);
     fw_output out;
-    camera.Expose(std::vector<Pose2>{{}, {0.8, 0, 0}}, 0, 1);
+    camera.Expose({std::vector<Pose2>{{}, {0.8, 0, 0}}, 0}, 1);
     camera.Decide(1, firmware, out);
     const Image picture = camera.LastImage();
     double columns = 0, count = 0;
@@ -245,7 +245,7 @@ TEST(CameraSensor, AFrameArrivesAfterItsDelay)
     for (int step = 0; step < 6; ++step)
     {
         const int64_t now_us = 1'000'000 + 20'000 * step;
-        camera.Expose(std::vector<Pose2>{{}, {0.6, 0, 0}}, 0, now_us);
+        camera.Expose({std::vector<Pose2>{{}, {0.6, 0, 0}}, 0}, now_us);
         camera.Decide(now_us, firmware, out);
         EXPECT_EQ(out.frame_utime_us, step < 3 ? 0 : 1'000'000 + 20'000 * (step - 3));
         EXPECT_EQ(out.detected_raw, step >= 3);

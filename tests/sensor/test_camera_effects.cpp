@@ -48,7 +48,7 @@ public:
     {
         std::vector<Pose2> poses{{}};
         poses.insert(poses.end(), others.begin(), others.end());
-        camera_.Expose(poses, 0, now_us_ += kPeriod_us);
+        camera_.Expose({poses, 0}, now_us_ += kPeriod_us);
         camera_.Decide(now_us_, firmware_, out_);
         return out_.detected_raw;
     }

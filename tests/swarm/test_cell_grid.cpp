@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -109,10 +110,11 @@ TEST(CellGrid, SensorsSeeTheSameWithFarRobotsLeftOut)
                     some.push_back(poses[j]);
                 const auto self =
                     static_cast<size_t>(std::ranges::lower_bound(near, i) - near.begin());
-                ConeSensor all(detection, static_cast<int>(i), 1),
-                    few(detection, static_cast<int>(i), 1);
-                const bool by_all = all.Next(poses, i, 0)->detected;
-                EXPECT_EQ(by_all, few.Next(some, self, 0)->detected);
+                const std::array bits{fw_bit_default()};
+                ConeSensor all(detection, bits, static_cast<int>(i), 1),
+                    few(detection, bits, static_cast<int>(i), 1);
+                const bool by_all = all.Next({poses, i}, 0)->bits;
+                EXPECT_EQ(by_all, few.Next({some, self}, 0)->bits);
                 seen += by_all;
             }
         }

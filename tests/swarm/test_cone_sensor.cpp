@@ -2,6 +2,7 @@
 // twin/sensor/cone_sensor.cpp
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -69,12 +70,13 @@ TEST(ConeSensor, ErrorRatesAreThoseOfTheModel)
     sensor.miss_rate = 0.04;
     sensor.false_rate = 0.1;
     const std::vector<Pose2> apart{{0, 0, 0}, {5, 0, 0}}, close{{0, 0, 0}, {0.5, 0, 0}};
-    ConeSensor blind(sensor, 0, 1), seeing(sensor, 0, 2);
+    ConeSensor blind(sensor, std::array{fw_bit_default()}, 0, 1),
+        seeing(sensor, std::array{fw_bit_default()}, 0, 2);
     int imagined = 0, missed = 0;
     for (int i = 0; i < kFrames; ++i)
     {
-        imagined += blind.Next(apart, 0, i)->detected;
-        missed += !seeing.Next(close, 0, i)->detected;
+        imagined += blind.Next({apart, 0}, i)->bits;
+        missed += !seeing.Next({close, 0}, i)->bits;
     }
     // Four standard deviations of a binomial count.
     EXPECT_NEAR(imagined, 0.1 * kFrames, 4 * std::sqrt(0.1 * 0.9 * kFrames));
@@ -85,7 +87,7 @@ TEST(ConeSensor, DelayHoldsFramesBackAndKeepsTheirTimeStamps)
 {
     DetectionModel sensor = Cone(1, 1);
     sensor.delay_s = 0.05;
-    ConeSensor delayed(sensor, 0, 1);
+    ConeSensor delayed(sensor, std::array{fw_bit_default()}, 0, 1);
     const std::vector<Pose2> apart{{0, 0, 0}, {5, 0, 0}}, close{{0, 0, 0}, {0.5, 0, 0}};
     // Seen in the frame at 20 ms alone; 50 ms of delay end at the frame at 80 ms.
     for (int64_t t_us = 0; t_us <= 100'000; t_us += 20'000)
@@ -95,7 +97,7 @@ TEST(ConeSensor, DelayHoldsFramesBackAndKeepsTheirTimeStamps)
         if (frame)
         {
             EXPECT_EQ(frame->utime_us, t_us - 60'000);
-            EXPECT_EQ(frame->detected, t_us == 80'000);
+            EXPECT_EQ(frame->bits, t_us == 80'000);
         }
     }
 }

@@ -62,8 +62,8 @@ TEST_P(SwarmProperty, MirrorImageGivesTheMirroredRun)
     auto tables = tables_;
     for (fw_table &table : tables)
     {
-        table.seen.turn_input_milli *= -1;
-        table.unseen.turn_input_milli *= -1;
+        table.rows[1].turn_input_milli *= -1;
+        table.rows[0].turn_input_milli *= -1;
     }
     const auto ends = EndsOf(models_, starts, tables);
     for (size_t i = 0; i < kRobots; ++i)

@@ -2,6 +2,7 @@
 // twin/sensor/view.cpp and the effects of stages view and decide. Truth: geometry and algebra.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -83,11 +84,11 @@ TEST(View, ASoftEdgeIsLogistic)
     EXPECT_NEAR(See(detection, {{}, At(1.02, 0), At(1, 0.1)}),
                 1 - 0.5 * (1 - 1 / (1 + std::exp(1))), 1e-12);
 
-    ConeSensor sensor(detection, 0, 5);
+    ConeSensor sensor(detection, std::array{fw_bit_default()}, 0, 5);
     int seen = 0;
     constexpr int kFrames = 20000;
     for (int i = 0; i < kFrames; ++i)
-        seen += sensor.Next(std::vector<Pose2>{{}, At(1.02, 0)}, 0, 1000 * i)->detected;
+        seen += sensor.Next({std::vector<Pose2>{{}, At(1.02, 0)}, 0}, 1000 * i)->bits;
     const double p = 1 / (1 + std::exp(1));
     EXPECT_NEAR(seen, kFrames * p, 4 * std::sqrt(kFrames * p * (1 - p)));
 }
@@ -165,16 +166,17 @@ TEST(Decide, VoteIsAWholeNumberOfFramesThatTheFirmwareTakes)
 // Seen in the picture of 20 ms alone. It is stamped at 70 ms, though 50 ms old.
 TEST(Decide, ADelayedPictureCarriesALateStamp)
 {
-    ConeSensor sensor(ModelWith("sensor_delay", "delay_s", 0.05), 0, 1);
+    ConeSensor sensor(ModelWith("sensor_delay", "delay_s", 0.05), std::array{fw_bit_default()}, 0,
+                      1);
     for (int64_t t_us = 0; t_us <= 100'000; t_us += 10'000)
     {
         const double x_m = t_us == 20'000 ? 0.5 : 5;
-        const auto frame = sensor.Next(std::vector<Pose2>{{}, {x_m, 0, 0}}, 0, t_us);
+        const auto frame = sensor.Next({std::vector<Pose2>{{}, {x_m, 0, 0}}, 0}, t_us);
         ASSERT_EQ(frame.has_value(), t_us >= 50'000);
         if (frame)
         {
             EXPECT_EQ(frame->utime_us, t_us);
-            EXPECT_EQ(frame->detected, t_us == 70'000);
+            EXPECT_EQ(frame->bits, t_us == 70'000);
         }
     }
 }

@@ -62,6 +62,26 @@ const Variant kVariants[] = {
          c.ring_size = 5;
          c.start = StartShape::kDisc;
      }},
+    {"three_bits_of_two_colours",
+     [](Cell &c) {
+         c.model.sensor.bits = {"left", "right", "all,40,235,0,124,165,255"};
+         c.model.sensor.target_radius_m = 0.05;
+         c.model.sensor.false_negative_rate = 0.04;
+         c.model.sensor.false_positive_rate = 0.02;
+         c.model.sensor.vote_frames = 3;
+         c.tables.assign(6, fw_table{3,
+                                     {{100, -500},
+                                      {100, 300},
+                                      {80, -900},
+                                      {60, 0},
+                                      {0, 700},
+                                      {-50, 200},
+                                      {90, -100},
+                                      {100, 500}}});
+         c.tables.back() = fw_behavior_find("milling")->table;
+         c.colours.assign(6, TargetColour());
+         c.colours[1] = c.colours[4] = ColourNamed("red");
+     }},
     {"duty_drive",
      [](Cell &c) {
          c.model = Model::Load("turbopi_nominal.toml");

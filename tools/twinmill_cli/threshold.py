@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from pathlib import Path
 from typing import Annotated
@@ -24,11 +25,22 @@ if working():  # not for --help
     from twinmill.robots.remote import Remote
     from twinmill.terminal import Fitting
     from twinmill.threshold import pictures as source
-    from twinmill.threshold.box import KEYS, Ball, Box, Fitted, evaluate, find_ball, fit_box
+    from twinmill.threshold.box import (
+        COLOURS,
+        KEYS,
+        Ball,
+        Fitted,
+        ball_pixels,
+        evaluate,
+        find_ball,
+        fit_box,
+        overlap,
+    )
     from twinmill.threshold.pictures import Picture
     from twinmill.threshold.show import draw
 
 DEFAULT_MIN_BLOB_PX = 300  # of the robot's program
+MOST_BITS = 4
 
 
 def register(app: typer.Typer) -> None:
@@ -39,8 +51,11 @@ def register(app: typer.Typer) -> None:
 def _threshold(
     *,
     images: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[IMAGE...]", help="PNG, JPEG, or raw YUYV frames (*.yuyv)."),
+        list[str] | None,
+        typer.Argument(
+            metavar="[IMAGE...]",
+            help="PNG, JPEG, or raw YUYV frames (*.yuyv); red=IMAGE: of that ball.",
+        ),
     ] = None,
     camera: Annotated[
         str, typer.Option("--camera", metavar="DEVICE", help="Or a camera here: /dev/video0.")
@@ -78,32 +93,100 @@ def _threshold(
     do is judged by the robot's own threshold and blob code. Nothing is written
     if ball and background cannot be told apart.
 
+    With pictures of several colours, as red=c.png, the first is the robot's
+    bit 1, the next its bit 2, and so on; colours that overlap are named.
+
     Example: twinmill threshold a.png b.png --picture seen.png --config turbopi.conf
     """
     if [bool(images), bool(camera), bool(robot)].count(True) != 1:
         raise ValueError("threshold: give pictures, or --camera, or --robot: one of them.")
     if write and not robot:
         raise ValueError("--write needs --robot: whose configuration is it?")
+    colours, paths = _named(images or [])
     if picture:
-        check_new_file(picture, force, [*(images or []), config])
+        check_new_file(picture, force, [*paths, config])
     size_px = _parse_size(size)
     remote = Remote(robot, ssh_config) if robot else None
     with busy("looking"):
-        taken = _take(images or [], camera, remote, count, size_px=size_px)
-        balls = _balls(taken, ball or [])
-        fitted = fit_box(taken, balls, min_blob_px)
+        taken = _take(paths, camera, remote, count, size_px=size_px)
+        colours = colours or ["green"] * len(taken)
+        balls = _balls(taken, colours, ball or [])
+        found = _fit(taken, colours, balls, min_blob_px)
         before = [evaluate(*both, native.green_box()) for both in zip(taken, balls, strict=True)]
+        results = {name: iter(fitted.results) for name, fitted in found.items()}
+        after = [next(results[name]) for name in colours]
         if picture:
-            draw(picture, taken, balls, before=before, after=fitted.results)
-    settings = dict(zip(KEYS, fitted.box, strict=True))
-    if not fitted.problem:
-        if config:
-            write_settings(config, settings)
-        if write:
-            remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
-            remote.run("restart")
-    _tell(taken, balls, fitted, before, as_json=as_json)
-    return 1 if fitted.problem else 0
+            draw(picture, taken, balls, before=before, after=after)
+    settings = _settings(found)
+    good = not _problem(found)
+    if good and config:
+        write_settings(config, settings)
+    if good and write:
+        remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
+        remote.run("restart")
+    _tell(taken, balls, found, before=before, after=after, as_json=as_json)
+    return 0 if good else 1
+
+
+def _named(images: list[str]) -> tuple[list[str], list[Path]]:
+    """Colour and file of each picture; without any name all show the green ball."""
+    pairs = [("green", image) if Path(image).exists() else _pair(image) for image in images]
+    return [name for name, _ in pairs], [Path(path) for _, path in pairs]
+
+
+def _pair(image: str) -> tuple[str, str]:
+    name, equals, path = image.partition("=")
+    if not equals:
+        return "green", image
+    if name not in COLOURS:
+        raise ValueError(f"{image}: '{name}' must be one of {', '.join(COLOURS)}.")
+    return name, path
+
+
+def _fit(
+    pictures: list[Picture], colours: list[str], balls: list[Ball], min_blob_px: int
+) -> dict[str, Fitted]:
+    """Limits of each colour, in the order of the pictures; those of the others are kept out."""
+    groups = {
+        name: [k for k, other in enumerate(colours) if other == name]
+        for name in dict.fromkeys(colours)
+    }
+    if len(groups) > MOST_BITS:
+        raise ValueError(f"{len(groups)} colours: a robot looks for at most {MOST_BITS}.")
+
+    def of(rows: list[int]) -> tuple[list[Picture], list[Ball]]:
+        return [pictures[k] for k in rows], [balls[k] for k in rows]
+
+    found = {}
+    for name, rows in groups.items():
+        rest = [k for k in range(len(pictures)) if k not in rows]
+        others = ball_pixels(*of(rest)) if rest else None
+        found[name] = fit_box(*of(rows), min_blob_px, others=others)
+    return found
+
+
+def _problem(found: dict[str, Fitted]) -> str:
+    """What keeps the limits from being used; empty if nothing does."""
+    problems = [fitted.problem for fitted in found.values() if fitted.problem]
+    problems += [
+        f"{a} and {b} overlap: a robot would take one for the other" for a, b in _overlaps(found)
+    ]
+    return "; ".join(problems)
+
+
+def _overlaps(found: dict[str, Fitted]) -> list[tuple[str, str]]:
+    return [
+        (a, b) for a, b in itertools.combinations(found, 2) if overlap(found[a].box, found[b].box)
+    ]
+
+
+def _settings(found: dict[str, Fitted]) -> dict[str, int | str]:
+    """Keys of the robot's configuration: the first colour's limits, then bits of the others."""
+    first, *others = (fitted.box for fitted in found.values())
+    settings: dict[str, int | str] = dict(zip(KEYS, first, strict=True))
+    for number, box in enumerate(others, 2):
+        settings[f"bit{number}"] = ",".join(["all", *map(str, box)])
+    return settings
 
 
 def _parse_size(text: str) -> tuple[int, int]:
@@ -123,9 +206,9 @@ def _take(
     return source.from_robot(remote, count, size_px)
 
 
-def _balls(pictures: list[Picture], given: list[str]) -> list[Ball]:
+def _balls(pictures: list[Picture], colours: list[str], given: list[str]) -> list[Ball]:
     if not given:
-        return [find_ball(picture) for picture in pictures]
+        return [find_ball(*both) for both in zip(pictures, colours, strict=True)]
     balls = [_parse_ball(text) for text in given]
     if len(balls) not in (1, len(pictures)):
         raise ValueError(f"--ball: {len(balls)} given for {len(pictures)} pictures: one, or each.")
@@ -147,7 +230,7 @@ def _parse_ball(text: str) -> Ball:
     return ball
 
 
-def write_settings(path: Path, settings: dict[str, int]) -> None:
+def write_settings(path: Path, settings: dict[str, int | str]) -> None:
     """Sets keys of a configuration file; all other lines stay as they are."""
     lines = path.read_text().splitlines() if path.exists() else []
     kept = [line for line in lines if line.partition("=")[0].strip() not in settings]
@@ -158,24 +241,34 @@ def write_settings(path: Path, settings: dict[str, int]) -> None:
 
 
 def _tell(
-    pictures: list[Picture], balls: list[Ball], fitted: Fitted, before: list, *, as_json: bool
+    pictures: list[Picture],
+    balls: list[Ball],
+    found: dict[str, Fitted],
+    *,
+    before: list,
+    after: list,
+    as_json: bool,
 ) -> None:
     rows = [
         {
             "name": picture.name,
             "ball_px": [ball.x_px, ball.y_px, ball.radius_px],
-            "hit_frac": after.hit_frac,
-            "ball_blob_px": after.ball_blob_px,
-            "false_px": after.false_px,
-            "false_blob_px": after.false_blob_px,
+            "hit_frac": now.hit_frac,
+            "ball_blob_px": now.ball_blob_px,
+            "false_px": now.false_px,
+            "false_blob_px": now.false_blob_px,
             "false_px_before": old.false_px,
         }
-        for picture, ball, after, old in zip(pictures, balls, fitted.results, before, strict=True)
+        for picture, ball, now, old in zip(pictures, balls, after, before, strict=True)
     ]
+    problem, settings = _problem(found), _settings(found)
     data = {
-        "separable": not fitted.problem,
-        "problem": fitted.problem or None,
-        "box": dict(zip(KEYS, fitted.box, strict=True)),
+        "separable": not problem,
+        "problem": problem or None,
+        "box": {key: settings[key] for key in KEYS},
+        "colours": {name: list(fitted.box) for name, fitted in found.items()},
+        "overlaps": _overlaps(found),
+        "settings": settings,
         "pictures": rows,
     }
     table = Table(box=frame.SIMPLE_HEAD)
@@ -189,9 +282,6 @@ def _tell(
             f"{row['false_blob_px']} px",
             f"{row['false_px']} (before {row['false_px_before']})",
         )
-    words = f"Cannot be told apart: {fitted.problem}." if fitted.problem else _options(fitted.box)
-    deliver(data, Group(Fitting(table), Text(words, "red" if fitted.problem else "")), as_json)
-
-
-def _options(box: Box) -> str:
-    return " ".join(f"--set {key}={value}" for key, value in zip(KEYS, box, strict=True))
+    options = " ".join(f"--set {key}={value}" for key, value in settings.items())
+    words = f"Cannot be told apart: {problem}." if problem else options
+    deliver(data, Group(Fitting(table), Text(words, "red" if problem else "")), as_json)

@@ -50,7 +50,7 @@ void UseFirmware(Swarm &swarm, const HilOptions &options, const CameraWorld &wor
         const size_t k = static_cast<size_t>(i);
         const DetectionModel detection = CameraDetectionModel(robots[k], world);
         const FirmwareOptions firmware{program, behaviors[k]->name, behaviors[k]->table,
-                                       !options.free_run};
+                                       robots[k].sensor.bits, !options.free_run};
         swarm.SetSensor(i, std::make_unique<FirmwareSensor>(firmware, world, i, detection, seed));
     }
 }

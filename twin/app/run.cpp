@@ -97,7 +97,10 @@ Swarm MakeSwarm(const Options &options, const Setup &setup,
     for (const fw_behavior *behavior : setup.behaviors)
         tables.push_back(behavior->table);
     Swarm swarm(MakePlant(options, setup), setup.robots, tables,
-                {options.seed, setup.start_utime_us, kMaxStep_s});
+                {.seed = options.seed,
+                 .start_utime_us = setup.start_utime_us,
+                 .max_step_s = kMaxStep_s,
+                 .colours = ParseColours(options.behavior, options.n)});
     for (int robot = 0; robot < swarm.Size(); ++robot)
         swarm.Play(robot, script);
     const CameraWorld world =
@@ -115,13 +118,9 @@ std::vector<Publisher::Robot> DescribeRobots(const Options &options, const Setup
     std::vector<Publisher::Robot> robots;
     for (const fw_behavior *behavior : setup.behaviors)
     {
-        const fw_table &table = behavior->table;
         std::ostringstream config;
         config << "# " << setup.command_line << "\n# seed = " << options.seed << ", table "
-               << behavior->name << ": unseen (" << table.unseen.speed_input_pct << ", "
-               << table.unseen.turn_input_milli / 1000.0 << "), seen ("
-               << table.seen.speed_input_pct << ", " << table.seen.turn_input_milli / 1000.0
-               << ")\n"
+               << behavior->name << " = " << TableText(behavior->table) << "\n"
                << model_text.str();
         robots.push_back({behavior->name, config.str()});
     }

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "sensor/cone_sensor.h"
+#include "swarm/robots.h"
 
 namespace twin
 {
@@ -29,7 +30,8 @@ struct SensorKind
 constexpr SensorKind kSensors[] = {
     {"cone",
      [](const Place &at) -> std::unique_ptr<RobotSensor> {
-         return std::make_unique<ConeSensor>(at.robot.MakeDetectionModel(), at.number, at.seed);
+         return std::make_unique<ConeSensor>(at.robot.MakeDetectionModel(), MakeBits(at.robot),
+                                             at.number, at.seed);
      }},
     {"camera",
      [](const Place &at) -> std::unique_ptr<RobotSensor> {

@@ -18,6 +18,8 @@
 #include <utility>
 #include <vector>
 
+#include "swarm/species.h"
+
 namespace twin
 {
 namespace
@@ -57,19 +59,18 @@ std::vector<std::string> CommandLine(const FirmwareOptions &options, const Camer
         words.push_back("--set");
         words.push_back(pair);
     }
+    for (size_t i = 0; i < options.bits.size(); ++i)
+    {
+        words.push_back("--set");
+        words.push_back("bit" + std::to_string(i + 1) + "=" + options.bits[i]);
+    }
     return words;
 }
 
 // A file of the one table, as robots have of the user's own: inputs in thousandths are exact.
 void WriteBehavior(const std::string &path, const FirmwareOptions &options)
 {
-    const auto input = [](const fw_input &in) {
-        return std::to_string(in.speed_input_pct) + "," +
-               std::to_string(in.turn_input_milli / 1000.0);
-    };
-    std::ofstream file(path);
-    file << options.behavior << " = \"" << input(options.table.unseen) << ","
-         << input(options.table.seen) << "\"\n";
+    std::ofstream(path) << options.behavior << " = \"" << TableText(options.table) << "\"\n";
 }
 
 }  // namespace

@@ -63,6 +63,7 @@ public:
         ReadFields();
         ReadEffects();
         ReadRobots();
+        ReadBits();
         ReadClock();
         return model_;
     }
@@ -94,8 +95,9 @@ private:
     // The plain numbers, and a sub-table `std` with their uncertainties, which only people read.
     void ReadFields()
     {
-        static const std::set<std::string> kSpecial{"base.drive", "base.wheels", "base.duty_pct",
-                                                    "base.wheel_speed_mps", "clock.same"};
+        static const std::set<std::string> kSpecial{"base.drive",    "base.wheels",
+                                                    "base.duty_pct", "base.wheel_speed_mps",
+                                                    "clock.same",    "sensor.bits"};
         for (const auto &[section, node] : root_)
         {
             const std::string name(section.str());
@@ -105,6 +107,8 @@ private:
             std::set<std::string> known{"std", "fitted_on"};
             if (name == "clock")
                 known.insert("same");
+            if (name == "sensor")
+                known.insert("bits");
             for (const Field &field : Fields())
                 if (name == field.section)
                     known.insert(field.key);
@@ -124,6 +128,20 @@ private:
                     }
             }
         }
+    }
+
+    // Texts for the firmware, which says what they may be.
+    void ReadBits()
+    {
+        const toml::node_view bits = root_["sensor"]["bits"];
+        if (!bits)
+            return;
+        const toml::array *texts = bits.as_array();
+        if (!texts || texts->empty() || !texts->is_homogeneous<std::string>())
+            Fail(origin_, "sensor.bits must be a list of texts, as in [\"left\", \"right\"]");
+        model_.sensor.bits.clear();
+        for (const toml::node &text : *texts)
+            model_.sensor.bits.push_back(*text.value<std::string>());
     }
 
     // `same = true`: poses and commands were stamped by one clock, so nothing is to be estimated.

@@ -212,7 +212,8 @@ std::vector<double> BodyVelocity(const Model &model, const std::vector<double> &
 // The firmware's own mixing, bound here once.
 std::vector<int> MixedDuties(int speed_input_pct, int turn_input_milli)
 {
-    const fw_input input{speed_input_pct, turn_input_milli};
+    const fw_input input{static_cast<int16_t>(std::clamp(speed_input_pct, -1000, 1000)),
+                         static_cast<int16_t>(std::clamp(turn_input_milli, -10000, 10000))};
     if (fw_input_check(&input) != FW_OK)
         throw std::invalid_argument(
             "mix: speed_input_pct must be within -100 to 100, turn_input_milli within -2000 to "
@@ -437,6 +438,7 @@ NB_MODULE(twinmill_native, m)
                      [](const Model &model) { return WheelKindName(model.base.wheels); })
         .def_prop_ro("clock_known", [](const Model &model) { return model.clock.known; })
         .def_prop_ro("clock_same", [](const Model &model) { return model.clock.same; })
+        .def_prop_ro("bits", [](const Model &model) { return model.sensor.bits; })
         .def_prop_ro("texts", &TextsList, "By effect in their order: its texts by name.")
         .def_prop_ro("effects", [](const Model &model) {
             nb::list names;

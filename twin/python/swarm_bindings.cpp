@@ -6,12 +6,14 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 
 #include "arrays.h"
 #include "plant_mujoco/mujoco_plant.h"
 #include "swarm/metrics.h"
+#include "swarm/robots.h"
 #include "swarm/species.h"
 #include "sweep/batch.h"
 #include "sweep/worlds.h"
@@ -25,7 +27,8 @@ namespace
 
 using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Seeds = nb::ndarray<const uint64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Tables = std::vector<std::array<int, 4>>;
+using Row = std::vector<int>;  // speed and turn of each number of bits
+using Tables = std::vector<Row>;
 
 constexpr const char *kMetricNames[] = {"circliness", "radius_m",  "scatter_m2", "rotation",
                                         "odd_ratio",  "diffusion", "groups",     "contacts"};
@@ -49,22 +52,34 @@ StartShape StartNamed(const std::string &name)
                                 "'; choose square, disc or facing-out");
 }
 
-fw_table TableOf(const std::array<int, 4> &row)
+fw_table TableOf(const Row &row)
 {
-    const fw_table table{{row[0], row[1]}, {row[2], row[3]}};
-    if (fw_table_check(&table) != FW_OK)
+    const auto entry = [&](size_t i) {
+        constexpr int kOutside = FW_TURN_INPUT_MAX_MILLI + 1;
+        return static_cast<int16_t>(std::clamp(row[i], -kOutside, kOutside));
+    };
+    fw_table table{};
+    while (table.bit_count < FW_MAX_BITS && size_t{2} << table.bit_count < row.size())
+        ++table.bit_count;
+    const bool fits = size_t{2} << table.bit_count == row.size();
+    for (size_t i = 0; fits && i < row.size() / 2; ++i)
+        table.rows[i] = {entry(2 * i), entry(2 * i + 1)};
+    if (!fits || fw_table_check(&table) != FW_OK)
         throw std::invalid_argument(
-            "the firmware refuses a table: speed inputs are -100 to 100, turn inputs -2 to 2");
+            "the firmware refuses a table: it has 2, 4, 8 or 16 rows; speed inputs are -100 to 100, "
+            "turn inputs -2 to 2");
     return table;
 }
 
-std::array<int, 4> RowOf(const fw_table &table)
+Row RowOf(const fw_table &table)
 {
-    return {table.unseen.speed_input_pct, table.unseen.turn_input_milli, table.seen.speed_input_pct,
-            table.seen.turn_input_milli};
+    Row row;
+    for (int i = 0; i < fw_table_row_count(&table); ++i)
+        row.insert(row.end(), {table.rows[i].speed_input_pct, table.rows[i].turn_input_milli});
+    return row;
 }
 
-using NamedTables = std::vector<std::pair<std::string, std::array<int, 4>>>;
+using NamedTables = std::vector<std::pair<std::string, Row>>;
 
 NamedTables Species(const std::string &text, std::optional<int> n, const NamedTables &own)
 {
@@ -78,19 +93,28 @@ NamedTables Species(const std::string &text, std::optional<int> n, const NamedTa
 }
 
 Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const std::string &start,
-              double spread_m, const std::vector<std::array<double, 3>> &poses)
+              double spread_m, const std::vector<std::array<double, 3>> &poses,
+              const std::vector<std::string> &colours)
 {
+    if (!colours.empty() && colours.size() != rows.size())
+        throw std::invalid_argument("colours must be none, or one for each table");
     if (!poses.empty() && poses.size() != rows.size())
         throw std::invalid_argument("poses must be none, or one for each table");
     if (ring_size < 1 || ring_size > rows.size())
         throw std::invalid_argument("ring_size must be 1 to the number of tables");
     std::vector<fw_table> tables;
     for (const auto &row : rows)
+    {
         tables.push_back(TableOf(row));
+        CheckBits(tables.back(), MakeBits(model).size());
+    }
     std::vector<Pose2> starts;
     for (const auto &[x_m, y_m, theta_rad] : poses)
         starts.push_back({x_m, y_m, theta_rad});
-    return {model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
+    Cell cell{model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
+    for (const std::string &name : colours)
+        cell.colours.push_back(ColourNamed(name));
+    return cell;
 }
 
 // Robots with other wheels than the installed one's are made of their models' numbers.
@@ -205,17 +229,22 @@ void BindSwarms(nb::module_ &m)
     m.attr("MUJOCO_PHYSICS") = std::string("MuJoCo ") + mj_versionString() + ", " + kSweepPhysics;
     m.def("species", &Species, "text"_a, "n"_a = nb::none(), "own"_a = NamedTables(),
           "Per robot the behaviour's name and (unseen speed, turn, seen speed, turn) inputs, turn "
-          "in thousandths. `own`: tables beside the firmware's.");
+          "in thousandths, or so for each number of k bits. `own`: tables beside the firmware's.");
+    m.def("colours", &ColourNames, "text"_a, "n"_a = nb::none(),
+          "Per robot the colour of its target, as name@colour says it.");
     nb::class_<Cell>(m, "Cell", "A swarm but for its seed; robots after ring_size are odd.")
         .def(
             "__init__",
             [](Cell *self, const Model &model, const Tables &tables, size_t ring_size,
                const std::string &start, double spread_m,
-               const std::vector<std::array<double, 3>> &poses) {
-                new (self) Cell(MakeCell(model, tables, ring_size, start, spread_m, poses));
+               const std::vector<std::array<double, 3>> &poses,
+               const std::vector<std::string> &colours) {
+                new (self)
+                    Cell(MakeCell(model, tables, ring_size, start, spread_m, poses, colours));
             },
             "model"_a, "tables"_a, "ring_size"_a, "start"_a = "square", "spread_m"_a = 1.2,
-            "poses"_a = std::vector<std::array<double, 3>>())
+            "poses"_a = std::vector<std::array<double, 3>>(),
+            "colours"_a = std::vector<std::string>())
         .def_prop_ro("period_s", [](const Cell &cell) { return cell.model.base.control_period_s; })
         .def_prop_ro("why_not_batched", [](const Cell &cell) { return WhyNotBatched(cell.model); });
     m.def(

@@ -7,19 +7,25 @@
 namespace twin
 {
 
-ConeSensor::ConeSensor(const DetectionModel &detection, int robot, uint64_t seed)
+ConeSensor::ConeSensor(const DetectionModel &detection, std::span<const fw_bit> bits, int robot,
+                       uint64_t seed)
     : detection_(detection),
       random_(seed, robot, "sensor"),
       age_us_(std::llround(detection.age_s * 1e6)),
       delay_us_(std::llround(detection.delay_s * 1e6))
 {
+    for (const fw_bit &bit : bits)
+        eyes_.push_back({bit.box, InSector(detection, static_cast<fw_sector>(bit.sector))});
 }
 
-// One draw per frame whatever is seen, two with a soft edge, so that streams of two runs stay in
-// step.
-bool ConeSensor::Seen(std::span<const Pose2> poses, size_t self)
+// One draw a bit and frame whatever is seen, two with a soft edge, so that streams of two runs stay
+// in step.
+bool ConeSensor::Sees(const Eye &eye, const Sight &sight)
 {
-    const double sure = ViewProbability(poses, self, detection_, {});
+    shown_.resize(sight.poses.size());
+    for (size_t i = 0; i < shown_.size(); ++i)
+        shown_[i] = IsInside(sight.colours.empty() ? TargetColour() : sight.colours[i], eye.box);
+    const double sure = ViewProbability(sight.poses, sight.self, eye.detection, {}, shown_);
     const bool in_view = detection_.softness_m > 0 ? random_.Uniform() < sure : sure > 0;
     const bool errs = random_.Uniform() < (in_view ? detection_.miss_rate : detection_.false_rate);
     return in_view != errs;
@@ -30,10 +36,12 @@ double ConeSensor::ReachM() const
     return detection_.softness_m > 0 ? std::numeric_limits<double>::infinity() : detection_.range_m;
 }
 
-std::optional<SensorFrame> ConeSensor::Next(std::span<const Pose2> poses, size_t self,
-                                            int64_t utime_us)
+std::optional<SensorFrame> ConeSensor::Next(const Sight &sight, int64_t utime_us)
 {
-    on_the_way_.push_back({Seen(poses, self), seq_++, utime_us + age_us_});
+    uint32_t bits = 0;
+    for (size_t i = 0; i < eyes_.size(); ++i)
+        bits |= static_cast<uint32_t>(Sees(eyes_[i], sight)) << i;
+    on_the_way_.push_back({bits, seq_++, utime_us + age_us_});
     std::optional<SensorFrame> newest;
     while (!on_the_way_.empty() && on_the_way_.front().utime_us + delay_us_ <= utime_us)
     {
@@ -43,15 +51,15 @@ std::optional<SensorFrame> ConeSensor::Next(std::span<const Pose2> poses, size_t
     return newest;
 }
 
-void ConeSensor::Expose(std::span<const Pose2> poses, size_t self, int64_t now_us)
+void ConeSensor::Expose(const Sight &sight, int64_t now_us)
 {
-    arrived_ = Next(poses, self, now_us);
+    arrived_ = Next(sight, now_us);
 }
 
 void ConeSensor::Decide(int64_t now_us, fw_ctx &firmware, fw_output &out)
 {
     if (arrived_)
-        fw_step_bit(&firmware, arrived_->detected, arrived_->utime_us, arrived_->seq, now_us, &out);
+        fw_step_bits(&firmware, arrived_->bits, arrived_->utime_us, arrived_->seq, now_us, &out);
     else
         fw_step(&firmware, nullptr, now_us, &out);
 }

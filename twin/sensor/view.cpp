@@ -107,18 +107,28 @@ bool Hidden(std::span<const Pose2> poses, size_t self, size_t target,
 }
 
 double ViewProbability(std::span<const Pose2> poses, size_t self, const DetectionModel &detection,
-                       const Blur &blur)
+                       const Blur &blur, std::span<const char> shown)
 {
     double unseen = 1;
     for (size_t i = 0; i < poses.size() && unseen > 0; ++i)
     {
-        if (i == self || std::isnan(poses[i].x_m))
+        if (i == self || std::isnan(poses[i].x_m) || !(shown.empty() || shown[i]))
             continue;
         const double seen = InViewProbability(poses[self], poses[i], detection, blur);
         if (seen > 0)
             unseen *= 1 - seen * Clear(poses, self, i, detection, blur);
     }
     return 1 - unseen;
+}
+
+DetectionModel InSector(DetectionModel detection, fw_sector sector)
+{
+    if (sector != FW_SECTOR_ALL)
+    {
+        detection.pan_rad += (sector == FW_SECTOR_LEFT ? 1 : -1) * detection.cone_rad / 4;
+        detection.cone_rad /= 2;
+    }
+    return detection;
 }
 
 }  // namespace twin

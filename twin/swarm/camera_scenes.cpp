@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "fw/config.h"
+#include "fw/bit.h"
 #include "sensor/view.h"
 
 namespace twin
@@ -21,7 +21,7 @@ constexpr double kFalseTargetAt_m = 0.04, kFalseTargetLimits = 2;
 
 double LimitPx()
 {
-    return fw_config_default().min_blob_px;
+    return fw_bit_default().min_blob_px;
 }
 
 // As far as a target covers more than the firmware's limit.
@@ -114,14 +114,15 @@ Ball CameraScenes::FalseTarget(const Pose2 &pose) const
             TargetColour()};
 }
 
-Scene CameraScenes::Next(std::span<const Pose2> poses)
+Scene CameraScenes::Next(const Sight &sight)
 {
+    const std::span<const Pose2> poses = sight.poses;
     const double u = random_.Uniform();
     const bool misses = u >= 1 - detection_.miss_rate, imagines = u < detection_.false_rate;
     scales_.resize(poses.size());
     for (size_t i = 0; i < poses.size(); ++i)
         scales_[i] = TargetScale(poses, i) * !misses;
-    Scene scene = RobotsSeenBy(self_, poses, world_.target, scales_);
+    Scene scene = RobotsSeenBy(self_, poses, world_.target, scales_, sight.colours);
     scene.balls.insert(scene.balls.end(), world_.distractors.begin(), world_.distractors.end());
     if (imagines)
         scene.balls.push_back(FalseTarget(poses[self_]));

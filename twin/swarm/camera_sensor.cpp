@@ -15,9 +15,13 @@ CameraSensor::CameraSensor(const CameraWorld &world, int robot, const DetectionM
 {
 }
 
-void CameraSensor::Expose(std::span<const Pose2> poses, size_t self, int64_t now_us)
+void CameraSensor::Expose(const Sight &sight, int64_t now_us)
 {
-    on_the_way_.push_back({{poses.begin(), poses.end()}, self, now_us + age_us_, seq_++});
+    on_the_way_.push_back({{sight.poses.begin(), sight.poses.end()},
+                           {sight.colours.begin(), sight.colours.end()},
+                           sight.self,
+                           now_us + age_us_,
+                           seq_++});
     arrived_.reset();
     while (!on_the_way_.empty() && on_the_way_.front().utime_us + delay_us_ <= now_us)
     {
@@ -30,7 +34,8 @@ std::optional<fw_frame> CameraSensor::DrawArrived()
 {
     if (!arrived_)
         return std::nullopt;
-    frame_ = camera_.Draw(scenes_.Next(arrived_->poses), arrived_->poses[arrived_->self]);
+    frame_ = camera_.Draw(scenes_.Next({arrived_->poses, arrived_->self, arrived_->colours}),
+                          arrived_->poses[arrived_->self]);
     fw_frame frame{};
     frame.yuyv = frame_.data();
     frame.width_px = scenes_.settings().width_px;

@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
 
+#include "fw/table.h"
 #include "plant/random.h"
 
 namespace twin
@@ -58,6 +62,36 @@ std::vector<Model> DrawRobots(const Model &model, int n, uint64_t seed)
     for (int id = 0; id < n; ++id)
         robots.push_back(DrawRobot(model, id, seed));
     return robots;
+}
+
+void CheckBits(const fw_table &table, size_t bit_count)
+{
+    if (table.bit_count > bit_count)
+        throw std::invalid_argument("a table of " + std::to_string(fw_table_row_count(&table)) +
+                                    " rows needs " + std::to_string(table.bit_count) +
+                                    " bits, and the model has " + std::to_string(bit_count) +
+                                    ": list them in its sensor.bits, as in [\"left\", \"right\"]");
+}
+
+std::vector<fw_bit> MakeBits(const Model &model)
+{
+    if (model.sensor.bits.size() > FW_MAX_BITS)
+        throw std::invalid_argument("sensor.bits has " + std::to_string(model.sensor.bits.size()) +
+                                    " entries: at most " + std::to_string(FW_MAX_BITS));
+    std::vector<fw_bit> bits;
+    for (const std::string &text : model.sensor.bits)
+    {
+        fw_bit bit = fw_bit_default();
+        bit.vote.max_frames =
+            static_cast<int32_t>(std::lround(model.MakeDetectionModel().vote_frames));
+        if (!fw_bit_parse(text.c_str(), &bit))
+            throw std::invalid_argument(
+                "sensor.bits: '" + text +
+                "' must be all, left or right, and what differs of "
+                "y_min,y_max,u_min,u_max,v_min,v_max,min_blob_px,vote_frames,vote_window_ms");
+        bits.push_back(bit);
+    }
+    return bits;
 }
 
 }  // namespace twin

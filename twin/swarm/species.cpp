@@ -44,6 +44,43 @@ int ParseCount(const std::string &part, const std::string &digits)
     return count;
 }
 
+// Robots of one name and colour.
+struct Part
+{
+    std::string name, colour;
+    size_t count;
+};
+
+Part MakePart(const std::string &name, int count)
+{
+    const size_t at = name.find('@');
+    return {name.substr(0, at), at == std::string::npos ? "green" : name.substr(at + 1),
+            static_cast<size_t>(count)};
+}
+
+std::vector<Part> Split(const std::string &text, std::optional<int> n)
+{
+    if (text.find(':') == std::string::npos && text.find(',') == std::string::npos)
+        return {MakePart(text, n.value_or(6))};
+    std::vector<Part> parts;
+    size_t robots = 0;
+    std::istringstream words(text);
+    for (std::string word; std::getline(words, word, ',');)
+    {
+        const size_t colon = word.find(':');
+        const std::string digits = colon == std::string::npos ? "" : word.substr(colon + 1);
+        parts.push_back(MakePart(word.substr(0, colon), ParseCount(word, digits)));
+        robots += parts.back().count;
+    }
+    const size_t wanted = n ? static_cast<size_t>(*n) : robots;
+    if (robots != wanted || robots > kMaxRobots)
+        throw std::invalid_argument("--behavior '" + text + "' is for " + std::to_string(robots) +
+                                    " robots, but there are " +
+                                    std::to_string(n.value_or(kMaxRobots)) +
+                                    (n ? " (--n): make both agree" : " at most"));
+    return parts;
+}
+
 }  // namespace
 
 const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_behavior> own)
@@ -54,30 +91,37 @@ const fw_behavior *FindBehavior(const std::string &name, std::span<const fw_beha
     return fw_behavior_find(name.c_str());
 }
 
+std::string TableText(const fw_table &table)
+{
+    std::ostringstream text;
+    for (int row = 0; row < fw_table_row_count(&table); ++row)
+        text << (row ? "," : "") << table.rows[row].speed_input_pct << ","
+             << table.rows[row].turn_input_milli / 1000.0;
+    return text.str();
+}
+
 std::vector<const fw_behavior *> ParseSpecies(const std::string &text, std::optional<int> n,
                                               std::span<const fw_behavior> own)
 {
     std::vector<const fw_behavior *> robots;
-    if (text.find(':') == std::string::npos && text.find(',') == std::string::npos)
-    {
-        robots.assign(static_cast<size_t>(n.value_or(6)), &MustFind(text, own));
-        return robots;
-    }
-    std::istringstream parts(text);
-    for (std::string part; std::getline(parts, part, ',');)
-    {
-        const size_t colon = part.find(':');
-        const std::string digits = colon == std::string::npos ? "" : part.substr(colon + 1);
-        const int count = ParseCount(part, digits);
-        robots.insert(robots.end(), static_cast<size_t>(count),
-                      &MustFind(part.substr(0, colon), own));
-    }
-    const size_t wanted = n ? static_cast<size_t>(*n) : robots.size();
-    if (robots.size() != wanted || robots.size() > kMaxRobots)
-        throw std::invalid_argument("--behavior '" + text + "' is for " +
-                                    std::to_string(robots.size()) + " robots, but there are " +
-                                    std::to_string(n.value_or(kMaxRobots)) +
-                                    (n ? " (--n): make both agree" : " at most"));
+    for (const Part &part : Split(text, n))
+        robots.insert(robots.end(), part.count, &MustFind(part.name, own));
+    return robots;
+}
+
+std::vector<std::string> ColourNames(const std::string &text, std::optional<int> n)
+{
+    std::vector<std::string> robots;
+    for (const Part &part : Split(text, n))
+        robots.insert(robots.end(), part.count, part.colour);
+    return robots;
+}
+
+std::vector<Colour> ParseColours(const std::string &text, std::optional<int> n)
+{
+    std::vector<Colour> robots;
+    for (const std::string &name : ColourNames(text, n))
+        robots.push_back(ColourNamed(name));
     return robots;
 }
 

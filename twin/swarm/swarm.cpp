@@ -9,6 +9,7 @@
 
 #include "plant/kinematics.h"
 #include "sensor/cone_sensor.h"
+#include "swarm/robots.h"
 
 namespace twin
 {
@@ -21,12 +22,13 @@ namespace
 constexpr double kFullPack_V = 8.2, kEmptyPack_V = 7.0, kPackCharge_As = 1.8 * 3600;
 constexpr double kComputer_A = 0.6, kMotors_A = 4 * 0.17;
 
-fw_config ConfigFor(const DetectionModel &detection, const fw_table &table)
+fw_config ConfigFor(const std::vector<fw_bit> &bits, const fw_table &table)
 {
+    CheckBits(table, bits.size());
     fw_config config = fw_config_default();
     config.table = table;
-    config.vote.max_frames = static_cast<int32_t>(std::lround(detection.vote_frames));
-    config.vote.window_us = std::numeric_limits<int64_t>::max();
+    config.bit_count = static_cast<int32_t>(bits.size());
+    std::ranges::copy(bits, config.bits);
     return config;
 }
 
@@ -91,6 +93,7 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
              const std::vector<fw_table> &tables, const SwarmOptions &options)
     : plant_(std::move(plant)),
       poses_(models.size()),
+      colours_(options.colours),
       grid_from_(options.grid_from),
       period_s_(models.front().base.control_period_s),
       substeps_(SubstepCount(period_s_, options.max_step_s)),
@@ -99,12 +102,13 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
     for (size_t i = 0; i < models.size(); ++i)
     {
         const DetectionModel detection = models[i].MakeDetectionModel();
-        const fw_config config = ConfigFor(detection, tables[i]);
+        const std::vector<fw_bit> bits = MakeBits(models[i]);
+        const fw_config config = ConfigFor(bits, tables[i]);
         CheckModel(models[i], config);
         members_.push_back(
             {{},
              {},
-             std::make_unique<ConeSensor>(detection, static_cast<int>(i), options.seed),
+             std::make_unique<ConeSensor>(detection, bits, static_cast<int>(i), options.seed),
              models[i].base,
              kFullPack_V,
              nullptr,
@@ -143,6 +147,7 @@ void Swarm::SetRunning(int robot, bool running)
 void Swarm::Select(int robot, const fw_behavior &behavior)
 {
     Member &member = members_[static_cast<size_t>(robot)];
+    CheckBits(behavior.table, static_cast<size_t>(member.firmware.config.bit_count));
     if (fw_set_table(&member.firmware, &behavior.table) != FW_OK)
         throw std::invalid_argument("the firmware refuses the table");
     member.sensor->Select(behavior);
@@ -174,8 +179,9 @@ void Swarm::Decide()
         Expose(i, now_us);
         DecideOne(member, now_us);
         const fw_output &out = member.output;
-        Command command = CommandFor(member.base, {out.speed_input_pct, out.turn_input_milli},
-                                     out.wheel_duty_pct);
+        const fw_input input{static_cast<int16_t>(out.speed_input_pct),
+                             static_cast<int16_t>(out.turn_input_milli)};
+        Command command = CommandFor(member.base, input, out.wheel_duty_pct);
         command.battery_V = member.battery_V;
         plant_->SetCommand(i, command);
     }
@@ -192,18 +198,21 @@ void Swarm::Expose(int robot, int64_t now_us)
     RobotSensor &sensor = *members_[static_cast<size_t>(robot)].sensor;
     if (!UsesGrid() || !std::isfinite(sensor.ReachM()))
     {
-        sensor.Expose(poses_, static_cast<size_t>(robot), now_us);
+        sensor.Expose({poses_, static_cast<size_t>(robot), colours_}, now_us);
         return;
     }
     near_poses_.clear();
+    near_colours_.clear();
     size_t self = 0;
     for (const size_t i : grid_.Near(static_cast<size_t>(robot)))
     {
         if (i == static_cast<size_t>(robot))
             self = near_poses_.size();
         near_poses_.push_back(poses_[i]);
+        if (!colours_.empty())
+            near_colours_.push_back(colours_[i]);
     }
-    sensor.Expose(near_poses_, self, now_us);
+    sensor.Expose({near_poses_, self, near_colours_}, now_us);
 }
 
 void Swarm::DecideOne(Member &member, int64_t now_us)

@@ -10,6 +10,7 @@
 #include "fw/mixing.h"
 #include "plant/planar_plant.h"
 #include "plant/random.h"
+#include "sensor/view.h"
 #include "swarm/robots.h"
 #include "swarm/swarm.h"
 
@@ -88,7 +89,10 @@ public:
         plan_.n = static_cast<int>(cell.tables.size());
         plan_.ring = static_cast<int>(cell.ring_size);
         plan_.step_count = count.steps;
-        plan_.prefilters = prefilters;
+        bits_ = MakeBits(model);
+        plan_.bits = static_cast<int>(bits_.size());
+        FindShown(cell);
+        plan_.prefilters = prefilters && IsPlain();
         plan_.substeps = SubstepCount(model.base.control_period_s, SwarmOptions{}.max_step_s);
         plan_.vote_frames = static_cast<int>(std::lround(model.sensor.vote_frames));
         schedule_ = Schedule(model, count, plan_.vote_frames, plan_.kept_frames);
@@ -145,11 +149,14 @@ private:
             At(kCos, i, lane) = std::cos(starts[i].theta_rad);
             At(kSin, i, lane) = std::sin(starts[i].theta_rad);
             FillSensor(i, lane, robots[i].sensor);
+            for (size_t bit = 0; bit < bits_.size(); ++bit)
+                FillEye(static_cast<int>(bit), i, lane, robots[i].MakeDetectionModel());
             At(kDice, i, lane) =
                 std::bit_cast<double>(Random(world.seed, static_cast<int>(i), "sensor").State());
             const DriveChain chain(robots[i]);
-            FillRow(i, lane, kUnseenX, kUnseenMotion, chain, robots[i].base, cell.tables[i].unseen);
-            FillRow(i, lane, kSeenX, kSeenMotion, chain, robots[i].base, cell.tables[i].seen);
+            for (int row = 0; row < 1 << plan_.bits; ++row)
+                FillRow(row, i, lane, chain, robots[i].base,
+                        fw_table_lookup(&cell.tables[i], static_cast<uint32_t>(row)));
         }
         Number(BatchLayout(plan_).range, lane) = cell.model.sensor.range_m;
         Sum(kLeastDiffusion, lane) = std::numeric_limits<double>::infinity();
@@ -157,23 +164,52 @@ private:
 
     void FillSensor(size_t robot, size_t lane, const Sensor &sensor)
     {
-        const double half_cos = std::cos(sensor.cone_rad / 2);
-        At(kRange2, robot, lane) = sensor.range_m * sensor.range_m;
-        At(kCone, robot, lane) = half_cos * std::abs(half_cos);
-        At(kHalfCos, robot, lane) = half_cos;
-        At(kHalfSin, robot, lane) = std::sin(sensor.cone_rad / 2);
-        At(kTarget2, robot, lane) = sensor.target_radius_m * sensor.target_radius_m;
         At(kMiss, robot, lane) = BelowRate(sensor.false_negative_rate);
         At(kFalse, robot, lane) = BelowRate(sensor.false_positive_rate);
         plan_.target_is_disc |= sensor.target_radius_m > 0;
         plan_.errors |= sensor.false_negative_rate > 0 || sensor.false_positive_rate > 0;
     }
 
+    void FillEye(int bit, size_t robot, size_t lane, const DetectionModel &whole)
+    {
+        const auto sector = static_cast<fw_sector>(bits_[static_cast<size_t>(bit)].sector);
+        const DetectionModel eye = InSector(whole, sector);
+        const double half_cos = std::cos(eye.cone_rad / 2);
+        const auto at = [&](BitColumn column) -> double & {
+            return At(BatchLayout(plan_).OfBit(bit, column), robot, lane);
+        };
+        at(kAxisCos) = std::cos(eye.pan_rad);
+        at(kAxisSin) = std::sin(eye.pan_rad);
+        at(kRange2) = eye.range_m * eye.range_m;
+        at(kCone) = half_cos * std::abs(half_cos);
+        at(kHalfCos) = half_cos;
+        at(kHalfSin) = std::sin(eye.cone_rad / 2);
+        at(kTarget2) = eye.target_radius_m * eye.target_radius_m;
+    }
+
+    void FindShown(const Cell &cell)
+    {
+        for (const fw_bit &bit : bits_)
+            for (size_t i = 0; i < cell.tables.size(); ++i)
+                shown_.push_back(IsInside(cell.ColourOf(i), bit.box));
+        plan_.shown = shown_.data();
+    }
+
+    // Any other robot, anywhere ahead.
+    bool IsPlain() const
+    {
+        return bits_.size() == 1 && bits_[0].sector == FW_SECTOR_ALL &&
+               std::ranges::find(shown_, 0) == shown_.end();
+    }
+
     // The motion that a row of the table gives this robot, and one substep of it: the chord of the
     // arc, in the body frame, and the turn.
-    void FillRow(size_t robot, size_t lane, int move, int motion, const DriveChain &chain,
-                 const Base &base, const fw_input &input)
+    void FillRow(int row, size_t robot, size_t lane, const DriveChain &chain, const Base &base,
+                 const fw_input &input)
     {
+        const auto at = [&](int column) -> double & {
+            return At(BatchLayout(plan_).OfRow(row, column), robot, lane);
+        };
         const double dt_s = StepS(base);
         RobotState state = chain.Start({});
         int8_t duty_pct[FW_WHEEL_COUNT];
@@ -181,13 +217,13 @@ private:
         PlanarStep(chain, CommandFor(base, input, duty_pct), 0, dt_s, state, nullptr);
         const double length_m = std::hypot(state.pose.x_m, state.pose.y_m);
         plan_.most_m = std::max(plan_.most_m, 1.01 * plan_.substeps * length_m);
-        At(move, robot, lane) = state.pose.x_m;
-        At(move + 1, robot, lane) = state.pose.y_m;
-        At(move + 2, robot, lane) = std::cos(state.pose.theta_rad);
-        At(move + 3, robot, lane) = std::sin(state.pose.theta_rad);
+        at(kRowX) = state.pose.x_m;
+        at(kRowY) = state.pose.y_m;
+        at(kRowCos) = std::cos(state.pose.theta_rad);
+        at(kRowSin) = std::sin(state.pose.theta_rad);
         const Motion taken = MotionOf(state.vx_mps, state.vy_mps, state.omega_radps);
         for (size_t k = 0; k < taken.size(); ++k)
-            At(motion + static_cast<int>(k), robot, lane) = taken[k];
+            at(kRowMotion + static_cast<int>(k)) = taken[k];
     }
 
     std::span<const World> worlds_;
@@ -196,6 +232,8 @@ private:
     int measured_ = 0;
     BatchPlan plan_{};
     std::vector<BatchStep> schedule_;
+    std::vector<fw_bit> bits_;
+    std::vector<uint8_t> shown_;
     std::vector<double> memory_;
     double *numbers_ = nullptr;
 };
@@ -212,6 +250,7 @@ bool SameBatch(const Cell &a, const Cell &b)
 {
     const Model &m = a.model, &o = b.model;
     return a.tables.size() == b.tables.size() && a.ring_size == b.ring_size &&
+           a.colours == b.colours && m.sensor.bits == o.sensor.bits &&
            m.base.control_period_s == o.base.control_period_s &&
            m.sensor.delay_s == o.sensor.delay_s && m.sensor.vote_frames == o.sensor.vote_frames &&
            m.robot.body_radius_m == o.robot.body_radius_m;
@@ -239,6 +278,12 @@ std::string WhyNotBatched(const Model &model)
         return "the sensor's delay comes near the firmware's time-out";
     if (model.base.motor_lag_s > 0)
         return "the model has motor lag";
+    const auto votes_alike = [&](const fw_bit &bit) {
+        return bit.vote.window_us == INT64_MAX &&
+               bit.vote.max_frames == std::lround(model.sensor.vote_frames);
+    };
+    if (!std::ranges::all_of(MakeBits(model), votes_alike))
+        return "a bit of the model has a vote of its own";
     for (const auto &[id, values] : model.robot_overrides)
     {
         const Model robot = model.ForRobot(id);

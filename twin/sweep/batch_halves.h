@@ -40,13 +40,22 @@ private:
     template <bool kDisc>
     void Sense(int step)
     {
-        if (p_.prefilters)
-            prefilter_.template Sense<kDisc>(step);
+        if (!p_.prefilters)
+        {
+            for (int bit = 0; bit < p_.bits; ++bit)
+                for (int i = 0; i < p_.n; ++i)
+                {
+                    low_.template Sense<kDisc>(bit, i);
+                    high_.template Sense<kDisc>(bit, i);
+                }
+            return;
+        }
+        prefilter_.template Sense<kDisc>(step);
         for (int i = 0; i < p_.n; ++i)
-            if (!p_.prefilters || prefilter_.Doubtful(i))
+            if (prefilter_.Doubtful(i))
             {
-                low_.template Sense<kDisc>(i);
-                high_.template Sense<kDisc>(i);
+                low_.template Sense<kDisc>(0, i);
+                high_.template Sense<kDisc>(0, i);
             }
             else
             {

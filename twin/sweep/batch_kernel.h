@@ -27,29 +27,34 @@ public:
     }
 
     const Real *Columns() const { return numbers_; }
+    // Robot by robot, bit by bit.
     Mask *Seen() const { return BitsAt(at_.seen); }
 
-    // InView() of the cone sensor for one robot. Its ahead > cos * distance is squared with the
-    // signs kept, which spares the root.
+    // InView() of the cone sensor for one bit of a robot. Its ahead > cos * distance is squared
+    // with the signs kept, which spares the root.
     template <bool kDisc>
-    void Sense(int robot)
+    void Sense(int bit, int robot)
     {
+        const auto eye = [&](int column) { return Column(at_.OfBit(bit, column))[robot]; };
+        const uint8_t *shown = p_.shown + bit * n_;
         const Real *x = Column(kX), *y = Column(kY);
-        const Real c = Column(kCos)[robot], s = Column(kSin)[robot];
-        const Real range2 = Column(kRange2)[robot], cone = Column(kCone)[robot];
+        const Real axis_c = eye(kAxisCos), axis_s = eye(kAxisSin);
+        const Real ci = Column(kCos)[robot], si = Column(kSin)[robot];
+        const Real c = ci * axis_c - si * axis_s, s = si * axis_c + ci * axis_s;
+        const Real range2 = eye(kRange2), cone = eye(kCone);
         Mask seen{};
         for (int j = 0; j < n_; ++j)
         {
-            if (j == robot)
+            if (j == robot || !shown[j])
                 continue;
             const Real dx = x[j] - x[robot], dy = y[j] - y[robot], d2 = dx * dx + dy * dy;
             const Real ahead = c * dx + s * dy;
             Mask inside = ahead * L::Abs(ahead) > cone * d2;
             if constexpr (kDisc)
-                inside |= Edge(robot, ahead, L::Abs(c * dy - s * dx));
+                inside |= Edge(bit, robot, ahead, L::Abs(c * dy - s * dx));
             seen |= inside & (d2 < range2);
         }
-        Seen()[robot] = seen;
+        Seen()[bit * n_ + robot] = seen;
     }
 
     // The rest of a step once it is clear what robots see.
@@ -61,7 +66,10 @@ public:
         const bool moves = p_.steps[step].frame >= 0;
         for (int i = 0; moves && i < p_.substeps; ++i)
         {
-            Move();
+            if (p_.bits == 1)
+                Move<true>();
+            else
+                Move<false>();
             PushApart();
         }
         if (p_.steps[step].measured)
@@ -72,13 +80,14 @@ private:
     Real *Column(int column) const { return numbers_ + column * n_; }
     Mask *BitsAt(int at) const { return reinterpret_cast<Mask *>(numbers_ + at); }
 
-    // Whether the disc reaches over the edge of the cone of `robot`.
-    Mask Edge(int robot, Real ahead, Real aside) const
+    // Whether the disc reaches over the edge of that cone of `robot`.
+    Mask Edge(int bit, int robot, Real ahead, Real aside) const
     {
-        const Real cos_half = Column(kHalfCos)[robot], sin_half = Column(kHalfSin)[robot];
+        const auto eye = [&](int column) { return Column(at_.OfBit(bit, column))[robot]; };
+        const Real cos_half = eye(kHalfCos), sin_half = eye(kHalfSin);
         const Real along = L::Max(ahead * cos_half + aside * sin_half, Real{});
         const Real over = ahead - along * cos_half, off = aside - along * sin_half;
-        return over * over + off * off < Column(kTarget2)[robot];
+        return over * over + off * off < eye(kTarget2);
     }
 
     void Err()
@@ -87,8 +96,9 @@ private:
         Bits *dice = reinterpret_cast<Bits *>(Column(kDice));
         const Mask *miss = reinterpret_cast<Mask *>(Column(kMiss));
         const Mask *imagined = reinterpret_cast<Mask *>(Column(kFalse));
-        for (int i = 0; i < n_; ++i)
-            seen[i] ^= (Mask)(SplitMix(dice[i]) >> 11) < (seen[i] ? miss[i] : imagined[i]);
+        for (int bit = 0; bit < p_.bits; ++bit, seen += n_)
+            for (int i = 0; i < n_; ++i)
+                seen[i] ^= (Mask)(SplitMix(dice[i]) >> 11) < (seen[i] ? miss[i] : imagined[i]);
     }
 
     // Frames travel, then vote. The firmware takes the newest frame alone, once.
@@ -96,35 +106,51 @@ private:
     {
         if (p_.kept_frames == 1 && p_.vote_frames == 1)
             return;
+        const int n = p_.bits * n_;
         Mask *seen = BitsAt(at_.seen), *ones = BitsAt(at_.ones);
-        Mask *sent = BitsAt(at_.frames) + (step % p_.kept_frames) * n_;
-        for (int i = 0; i < n_; ++i)
+        Mask *sent = BitsAt(at_.frames) + (step % p_.kept_frames) * n;
+        for (int i = 0; i < n; ++i)
             sent[i] = seen[i];
         const BatchStep now = p_.steps[step];
-        const Mask *arrived = BitsAt(at_.frames) + now.frame * n_;
-        Mask *slot = BitsAt(at_.votes) + now.slot * n_;
-        for (int i = 0; now.slot >= 0 && i < n_; ++i)
+        const Mask *arrived = BitsAt(at_.frames) + now.frame * n;
+        Mask *slot = BitsAt(at_.votes) + now.slot * n;
+        for (int i = 0; now.slot >= 0 && i < n; ++i)
         {
             ones[i] += slot[i] - arrived[i];  // a set bit is -1
             slot[i] = arrived[i];
         }
-        for (int i = 0; i < n_; ++i)
+        for (int i = 0; i < n; ++i)
             seen[i] = ones[i] + ones[i] > now.voters;
     }
 
+    // The entry of that column in the row that the bits of a robot choose.
+    template <bool kOneBit>
+    Real Chosen(int column, int robot) const
+    {
+        const Mask *seen = BitsAt(at_.seen) + robot;
+        const Real *first = Column(at_.OfRow(0, column)) + robot;
+        const int apart = kRowColumns * n_;
+        if constexpr (kOneBit)
+            return *seen ? first[apart] : *first;
+        Real rows[kMostRows];
+        int count = 1 << p_.bits;
+        for (int row = 0; row < count; ++row)
+            rows[row] = first[row * apart];
+        for (; count > 1; count /= 2, seen += n_)
+            for (int row = 0; row < count / 2; ++row)
+                rows[row] = *seen ? rows[2 * row + 1] : rows[2 * row];
+        return rows[0];
+    }
+
+    template <bool kOneBit>
     void Move()
     {
-        const int n = n_;
-        const Mask *seen = BitsAt(at_.seen);
-        const Real *unseen_row = Column(kUnseenX), *seen_row = Column(kSeenX);
         Real *x = Column(kX), *y = Column(kY), *c = Column(kCos), *s = Column(kSin);
-        for (int i = 0; i < n; ++i)
+        for (int i = 0; i < n_; ++i)
         {
-            const auto driven = [&](int column) {
-                const int at = column * n + i;
-                return seen[i] ? seen_row[at] : unseen_row[at];
-            };
-            const Real ahead = driven(0), left = driven(1), turn_c = driven(2), turn_s = driven(3);
+            const auto driven = [&](int column) { return Chosen<kOneBit>(column, i); };
+            const Real ahead = driven(kRowX), left = driven(kRowY);
+            const Real turn_c = driven(kRowCos), turn_s = driven(kRowSin);
             const Real ci = c[i], si = s[i];
             x[i] += ci * ahead - si * left;
             y[i] += si * ahead + ci * left;
@@ -162,13 +188,10 @@ private:
 
     void Measure(bool moves)
     {
-        const Mask *seen = BitsAt(at_.seen);
         Real *motion = Column(kMotionNow);
         for (int i = 0; i < n_; ++i)
             for (int k = 0; k < kMotion; ++k)
-                motion[k * n_ + i] = !moves    ? Real{}
-                                     : seen[i] ? Column(kSeenMotion + k)[i]
-                                               : Column(kUnseenMotion + k)[i];
+                motion[k * n_ + i] = moves ? Chosen<false>(kRowMotion + k, i) : Real{};
         const MetricLanes<W> m = MetricFormulas<W>::Measure(
             {n_, p_.ring, Column(kX), Column(kY), Column(kCos), Column(kSin), motion,
              Column(kScratch), Column(kScratch + 1), Column(kScratch + 2), numbers_[at_.range],

@@ -29,11 +29,12 @@ public:
           high_(high),
           memory_(reinterpret_cast<Real *>(memory))
     {
-        Load(kRange2, kScreenRange2);
-        Load(kCone, kScreenCone);
-        Load(kHalfCos, kScreenHalfCos);
-        Load(kHalfSin, kScreenHalfSin);
-        Load(kTarget2, kScreenTarget2);
+        const BatchLayout at(plan);
+        Load(at.OfBit(0, kRange2), kScreenRange2);
+        Load(at.OfBit(0, kCone), kScreenCone);
+        Load(at.OfBit(0, kHalfCos), kScreenHalfCos);
+        Load(at.OfBit(0, kHalfSin), kScreenHalfSin);
+        Load(at.OfBit(0, kTarget2), kScreenTarget2);
         range2_ = Most(kScreenRange2);
         for (int i = 0; i < 2 * W; ++i)
             range_[i] = __builtin_sqrtf(range2_[i]);

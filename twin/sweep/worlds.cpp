@@ -25,7 +25,8 @@ Swarm MakeSwarm(const World &world, const PlantMaker &make)
     const int n = static_cast<int>(cell.tables.size());
     const auto robots = DrawRobots(cell.model, n, world.seed);
     const auto starts = StartsOf(cell, world.seed);
-    return Swarm(make(robots, starts, world.seed), robots, cell.tables, {.seed = world.seed});
+    return Swarm(make(robots, starts, world.seed), robots, cell.tables,
+                 {.seed = world.seed, .colours = cell.colours});
 }
 
 // The classes that a swarm goes through.

@@ -44,5 +44,5 @@ def frames_of(robot: RobotLog) -> Frames | None:
     t_s = robot.frame_t_s if stamped else robot.command_t_s
     known = np.flatnonzero(np.isfinite(t_s))
     fresh = known[np.diff(t_s[known], prepend=-np.inf) > 0]
-    raw, voted = robot.detected_raw[fresh] > 0, robot.detected[fresh] > 0
+    raw, voted = robot.detected_raw[fresh] & 1 > 0, robot.detected[fresh] & 1 > 0
     return Frames(t_s[fresh], stamped, raw, bool(raw.any() or not voted.any()), voted)

@@ -57,7 +57,8 @@ class RobotLog:
         battery_V: (M,) NaN where not measured.
         frame_t_s: (M,) time stamp of the camera frame, robot's clock; NaN where there was none;
             (0,) without telemetry.
-        mode, detected_raw, detected: (M,) int8 as in telemetry_t; (0,) without telemetry.
+        mode, detected_raw, detected: (M,) int8 as in telemetry_t, the last two numbers of k bits;
+            (0,) without telemetry.
         speed_input, turn_input: (M,) as in telemetry_t; (0,) without telemetry.
         pose_t_s: (N,) motion capture's clock, ascending.
         pose: (N, 3) x_m, y_m, theta_rad (unwrapped); NaN where not valid. Where the heading was

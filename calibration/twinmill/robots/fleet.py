@@ -150,7 +150,7 @@ class Robot:
         """Share of the last seconds' control steps in which it saw a neighbour; NaN without any."""
         if not self.recent:
             return float("nan")
-        return sum(t.detected for _, _, t in self.recent) / len(self.recent)
+        return sum(t.detected != 0 for _, _, t in self.recent) / len(self.recent)
 
     @property
     def camera(self) -> str:
@@ -185,6 +185,7 @@ class Robot:
             "clock_ahead_s": self.clock_s,
             "last_heard_s": time.monotonic() - self.heard_s,
             "detected": bool(t.detected) if t else None,
+            "bits": t.detected if t else None,
             "detected_frac": self.detected_frac,
             "status_flags": t.status_flags if t else None,
         }

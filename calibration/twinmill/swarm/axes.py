@@ -140,8 +140,8 @@ def set_speeds(
             "base.forward_gain and base.yaw_gain, or take --model paper.toml."
         )
     for name, value, inputs, scale in (
-        ("speed", v_mps, (table[0], table[2]), 1),
-        ("turn", omega_radps, (table[1], table[3]), 1000),
+        ("speed", v_mps, table[::2], 1),
+        ("turn", omega_radps, table[1::2], 1000),
     ):
         if value is None:
             continue

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files of tables of the user's own: lines `name = "100,-0.5,100,0.5"` of TOML."""
 
+import itertools
 import os
 import tomllib
 from pathlib import Path
 
 NAME = "behaviors.toml"
+TABLE_SIZES = (4, 8, 16, 32)  # speed and turn of 2, 4, 8 or 16 rows
 
 
 def find_file() -> Path | None:
@@ -15,25 +17,24 @@ def find_file() -> Path | None:
 
 
 def parse_table(text: str) -> tuple[str, list[int]]:
-    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in the robot's inputs.
+    """`name=unseen_speed,unseen_turn,seen_speed,seen_turn` in inputs, or so for 4, 8 or 16 rows.
 
     Raises:
         ValueError: in one sentence.
     """
     name, _, rest = text.partition("=")
     try:
-        unseen_speed, unseen_turn, seen_speed, seen_turn = map(float, rest.split(","))
-        within = [abs(v) <= 100 for v in (unseen_speed, seen_speed)]
-        within += [abs(v) <= 2 for v in (unseen_turn, seen_turn)]
-        if not name or not all(within):
+        values = list(map(float, rest.split(",")))
+        within = [abs(v) <= 100 for v in values[::2]] + [abs(v) <= 2 for v in values[1::2]]
+        if not name or not all(within) or len(values) not in TABLE_SIZES:
             raise ValueError
     except ValueError:
         raise ValueError(
             f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
-            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2)."
+            "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2), or 4, 8 or 16 such pairs."
         ) from None
-    milli = [round(unseen_turn * 1000), round(seen_turn * 1000)]
-    return name, [round(unseen_speed), milli[0], round(seen_speed), milli[1]]
+    scales = itertools.cycle((1, 1000))
+    return name, [round(value * scale) for value, scale in zip(values, scales, strict=False)]
 
 
 def read_tables(path: Path) -> dict[str, str]:

@@ -29,7 +29,7 @@ class Request:
 
     Attributes:
         tables: own behaviours beside the firmware's: name, inputs (unseen speed, unseen turn,
-            seen speed, seen turn; turns in thousandths).
+            seen speed, seen turn, or so for each number of k bits; turns in thousandths).
         n: robots; None: what the behaviour says, or 6.
         first_seed, seeds: the first cell has so many seeds from the first on, the next cell the
             next ones: what is unlucky in one cell is not so in the others.
@@ -103,18 +103,27 @@ class Request:
         The ring is of the most frequent species, of equally many the first. Where a mix is given
         and `n` differs from its sum, the first species takes up the rest.
         """
-        robots = native.species(self.behavior, None, self.tables)
-        counts, rows = Counter(name for name, _ in robots), dict(robots)
-        first = robots[0][0]
+        robots, ring = self._robots(n)
+        return [row for _, row, _ in robots], ring
+
+    def _robots(self, n: int | None) -> tuple[list[tuple[str, list[int], str]], int]:
+        """Name, table and colour of each, in the order of species(), and how many are the ring."""
+        named = native.species(self.behavior, None, self.tables)
+        colours = native.colours(self.behavior)
+        robots = [(name, row, colour) for (name, row), colour in zip(named, colours, strict=True)]
+        first = [robot for robot in robots if robot[0] == robots[0][0]]
+        others = [robot for robot in robots if robot[0] != robots[0][0]]
         wanted = len(robots) if n is None else n
-        others = len(robots) - counts[first]
-        if not 1 <= wanted <= MAX_ROBOTS or wanted <= others:
+        if not 1 <= wanted <= MAX_ROBOTS or wanted <= len(others):
             raise ValueError(
-                f"{wanted} robots: from {others + 1} to {MAX_ROBOTS} can run '{self.behavior}'."
+                f"{wanted} robots: from {len(others) + 1} to {MAX_ROBOTS} can run "
+                f"'{self.behavior}'."
             )
-        counts[first] = wanted - others
-        order = counts.most_common()  # of equally many the first
-        return [rows[name] for name, count in order for _ in range(count)], order[0][1]
+        count = wanted - len(others)
+        robots = (first + first[-1:] * count)[:count] + others
+        order = Counter(name for name, _, _ in robots).most_common()  # of equally many the first
+        names = [name for name, _ in order]
+        return sorted(robots, key=lambda robot: names.index(robot[0])), order[0][1]
 
     def cell(self, point: tuple[float, ...]) -> native.Cell:
         """The swarm at these axis values.
@@ -123,11 +132,18 @@ class Request:
             ValueError: a value is out of bounds.
         """
         at = self._at(point)
-        tables, ring = self.species(int(at["n"]) if "n" in at else self.n)
+        robots, ring = self._robots(int(at["n"]) if "n" in at else self.n)
         spread_m = at.get("spread_m", self.spread_m)
         if spread_m < LEAST_SPREAD_M:
             raise ValueError(f"spread_m = {spread_m:g} m: must be {LEAST_SPREAD_M} m or more.")
-        return native.Cell(self.cell_model(point), tables, ring, self.start, spread_m)
+        return native.Cell(
+            self.cell_model(point),
+            [row for _, row, _ in robots],
+            ring,
+            self.start,
+            spread_m,
+            colours=[colour for _, _, colour in robots],
+        )
 
     def cell_model(self, point: tuple[float, ...]) -> native.Model:
         """The model at these axis values.

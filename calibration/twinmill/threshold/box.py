@@ -7,7 +7,7 @@ import numpy as np
 import twinmill_native as native
 from scipy import ndimage
 
-from twinmill.threshold.pictures import Picture
+from twinmill.threshold.pictures import BT601, Picture
 
 KEYS = ("y_min", "y_max", "u_min", "u_max", "v_min", "v_max")
 Box = tuple[int, int, int, int, int, int]
@@ -28,6 +28,17 @@ ROUND = 0.88
 SMALLEST_PX = 50  # of a blob, below which nothing is told of its form
 OTHER_HUE_RAD = 0.35  # two pictures of one ball differ less, whatever the light
 COLOURLESS = 6  # counts of U and V about grey, below which there is no hue
+
+
+# Colours by name, as R, G, B: what is looked for where nobody says where the ball is. For green the
+# robot's own limits do.
+COLOURS = {
+    "green": None,
+    "red": (200, 30, 30),
+    "blue": (30, 60, 210),
+    "orange": (230, 140, 30),
+    "purple": (150, 50, 180),
+}
 
 
 @dataclass(frozen=True)
@@ -62,13 +73,14 @@ class PictureResult:
     false_px: int
 
 
-def find_ball(picture: Picture) -> Ball:
-    """The largest round blob of anything green.
+def find_ball(picture: Picture, colour: str = "green") -> Ball:
+    """The largest round blob of anything of a colour.
 
     Raises:
         ValueError: there is none, or a second one of half its size.
     """
-    mask = native.inside(picture.yuyv, native.green_box())
+    rgb = COLOURS[colour]
+    mask = _of_hue(picture, rgb) if rgb else native.inside(picture.yuyv, native.green_box())
     labels, _ = ndimage.label(ndimage.binary_opening(mask, iterations=2))
     blobs = [
         (rows, columns, labels[rows, columns] == index)
@@ -78,20 +90,30 @@ def find_ball(picture: Picture) -> Ball:
     blobs.sort(key=lambda blob: -np.count_nonzero(blob[2]))
     found = [blob for blob in blobs if _roundness(blob[2]) > ROUND]
     if not found:
-        largest = f"the largest green thing, at {_where(blobs[0])}, is not round" if blobs else ""
+        largest = (
+            f"the largest {colour} thing, at {_where(blobs[0])}, is not round" if blobs else ""
+        )
         raise ValueError(
-            f"{picture.name}: {largest or 'nothing in it is green'}; say where the ball is: "
+            f"{picture.name}: {largest or 'nothing in it is ' + colour}; say where the ball is: "
             "--ball X,Y,R."
         )
     sizes = [np.count_nonzero(blob[2]) for blob in found]
     if len(found) > 1 and sizes[1] > 0.5 * sizes[0]:
         raise ValueError(
-            f"{picture.name}: round and green are the things at {_where(found[0])} and at "
+            f"{picture.name}: round and {colour} are the things at {_where(found[0])} and at "
             f"{_where(found[1])}; say which is the ball: --ball X,Y,R."
         )
     rows, columns, _ = found[0]
     middle = ((columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2)
     return Ball(*middle, max(rows.stop - rows.start, columns.stop - columns.start) / 2)
+
+
+def _of_hue(picture: Picture, rgb: tuple[int, int, int]) -> np.ndarray:
+    """(H, W) pixels that have about the hue of a colour, and are not near grey."""
+    colour = BT601[1:] @ rgb
+    u, v = np.moveaxis(picture.yuv[..., 1:].astype(float) - 128, -1, 0)
+    apart = np.angle((u + 1j * v) / complex(*colour))
+    return (np.abs(apart) < OTHER_HUE_RAD) & (np.hypot(u, v) > 3 * COLOURLESS)
 
 
 def _roundness(blob: np.ndarray) -> float:
@@ -138,7 +160,28 @@ class Fitted:
     problem: str
 
 
-def fit_box(pictures: list[Picture], balls: list[Ball], min_blob_px: int) -> Fitted:
+def overlap(a: Box, b: Box) -> bool:
+    """Whether some colour is inside both."""
+    return all(max(a[k], b[k]) <= min(a[k + 1], b[k + 1]) for k in (0, 2, 4))
+
+
+def ball_pixels(pictures: list[Picture], balls: list[Ball]) -> np.ndarray:
+    """(N, 3) Y, U and V of all that surely is the ball's, one in each picture."""
+    return np.concatenate(
+        [
+            picture.yuv[ball.distance(picture.yuv.shape[:2]) < SURE_INSIDE]
+            for picture, ball in zip(pictures, balls, strict=True)
+        ]
+    )
+
+
+def fit_box(
+    pictures: list[Picture],
+    balls: list[Ball],
+    min_blob_px: int,
+    *,
+    others: np.ndarray | None = None,
+) -> Fitted:
     """Limits that hold the ball of all pictures, as wide as their backgrounds allow.
 
     The tightest limits that hold almost all of the ball are moved outwards, one after the other,
@@ -150,16 +193,16 @@ def fit_box(pictures: list[Picture], balls: list[Ball], min_blob_px: int) -> Fit
         pictures: at least one.
         balls: one in each.
         min_blob_px: the robot takes blobs that are larger for a target.
+        others: (N, 3) pixels of balls of other colours, wherever they were seen.
     """
     lit = [picture.in_light(times) for times in LIGHTS for picture in pictures]
     shown, at = [*pictures, *lit], balls * (1 + len(LIGHTS))
-    inside, outside = [], []
-    for picture, ball in zip(shown, at, strict=True):
-        yuv = picture.yuv
-        distance = ball.distance(yuv.shape[:2])
-        inside.append(yuv[distance < SURE_INSIDE])
-        outside.append(yuv[distance > SURE_OUTSIDE])
-    target, rest = np.concatenate(inside).astype(int), np.concatenate(outside).astype(int)
+    outside = [
+        picture.yuv[ball.distance(picture.yuv.shape[:2]) > SURE_OUTSIDE]
+        for picture, ball in zip(shown, at, strict=True)
+    ]
+    outside += [] if others is None else [others]
+    target, rest = ball_pixels(shown, at).astype(int), np.concatenate(outside).astype(int)
     for trim in TRIMS:
         box = _widen(_tight(target, trim), rest, FALSE_FRAC * len(rest))
         results = [evaluate(*both, box) for both in zip(shown, at, strict=True)]

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
+#include <stdexcept>
 
 #include "plant/random.h"
 
@@ -47,6 +49,17 @@ std::vector<Part> BodyParts()
 
 const Part kCover{{-0.035, 0, 0.129}, {0.050, 0.047, 0.020}, kGreen};
 
+struct NamedColour
+{
+    const char *name;
+    Colour colour;
+};
+const std::array<NamedColour, 5> kColours{{{"green", kGreen},
+                                           {"red", Colour::FromRgb(0.85, 0.1, 0.1)},
+                                           {"blue", Colour::FromRgb(0.1, 0.2, 0.85)},
+                                           {"orange", Colour::FromRgb(0.9, 0.55, 0.1)},
+                                           {"purple", Colour::FromRgb(0.6, 0.2, 0.7)}}};
+
 }  // namespace
 
 Colour Colour::FromRgb(double red, double green, double blue)
@@ -54,6 +67,12 @@ Colour Colour::FromRgb(double red, double green, double blue)
     const double luma = 0.299 * red + 0.587 * green + 0.114 * blue;
     return {Byte(16 + 219 * luma), Byte(128 + 224 * (blue - luma) / 1.772),
             Byte(128 + 224 * (red - luma) / 1.402)};
+}
+
+bool IsInside(const Colour &colour, const fw_color_box &box)
+{
+    return box.y_min <= colour.y && colour.y <= box.y_max && box.u_min <= colour.u &&
+           colour.u <= box.u_max && box.v_min <= colour.v && colour.v <= box.v_max;
 }
 
 double TargetArea(Target target)
@@ -69,8 +88,20 @@ Colour TargetColour()
     return kGreen;
 }
 
+Colour ColourNamed(const std::string &name)
+{
+    std::string known;
+    for (const NamedColour &named : kColours)
+    {
+        if (name == named.name)
+            return named.colour;
+        known += (known.empty() ? "" : ", ") + std::string(named.name);
+    }
+    throw std::invalid_argument("there is no colour '" + name + "'; choose one of " + known);
+}
+
 Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
-                   std::span<const double> target_scales)
+                   std::span<const double> target_scales, std::span<const Colour> colours)
 {
     static const std::vector<Part> parts = BodyParts();
     Scene scene;
@@ -90,22 +121,22 @@ Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
         };
         for (const Part &part : parts)
             add(part);
+        const Colour colour = colours.empty() ? kGreen : colours[i];
         const double scale = target_scales.empty() ? 1 : target_scales[i];
         if (scale == 0)
             continue;
         if (target == Target::kCover)
-            add({kCover.centre_m, scale * kCover.half_m, kCover.colour});
+            add({kCover.centre_m, scale * kCover.half_m, colour});
         else
-            scene.balls.push_back({in_world(kBallAt_m), scale * kBallRadius_m, kGreen});
+            scene.balls.push_back({in_world(kBallAt_m), scale * kBallRadius_m, colour});
     }
     return scene;
 }
 
 std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed)
 {
-    static const std::array<Colour, 4> colours{
-        Colour::FromRgb(0.85, 0.1, 0.1), Colour::FromRgb(0.1, 0.2, 0.85),
-        Colour::FromRgb(0.9, 0.55, 0.1), Colour::FromRgb(0.6, 0.2, 0.7)};
+    // All but the green.
+    const std::span others = std::span(kColours).subspan<1>();
     std::vector<Ball> balls;
     for (int i = 0; i < count; ++i)
     {
@@ -115,7 +146,7 @@ std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed)
         const double radius_m = 0.04 + 0.08 * random.Uniform();
         balls.push_back({{out_m * std::cos(at_rad), out_m * std::sin(at_rad), radius_m},
                          radius_m,
-                         colours[static_cast<size_t>(i) % colours.size()]});
+                         others[static_cast<size_t>(i) % others.size()].colour});
     }
     return balls;
 }

@@ -88,7 +88,7 @@ class Entry:
 
 
 def _start_scatter_m2(hunt: Hunt) -> float:
-    still = Mix([0, 0, 0, 0], [0, 0, 0, 0], hunt.n, 0)
+    still = Mix([0] * 4, [0] * 4, hunt.n, 0)
     return float(np.mean(hunt.run([still], range(1, 33))[0, :, native.METRICS.index("scatter_m2")]))
 
 
@@ -101,7 +101,9 @@ def entries(hunt: Hunt, elites: Elites) -> tuple[list[Entry], float]:
     ):
         kind, count = Counter(kinds(rows, start_m2, range_m)).most_common(1)[0]
         share = count / len(rows)
-        found.append(Entry("", kind, decode(genes, hunt.n), float(alike), at.tolist(), share))
+        found.append(
+            Entry("", kind, decode(genes, hunt.n, hunt.bits), float(alike), at.tolist(), share)
+        )
     return found, start_m2
 
 
@@ -220,7 +222,10 @@ def write_entries(folder: Path, hunt: Hunt, found: list[Entry]) -> None:
     rows = [entry.to_json() for entry in found]
     with replacing(folder / "archive.parquet", force=True) as fresh:
         pq.write_table(pa.Table.from_pylist(rows), fresh, compression="zstd")
-    lines = ["# Found by twinmill discover: speed and turn for nothing seen, then for seen."]
+    lines = [
+        "# Found by twinmill discover: speed and turn for nothing seen, then for seen, "
+        "or so for each number of the model's bits."
+    ]
     for entry in filter(lambda entry: entry.name, found):
         lines += [f'{name} = "{table_text(row)}"' for name, row in entry.mix.tables(entry.name)]
     write_whole(folder / NAME, "\n".join(lines) + "\n")

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-GENES = 9  # ring's table, share of odd robots, odd table; all within 0..1
 Row = list[int]
 
 
@@ -14,7 +13,8 @@ class Mix:
     """Robots of one table, and odd ones of another.
 
     Attributes:
-        ring, odd: inputs unseen speed, unseen turn, seen speed, seen turn; turns in thousandths.
+        ring, odd: inputs unseen speed, unseen turn, seen speed, seen turn, or so for each number of
+            k bits; turns in thousandths.
         n, odd_count: robots, and how many of them are odd: at most half.
     """
 
@@ -34,18 +34,31 @@ class Mix:
         return f"{name}:{self.n - self.odd_count},{name}_odd:{self.odd_count}"
 
 
+def gene_count(bits: int) -> int:
+    """Of the ring's table, the share of odd robots, and the odd table."""
+    return 2 * _inputs(bits) + 1
+
+
+def _inputs(bits: int) -> int:
+    """Speed and turn of each row."""
+    return 2 << bits
+
+
 def _row(genes: np.ndarray) -> Row:
     """The firmware's steps: whole percent of speed, thousandths of turn."""
-    speeds, turns = np.rint(200 * genes[::2] - 100), np.rint(4000 * genes[1::2] - 2000)
-    return [int(speeds[0]), int(turns[0]), int(speeds[1]), int(turns[1])]
+    row = np.empty(len(genes), int)
+    row[::2], row[1::2] = np.rint(200 * genes[::2] - 100), np.rint(4000 * genes[1::2] - 2000)
+    return row.tolist()
 
 
-def decode(genes: np.ndarray, n: int) -> Mix:
-    """From (GENES,) numbers within 0..1."""
-    odd_count = min(int(genes[4] * (n // 2 + 1)), n // 2)
-    return Mix(_row(genes[:4]), _row(genes[5:]), n, odd_count)
+def decode(genes: np.ndarray, n: int, bits: int) -> Mix:
+    """From (gene_count,) numbers within 0..1."""
+    inputs = _inputs(bits)
+    odd_count = min(int(genes[inputs] * (n // 2 + 1)), n // 2)
+    return Mix(_row(genes[:inputs]), _row(genes[inputs + 1 :]), n, odd_count)
 
 
 def table_text(row: Row) -> str:
     """As --table and behaviors.toml write it."""
-    return f"{row[0]},{row[1] / 1000:g},{row[2]},{row[3] / 1000:g}"
+    pairs = zip(row[::2], row[1::2], strict=True)
+    return ",".join(f"{speed},{turn / 1000:g}" for speed, turn in pairs)

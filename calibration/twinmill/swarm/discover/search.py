@@ -23,7 +23,7 @@ from twinmill.defaults import BATCH, PER_GENERATION
 from twinmill.files import alone_in, made_folder, replacing
 from twinmill.model.model_file import write_whole
 from twinmill.programs import available_cores
-from twinmill.swarm.discover.genes import GENES, Mix, decode
+from twinmill.swarm.discover.genes import Mix, decode, gene_count
 from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, measures
 from twinmill.swarm.request import Request
 
@@ -47,6 +47,11 @@ class Hunt:
     def sha256(self) -> str:
         """Of the whole question: a stored search goes on only with the same one."""
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+
+    @property
+    def bits(self) -> int:
+        """That the model sees: tables of 2^bits rows are searched."""
+        return len(self.request.model.bits)
 
     def cell(self, mix: Mix) -> native.Cell:
         """The swarm of a mix."""
@@ -90,16 +95,16 @@ class Elites:
     cells: int
 
 
-def _scheduler(seed: int) -> Scheduler:
+def _scheduler(seed: int, genes: int) -> Scheduler:
     bounds = list(MEASURES.values())
     archive = GridArchive(
-        solution_dim=GENES,
+        solution_dim=genes,
         dims=[cells for _, _, cells in bounds],
         ranges=[(low, high) for low, high, _ in bounds],
         extra_fields={"place": ((), np.int64)},
         seed=seed,
     )
-    common = {"bounds": [(0.0, 1.0)] * GENES, "batch_size": BATCH, "x0": np.full(GENES, 0.5)}
+    common = {"bounds": [(0.0, 1.0)] * genes, "batch_size": BATCH, "x0": np.full(genes, 0.5)}
     emitters = [
         EvolutionStrategyEmitter(archive, sigma0=STEP, seed=seed + 1, **common),
         EvolutionStrategyEmitter(archive, sigma0=STEP, seed=seed + 2, **common),
@@ -166,11 +171,11 @@ def search(hunt: Hunt, folder: Path, generations: int, tell: Callable[[int, int]
 def _searched(
     hunt: Hunt, store: GenerationStore, generations: int, tell: Callable[[int, int], None]
 ) -> Elites:
-    scheduler, kept = _scheduler(hunt.seed), []
+    scheduler, kept = _scheduler(hunt.seed, gene_count(hunt.bits)), []
     seeds = range(hunt.request.first_seed, hunt.request.first_seed + hunt.request.seeds)
     for generation in range(generations):
         genes = scheduler.ask()
-        mixes = [decode(one, hunt.n) for one in genes]
+        mixes = [decode(one, hunt.n, hunt.bits) for one in genes]
         rows = store.rows(generation, genes, lambda mixes=mixes: hunt.run(mixes, seeds))
         found, alike = measures(rows)
         scheduler.tell(alike, found, place=len(kept) * PER_GENERATION + np.arange(len(genes)))

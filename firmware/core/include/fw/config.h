@@ -5,10 +5,9 @@
 
 #include <stdint.h>
 
+#include "fw/bit.h"
 #include "fw/err.h"
 #include "fw/table.h"
-#include "fw/threshold.h"
-#include "fw/vote.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -18,10 +17,10 @@ struct fw_config
 {
     // Size of every frame: at most FW_MAX_WIDTH_PX by FW_MAX_HEIGHT_PX, the width even.
     int32_t width_px, height_px;
-    struct fw_color_box box;
-    // A frame shows the target if its largest blob has more pixels than this. >= 0
-    int32_t min_blob_px;
-    struct fw_vote_config vote;
+    // What is looked for in each picture. [1, FW_MAX_BITS]
+    int32_t bit_count;
+    struct fw_bit bits[FW_MAX_BITS];
+    // Of at most as many bits.
     struct fw_table table;
     // Older frames are forgotten, and without a frame the motors stop. > 0
     int64_t frame_timeout_us;
@@ -29,7 +28,7 @@ struct fw_config
     int32_t duty_cap_pct;
 };
 
-// 640x480, green, blob > 300 px, 6 of 10 frames, milling, 200 ms, no cap.
+// 640x480, one bit as fw_bit_default() has it, milling, 200 ms, no cap.
 struct fw_config fw_config_default(void);
 
 // @return FW_OK, or the code of an entry that is out of range.

@@ -20,6 +20,7 @@ enum fw_err
     FW_ERR_INPUT_RANGE,
     FW_ERR_FRAME_TIMEOUT,
     FW_ERR_DUTY_CAP,
+    FW_ERR_BITS,
     // Devices, which only the hardware layer touches.
     FW_ERR_NO_DEVICE,
     FW_ERR_FORMAT,

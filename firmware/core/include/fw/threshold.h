@@ -31,11 +31,24 @@ struct fw_threshold
     uint8_t chroma_low[16], chroma_span[16];
 };
 
+// A quick look at a row for up to eight boxes at once: bit i of an entry says whether box i takes
+// any of the 16 values of U, or of V, that begin with the entry's number.
+struct fw_looks
+{
+    uint8_t u[16], v[16];
+};
+
 // The green of the TurboPi experiments; threshold.c says where the numbers come from.
 struct fw_color_box fw_color_box_green(void);
 
 // @param box each min <= max.
 struct fw_threshold fw_threshold_make(const struct fw_color_box *box);
+
+// A quick look for one box. @param width_px as below. @return false only if no pixel is inside it.
+bool fw_threshold_look(const struct fw_threshold *threshold, const uint8_t *yuyv, int width_px);
+
+// @param width_px as below. @return bit i is 0 only if no pixel of the row is inside box i.
+uint8_t fw_looks_row(const struct fw_looks *looks, const uint8_t *yuyv, int width_px);
 
 // Tests the pixels of one row.
 // @param width_px even, at most FW_MAX_WIDTH_PX; 2 * width_px bytes are read.

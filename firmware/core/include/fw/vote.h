@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Strict majority over recent frames: turns one frame's bit into the bit that indexes the table.
+// Strict majority over recent frames: turns bits of single frames into the one that counts.
 #ifndef FW_VOTE_H
 #define FW_VOTE_H
 
@@ -36,6 +36,8 @@ struct fw_vote
 
 // The authors' vote: 10 frames, so 6 of 10 when full, and fewer frames while it fills.
 struct fw_vote_config fw_vote_config_default(void);
+// From milliseconds, as texts say it; 0: frames of any age count.
+int64_t fw_vote_window_us(int64_t window_ms);
 enum fw_err FW_MUST_CHECK fw_vote_check(const struct fw_vote_config *config);
 
 void fw_vote_clear(struct fw_vote *vote);

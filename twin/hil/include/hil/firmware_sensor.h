@@ -21,7 +21,8 @@ struct FirmwareOptions
 {
     std::string program;  // turbopi
     std::string behavior;
-    fw_table table;  // of that behaviour, which the program need not have built in
+    fw_table table;                 // of that behaviour, which the program need not have built in
+    std::vector<std::string> bits;  // as the program's configuration has them
     // Waits for the answer to each frame: same seed, same run. Else takes the newest answer there
     // is, as the wheels of a robot would.
     bool lockstep = true;

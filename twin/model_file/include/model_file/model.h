@@ -50,6 +50,8 @@ struct Sensor
     double false_negative_rate = 0, false_positive_rate = 0;  // per frame
     double delay_s = 0;
     double vote_frames = 1;  // seen if more than half of the last frames show it
+    // What is looked for, as in the robot's configuration: see fw_bit_parse().
+    std::vector<std::string> bits{"all"};
 };
 
 struct Noise

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a robot of a swarm decides by: the cone's bit, drawn frames, or the robot's own program.
+// What a robot of a swarm decides by: the cone's bits, drawn frames, or the robot's own program.
 #ifndef SENSOR_ROBOT_SENSOR_H
 #define SENSOR_ROBOT_SENSOR_H
 
@@ -10,6 +10,7 @@
 #include "fw/behavior.h"
 #include "fw/step.h"
 #include "plant/plant.h"
+#include "sensor/scene.h"
 
 namespace twin
 {
@@ -21,6 +22,14 @@ struct Image
     int width_px = 0, height_px = 0;
 };
 
+// What is before the cameras of a swarm: all robots, or those that one of them may see.
+struct Sight
+{
+    std::span<const Pose2> poses;
+    size_t self;                           // the place in `poses` of the robot that looks
+    std::span<const Colour> colours = {};  // of the targets on them; empty: TargetColour()
+};
+
 // A robot's sensor. Each control step exposes it once, also while a script drives the robot.
 class RobotSensor
 {
@@ -29,9 +38,9 @@ public:
 
     // Robots at least this far away do not matter, in m; infinite: all do.
     virtual double ReachM() const { return std::numeric_limits<double>::infinity(); }
-    // Exposes a frame at `now_us` of the robots' clock. `self` is this robot's place in `poses`,
-    // which may leave out robots that are ReachM() away or farther.
-    virtual void Expose(std::span<const Pose2> poses, size_t self, int64_t now_us) = 0;
+    // Exposes a frame at `now_us` of the robots' clock. `sight` may leave out robots that are
+    // ReachM() away or farther.
+    virtual void Expose(const Sight &sight, int64_t now_us) = 0;
     // One control step of the robot's `firmware` with what has arrived by the last Expose(), which
     // was at the same `now_us`. Writes all of `out`.
     virtual void Decide(int64_t now_us, fw_ctx &firmware, fw_output &out) = 0;

@@ -6,8 +6,10 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "fw/threshold.h"
 #include "plant/plant.h"
 
 namespace twin
@@ -19,7 +21,11 @@ struct Colour
     uint8_t y, u, v;
     // From red, green and blue in [0, 1], without gamma of its own (ITU-R BT.601-7, 2.5).
     static Colour FromRgb(double red, double green, double blue);
+    bool operator==(const Colour &) const = default;
 };
+
+// As the firmware's threshold does.
+bool IsInside(const Colour &colour, const fw_color_box &box);
 
 struct Ball
 {
@@ -52,11 +58,15 @@ enum class Target
 // Mean area of a target as seen from its own height, in m^2.
 double TargetArea(Target target);
 Colour TargetColour();
+// Of a target: green, red, blue, orange or purple. Throws std::invalid_argument in one sentence.
+Colour ColourNamed(const std::string &name);
 
 // What robot `self` may see of all the robots: the rest of them, sizes as in turbopi.xml.
-// `target_scales`, one per robot, enlarge or shrink their targets; 0: none. Without: 1.
+// `target_scales`, one per robot, enlarge or shrink their targets; 0: none. Without: 1. `colours`
+// are those of the targets. Without: TargetColour().
 Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
-                   std::span<const double> target_scales = {});
+                   std::span<const double> target_scales = {},
+                   std::span<const Colour> colours = {});
 
 // Coloured balls, none of them green, that lie on the floor in a ring about the origin.
 std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed);

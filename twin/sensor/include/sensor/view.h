@@ -7,6 +7,7 @@
 #include <span>
 
 #include "effects/effect.h"
+#include "fw/bit.h"
 #include "plant/plant.h"
 
 namespace twin
@@ -30,8 +31,13 @@ struct Blur
 // Probability, 0 to 1, that robot `self` has at least one other in view; misses and false
 // detections apart. With exact poses and a sharp range it is 0 or 1. Blurred edges are logistic,
 // with the variance of the pose noise that they stand for. A pose of NaN is seen by nobody.
+// `shown`, one per robot, leaves out those with another target than is looked for: they hide, and
+// are not seen.
 double ViewProbability(std::span<const Pose2> poses, size_t self, const DetectionModel &detection,
-                       const Blur &blur);
+                       const Blur &blur, std::span<const char> shown = {});
+
+// What a bit of that sector sees: half of a cone is a cone about another axis.
+DetectionModel InSector(DetectionModel detection, fw_sector sector);
 
 }  // namespace twin
 

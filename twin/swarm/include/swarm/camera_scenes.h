@@ -10,6 +10,7 @@
 #include "model_file/model.h"
 #include "plant/random.h"
 #include "sensor/camera.h"
+#include "sensor/robot_sensor.h"
 
 namespace twin
 {
@@ -30,7 +31,8 @@ DetectionModel CameraDetectionModel(const Model &robot, const CameraWorld &world
 // Draws what camera `robot` is given to see, by CameraDetectionModel:
 // pan      the camera is turned;
 // cone     a lens of another focal length, and targets that keep their size in the picture;
-// range    more or less of a target is green, so that it fills the firmware's limit at that range;
+// range    more or less of a target has its colour, so that it fills the firmware's limit at that
+// range;
 //          a soft edge draws the range anew for each target and frame;
 // hiding   a target behind a body of that radius is not drawn;
 // misses   no target is drawn; false detections: a green spot twice the limit in the middle.
@@ -41,8 +43,7 @@ public:
                  uint64_t seed);
 
     const CameraSettings &settings() const { return settings_; }
-    // The scene of the next frame while robots are at `poses`.
-    Scene Next(std::span<const Pose2> poses);
+    Scene Next(const Sight &sight);
 
 private:
     double TargetScale(std::span<const Pose2> poses, size_t target);

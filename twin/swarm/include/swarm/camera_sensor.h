@@ -22,7 +22,7 @@ public:
     CameraSensor(const CameraWorld &world, int robot, const DetectionModel &detection,
                  uint64_t seed);
 
-    void Expose(std::span<const Pose2> poses, size_t self, int64_t now_us) override;
+    void Expose(const Sight &sight, int64_t now_us) override;
     void Decide(int64_t now_us, fw_ctx &firmware, fw_output &out) override;
     Image LastImage() const override
     {
@@ -37,6 +37,7 @@ private:
     struct Exposure
     {
         std::vector<Pose2> poses;
+        std::vector<Colour> colours;
         size_t self;
         int64_t utime_us;  // time stamp
         uint32_t seq;

@@ -26,6 +26,7 @@ struct SwarmOptions
     double max_step_s = 0.025;
     // From this many robots on, neighbours are found with a grid; results are the same to the bit.
     size_t grid_from = kGridPays;
+    std::vector<Colour> colours = {};  // of the robots' targets; empty: TargetColour()
 };
 
 // Into how many substeps of at most `max_step_s` a control period is split.
@@ -98,6 +99,7 @@ private:
     std::unique_ptr<Plant> plant_;
     std::vector<Member> members_;
     std::vector<Pose2> poses_, near_poses_;
+    std::vector<Colour> colours_, near_colours_;
     CellGrid grid_;
     size_t grid_from_;
     double reach_m_ = 0;  // the longest finite one of a sensor; 0: none

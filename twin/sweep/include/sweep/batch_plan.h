@@ -11,7 +11,7 @@
 namespace twin
 {
 
-// Columns of n robots each.
+// Columns of n robots each: these, kBitColumns for each bit, kRowColumns for each row.
 enum BatchColumn
 {
     // State.
@@ -19,6 +19,24 @@ enum BatchColumn
     kY,
     kCos,
     kSin,
+    // Integers: the stream of the sensor's errors, and from which of its numbers in [0, 2^53) on a
+    // frame is right when something is in view, when nothing is.
+    kDice,
+    kMiss,
+    kFalse,
+    // The motion now, see swarm/metrics_lanes.h.
+    kMotionNow,
+    // Scratch.
+    kScratch = kMotionNow + kMotion,
+    kRobotColumns = kScratch + 3,
+};
+
+// Of one bit.
+enum BitColumn
+{
+    // Its cone's axis from the heading.
+    kAxisCos,
+    kAxisSin,
     // Range squared; cos(half cone) times its absolute value.
     kRange2,
     kCone,
@@ -26,27 +44,19 @@ enum BatchColumn
     kHalfCos,
     kHalfSin,
     kTarget2,
-    // Integers: the stream of the sensor's errors, and from which of its numbers in [0, 2^53) on a
-    // frame is right when something is in view, when nothing is.
-    kDice,
-    kMiss,
-    kFalse,
-    // A row of the table: displacement in the body frame and rotation in one substep.
-    kUnseenX,
-    kUnseenY,
-    kUnseenCos,
-    kUnseenSin,
-    kSeenX,
-    kSeenY,
-    kSeenCos,
-    kSeenSin,
-    // And its motion, see swarm/metrics_lanes.h.
-    kUnseenMotion,
-    kSeenMotion = kUnseenMotion + kMotion,
-    kMotionNow = kSeenMotion + kMotion,
-    // Scratch.
-    kScratch = kMotionNow + kMotion,
-    kBatchColumns = kScratch + 3,
+    kBitColumns,
+};
+
+// Of one row of the table.
+enum RowColumn
+{
+    // Displacement in the body frame and rotation in one substep.
+    kRowX,
+    kRowY,
+    kRowCos,
+    kRowSin,
+    kRowMotion,
+    kRowColumns = kRowMotion + kMotion,
 };
 
 // Columns of n robots in single precision, 2 W worlds.
@@ -92,15 +102,19 @@ struct BatchStep
 struct BatchPlan
 {
     int n, ring, step_count, substeps;
-    int vote_frames;  // majority over this many
-    int kept_frames;  // of the sensor, newest included
+    int bits;              // of the table's rows; the tables of all robots have 2^bits
+    const uint8_t *shown;  // by bit, of each robot: its target has the colour
+    int vote_frames;       // majority over this many
+    int kept_frames;       // of the sensor, newest included
     const BatchStep *steps;
     bool target_is_disc, errors;
-    bool prefilters;  // in single precision first; results are the same to the bit
+    bool prefilters;  // one bit in single precision first; results are the same to the bit
     double most_m;    // that a robot may drive in a step
     double body_m;    // diameter; 0: no bodies
     double touch_m;   // nearer bodies count as in contact
 };
+
+constexpr int kMostRows = 16;
 
 // Numbers of one lane, in units of the lane count: columns, range, sums, bits seen, votes' ones,
 // frames on the way, frames that vote. `total`: of two halves of a batch and their prefilter.
@@ -108,17 +122,26 @@ struct BatchLayout
 {
     // Always inlined: see lanes.h on inline functions that are compiled for several processors.
     [[gnu::always_inline]] explicit BatchLayout(const BatchPlan &p)
-        : range(kBatchColumns * p.n),
+        : first_row(kRobotColumns + p.bits * kBitColumns),
+          range((first_row + (kRowColumns << p.bits)) * p.n),
           sums(range + 1),
           seen(sums + kBatchSums),
-          ones(seen + p.n),
-          frames(ones + p.n),
-          votes(frames + p.kept_frames * p.n),
-          size(votes + p.vote_frames * p.n),
+          ones(seen + p.bits * p.n),
+          frames(ones + p.bits * p.n),
+          votes(frames + p.kept_frames * p.bits * p.n),
+          size(votes + p.vote_frames * p.bits * p.n),
           total(2 * size + kPrefilterColumns * p.n)
     {
     }
-    int range, sums, seen, ones, frames, votes, size, total;
+    [[gnu::always_inline]] int OfBit(int bit, int column) const
+    {
+        return kRobotColumns + bit * kBitColumns + column;
+    }
+    [[gnu::always_inline]] int OfRow(int row, int column) const
+    {
+        return first_row + row * kRowColumns + column;
+    }
+    int first_row, range, sums, seen, ones, frames, votes, size, total;
 };
 
 // Runs all steps of 2 W worlds. `numbers`: BatchLayout::total * W doubles, aligned to 64 bytes:

@@ -9,6 +9,7 @@
 #include "fw/table.h"
 #include "model_file/model.h"
 #include "plant/plant.h"
+#include "sensor/scene.h"
 #include "swarm/metrics.h"
 #include "swarm/starts.h"
 
@@ -23,7 +24,13 @@ struct Cell
     size_t ring_size;
     StartShape start = StartShape::kSquare;
     double spread_m = 1.2;
-    std::vector<Pose2> poses = {};  // where they start whatever the seed; empty: drawn
+    std::vector<Pose2> poses = {};     // where they start whatever the seed; empty: drawn
+    std::vector<Colour> colours = {};  // of the robots' targets; empty: TargetColour()
+
+    Colour ColourOf(size_t robot) const
+    {
+        return colours.empty() ? TargetColour() : colours[robot];
+    }
 };
 
 // Where the robots of a world start.
