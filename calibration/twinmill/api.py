@@ -1564,9 +1564,9 @@ def compare_runs(
         ValueError: the rate is not between 0 and 1.
 
     Examples:
-        >>> runs = tm.compare_runs("run.lcmlog", "later.lcmlog", "fitted.toml")
-        >>> runs.changed
-        False
+        >>> runs = tm.compare_runs("run.lcmlog", "other.lcmlog", "fitted.toml")
+        >>> runs.changed  # these are two robots of a kind
+        True
     """
     model = _model(model)
     rate = float(checked("alarm_rate", alarm_rate, *NUMBER))

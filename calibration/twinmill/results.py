@@ -152,8 +152,8 @@ class RunComparison(Reported):
         remounted: whether the marker was mounted anew, which is no change of the robot.
 
     Examples:
-        >>> tm.compare_runs("run.lcmlog", "later.lcmlog", "fitted.toml").changed
-        False
+        >>> tm.compare_runs("run.lcmlog", "other.lcmlog", "fitted.toml").verdict
+        'Changed in other.lcmlog: the forward speed is ... % lower (...'
     """
 
     def __init__(self, result: _compare_runs.RunComparison):

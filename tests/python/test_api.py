@@ -38,7 +38,10 @@ PUBLIC = (api, results)  # where the public names stand
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
-    """A minute of a robot that coasts, and the model that lacks it."""
+    """A minute of a robot that coasts, one of another robot, and the model that lacks it.
+
+    Robots of other seeds differ by the spread of speeds that the model states, 4 %.
+    """
     folder = tmp_path_factory.mktemp("api")
     base = Path(tm.Model.load("turbopi.toml").file.path).read_text()
     parameters = catalogue()["coasting"]["parameters"]
@@ -46,15 +49,17 @@ def folder(tmp_path_factory) -> Path:
     (folder / "hidden.toml").write_text(f'{base}\n[[effect]]\nname = "coasting"\n{effect}')
     (folder / "fitted.toml").write_text(base)
     write_rich_script(folder / "script.csv", 60, 1)
-    subprocess.run(
-        [
-            *(os.environ["TWIN_RUN"], "--plant", "planar", "--model", "hidden.toml", "--n", "1"),
-            *("--script", "script.csv", "--duration-s", "60", "--log", "run.lcmlog"),
-        ],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-    )
+    for seed, log in enumerate(("run.lcmlog", "other.lcmlog"), 1):
+        subprocess.run(
+            [
+                *(os.environ["TWIN_RUN"], "--plant", "planar", "--model", "hidden.toml"),
+                *("--n", "1", "--script", "script.csv", "--duration-s", "60"),
+                *("--seed", str(seed), "--log", log),
+            ],
+            cwd=folder,
+            check=True,
+            capture_output=True,
+        )
     return folder
 
 
@@ -76,6 +81,7 @@ def test_the_examples_of_the_documentation_run_and_all_results_pickle(here):
         "explained": tm.explain(log, "fitted.toml"),
         "inferred": tm.infer(log, "fitted.toml"),
         "run": tm.next_run(log, "fitted.toml"),
+        "runs": tm.compare_runs(log, "other.lcmlog", "fitted.toml"),
     }
     names = {"tm": tm, "np": np, "pd": pd, "Path": Path, "log": log, **made}
     done = [doctest.testmod(m, extraglobs=names, optionflags=options) for m in PUBLIC]
@@ -85,7 +91,7 @@ def test_the_examples_of_the_documentation_run_and_all_results_pickle(here):
         assert repr(again) == repr(thing) and str(again) == str(thing)
         assert again.to_json() == thing.to_json()
     assert sorted(p.name for p in here.iterdir()) == [
-        *("fitted.toml", "hidden.toml", "run.lcmlog", "script.csv")
+        *("fitted.toml", "hidden.toml", "other.lcmlog", "run.lcmlog", "script.csv")
     ]
 
 
@@ -108,6 +114,16 @@ def test_a_comparison_is_that_of_the_command(here, capsys):
     assert found.verdict in " ".join(str(found).split())
     assert "<table" in found._repr_html_()
     assert len(found.plot().axes) == 3
+
+
+def test_a_comparison_of_runs_is_that_of_the_command(here, capsys):
+    run(["compare-runs", "run.lcmlog", "other.lcmlog", "--model", "fitted.toml", "--json"])
+    told = json.loads(capsys.readouterr().out)
+    runs = tm.compare_runs("run.lcmlog", tm.load("other.lcmlog"), "fitted.toml")
+    assert runs.to_json().items() <= told.items() and runs.verdict == told["sentence"]
+    assert runs.changed
+    with pytest.raises(ValueError, match="alarm_rate"):
+        tm.compare_runs("run.lcmlog", "other.lcmlog", "fitted.toml", alarm_rate=1.5)
 
 
 def test_a_fit_gives_the_model_of_the_command(here, tmp_path, capsys):

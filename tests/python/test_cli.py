@@ -216,6 +216,7 @@ JUDGING = {
     "add": "add coasting {log} --model {model} -o x.toml",
     "next": "next {log} --model {model} -o x.csv",
     "metrics": "metrics {log} --model {model}",
+    "compare-runs": "compare-runs {log} {log} --model {model}",
     "compare-swarm": "compare-swarm {log} --model {model}",
     "wheels": "wheels {log} --model {model}",
     "plot": "plot {log} -o x.png",

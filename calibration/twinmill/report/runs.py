@@ -86,9 +86,8 @@ def apart(result: RunComparison) -> list[str]:
     late_s, reach_s = result.size_of("late_s")
     if "late_s" not in result.tested_keys and abs(late_s) > reach_s:
         said.append(
-            f"The clocks of commands and poses are {number(1000 * abs(late_s))} ms (± "
-            f"{number(1000 * reach_s, 2)} ms) {'further' if late_s > 0 else 'less far'} apart; a "
-            "delay of the robot cannot be told from that."
+            f"The offset of the clocks of commands and poses differs by {1000 * late_s:+.0f} ms (± "
+            f"{number(1000 * reach_s, 2)}); a delay of the robot cannot be told from that."
         )
     if follows_charge(result.first.model):
         said.append(_charge(*result.volts))

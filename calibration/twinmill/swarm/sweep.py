@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many swarms over a grid of parameters: asked for, run, joined and summed up."""
 
-import itertools
 import time
 from collections import Counter
 from collections.abc import Callable
