@@ -83,11 +83,10 @@ docs: build
 	    --requirement docs/requirements.lock && cp docs/requirements.lock .deps/docs; }
 	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
-# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for any glibc from 2.28
-# on. `scripts/wheel dist` alone makes one for this machine's.
+# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for this machine's glibc
+# and later ones. For older ones see scripts/make_wheel_root.
 wheel: build
-	@[ -d .deps/wheel-root ] || scripts/make_wheel_root .deps/wheel-root
-	@scripts/wheel dist .deps/wheel-root
+	@scripts/wheel dist
 
 # Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
 clean:
