@@ -21,7 +21,6 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parents[1]
 RATE_HZ = 100
-AT_ONCE = 100_000  # rows written at once
 COMMANDS_HZ = 20
 IMAGE_BYTES = 60_000  # of a camera beside the topics that are read, as bags have it
 
@@ -43,10 +42,19 @@ print(json.dumps([own.ru_utime + own.ru_stime, own.ru_maxrss / 1024]))
 """
 
 
-def drive(begin: int, end: int) -> tuple[np.ndarray, ...]:
-    """Times (s), positions and headings of a robot that drives a slow figure, by number of pose."""
-    t_s = np.arange(begin, end) / RATE_HZ
-    return t_s, np.cos(t_s / 7), np.sin(t_s / 5), np.sin(t_s / 3)
+def drive(count: int) -> np.ndarray:
+    """(count, 4) times (s), positions and headings of a robot that drives as `told` has it."""
+    t_s = np.arange(count) / RATE_HZ
+    speed_mps, _ = told(t_s)
+    heading_rad = np.sin(t_s / 3)
+    way_m = speed_mps * np.exp(1j * heading_rad) / RATE_HZ
+    place_m = np.cumsum(way_m) - way_m
+    return np.column_stack([t_s, place_m.real, place_m.imag, heading_rad])
+
+
+def told(t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Speed (m/s) and turn rate (rad/s) of the commands."""
+    return 0.2 + 0.1 * np.sin(t_s), np.cos(t_s / 3) / 3
 
 
 def write_table(folder: Path, rows: int) -> dict:
@@ -54,15 +62,14 @@ def write_table(folder: Path, rows: int) -> dict:
     poses, commands = folder / "poses.csv", folder / "commands.csv"
     with poses.open("w") as stream:
         stream.write("t_s,x_m,y_m,theta_rad\n")
-        for begin in range(0, rows, AT_ONCE):
-            columns = drive(begin, min(rows, begin + AT_ONCE))
-            np.savetxt(stream, np.column_stack(columns), fmt="%.5f", delimiter=",")
+        np.savetxt(stream, drive(rows), fmt="%.5f", delimiter=",")
     count = rows * COMMANDS_HZ // RATE_HZ
     t_s = np.arange(count) / COMMANDS_HZ
     with commands.open("w") as stream:
         stream.write("t_s,vx_mps,vy_mps,omega_radps\n")
-        told = np.column_stack([t_s, 0.2 + 0.1 * np.sin(t_s), 0 * t_s, np.cos(t_s / 3) / 3])
-        np.savetxt(stream, told, fmt="%.4f", delimiter=",")
+        speed_mps, turn_radps = told(t_s)
+        table = np.column_stack([t_s, speed_mps, 0 * t_s, turn_radps])
+        np.savetxt(stream, table, fmt="%.4f", delimiter=",")
     paths = {"poses": poses, "commands": commands, "out": folder / "table.lcmlog"}
     return {"paths": paths, "options": {}}
 
@@ -100,15 +107,15 @@ def write_bag(folder: Path, megabytes: int) -> dict:
             message = of(head, *content)
             bag.write(at[topic], ns, store.serialize_cdr(message, of.__msgtype__))
 
+        poses = drive(5 * pictures)  # at 100 Hz, commands and pictures at 20 Hz
         for k in range(pictures):
-            begin = 5 * k  # poses at 100 Hz, commands and pictures at 20 Hz
-            for t_s, x_m, y_m, theta_rad in zip(*drive(begin, begin + 5), strict=True):
+            for t_s, x_m, y_m, theta_rad in poses[5 * k : 5 * k + 5]:
                 half = np.sin(theta_rad / 2), np.cos(theta_rad / 2)
                 orientation = turn(0.0, 0.0, *map(float, half))
                 put("/pose", t_s, body(point(float(x_m), float(y_m), 0.0), orientation))
-            t_s = begin / RATE_HZ
-            told = vector(0.2 + 0.1 * float(np.sin(t_s)), 0.0, 0.0)
-            put("/told", t_s, twist(told, vector(0.0, 0.0, float(np.cos(t_s / 3)) / 3)))
+            t_s = k / COMMANDS_HZ
+            speed_mps, turn_radps = map(float, told(t_s))
+            put("/told", t_s, twist(vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, turn_radps)))
             put("/camera", t_s, "jpeg", pixels)
     paths = {"bag": path, "out": folder / "bag.lcmlog"}
     return {"paths": paths, "options": {"pose_topics": ("/pose",), "command_topics": ("/told",)}}
