@@ -91,7 +91,9 @@ def bench_readings(table: Table) -> Readings:
             if driven:
                 duty[k, wheels] = value
             elif wheels:
-                _put(table, column, speed[k], wheels[0], value)
+                if np.isfinite(speed[k, wheels[0]]):
+                    raise _told_twice(table, column, wheels[0])
+                speed[k, wheels[0]] = value
     most = np.abs(duty).max(axis=1)
     table.refuse(most > FULL_PCT, "the duty in percent", most, "must lie in -100..100")
     if not (speed < 0).any():  # a tachometer knows no backwards
@@ -126,14 +128,11 @@ def _factor(table: Table, column: str) -> float:
     return UNITS[unit][1]
 
 
-def _put(table: Table, column: str, speeds: np.ndarray, wheel: int, value: float) -> None:
-    """Raises LogError where another column has told this wheel's speed."""
-    if np.isfinite(speeds[wheel]):
-        raise LogError(
-            f"{table.name}: column {column} tells the speed of wheel {wheel + 1}, and so does one "
-            "before; keep the measured one, or name the wheel that each is of (fl_rpm, left_rpm)."
-        )
-    speeds[wheel] = value
+def _told_twice(table: Table, column: str, wheel: int) -> LogError:
+    return LogError(
+        f"{table.name}: column {column} tells the speed of wheel {wheel + 1}, and so does one "
+        "before; keep the measured one, or name the wheel that each is of (fl_rpm, left_rpm)."
+    )
 
 
 def _wheels(table: Table, name: str) -> tuple[int, ...]:

@@ -158,8 +158,9 @@ def log_of(data: bytes, name: str) -> Log:
 def _decoded(data: bytes, path: Path, channel_prefix: str) -> Log:
     if (other := other_file(data[:LOOKED_AT])) and other[0] != LCM_LOG:
         raise LogError(f"{path.name}: is {other[0]}, not an LCM log; {other[1]}.")
-    events = split_events(data, path.name)
-    return decode_log(events, path, hashlib.sha256(data).hexdigest(), channel_prefix)
+    events, sha256 = split_events(data, path.name), hashlib.sha256(data).hexdigest()
+    del data  # the payloads are copies
+    return decode_log(events, path, sha256, channel_prefix)
 
 
 def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = "") -> Log:

@@ -7,6 +7,7 @@ import difflib
 import gzip
 import io
 import re
+from array import array
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,7 @@ import numpy as np
 from twinmill.data.log import LogError
 from twinmill.data.nameless import messages, trajectory
 from twinmill.data.other_files import GZIP, other_file
+from twinmill.data.packed_rows import PackedRows
 from twinmill.data.units import UNITS, split_unit
 from twinmill.data.unpacking import BoundedText
 
@@ -99,11 +101,16 @@ def _encoding(binary: io.BufferedReader) -> str:
 
 
 class CellError(LogError):
-    """A cell of `row` that is no measurement; the rows of other robots may well be."""
+    """A cell of a row that is no measurement; the rows of other robots may well be.
 
-    def __init__(self, sentence: str, row: list[str]) -> None:
+    Attributes:
+        row: its cells.
+        line: of the file that it stands in.
+    """
+
+    def __init__(self, sentence: str, table: "Table", k: int) -> None:
         super().__init__(sentence)
-        self.row = row
+        self.row, self.line = table.rows[k], table.line[k]
 
 
 @dataclass(frozen=True)
@@ -112,8 +119,8 @@ class Table:
 
     name: str
     header: list[str]
-    rows: list[list[str]]
-    line: list[int]
+    rows: PackedRows
+    line: np.ndarray
     known: frozenset[str]  # columns that have a meaning: never proposed for renaming
     factor: dict[str, float] = field(default_factory=dict)  # of columns in another unit
     zero: dict[str, float] = field(default_factory=dict)  # what stands for nothing, if not 0
@@ -124,16 +131,12 @@ class Table:
         place = {name: k for k, name in enumerate(self.header)}
         taken = {source.column for source in sources.values()}
         rest = [name for name in self.header if name not in taken and name not in sources]
-        rows = [
+        rows = self.rows.rearranged(
             [
-                *(
-                    row[place[s.column]] if s.column else repr(float(s.value))
-                    for s in sources.values()
-                ),
-                *(row[place[name]] for name in rest),
+                *(place[s.column] if s.column else repr(float(s.value)) for s in sources.values()),
+                *(place[name] for name in rest),
             ]
-            for row in self.rows
-        ]
+        )
         factor = {name: source.factor for name, source in sources.items()}
         zero = {name: source.zero for name, source in sources.items()}
         return replace(self, header=[*sources, *rest], rows=rows, factor=factor, zero=zero)
@@ -149,9 +152,8 @@ class Table:
 
     def where(self, kept: np.ndarray) -> "Table":
         """Some of the rows, (rows,) bool."""
-        index = np.flatnonzero(kept).tolist()
-        rows, line = [self.rows[k] for k in index], [self.line[k] for k in index]
-        return replace(self, rows=rows, line=line)
+        index = np.flatnonzero(kept)
+        return replace(self, rows=self.rows.at(index), line=self.line[index])
 
     def cells(self, column: str) -> list[str]:
         """(rows,) texts of a column.
@@ -159,10 +161,12 @@ class Table:
         Raises:
             LogError: it is missing.
         """
+        return [cell.strip() for cells in self.rows.parts(self._place(column)) for cell in cells]
+
+    def _place(self, column: str) -> int:
         if column not in self.header:
             raise self.missing(column)
-        place = self.header.index(column)
-        return [row[place].strip() for row in self.rows]
+        return self.header.index(column)
 
     def numbers(self, column: str, empty_is_nan: bool = False) -> np.ndarray:
         """(rows,) floats of a column.
@@ -175,32 +179,41 @@ class Table:
             LogError: the column is missing.
             CellError: a cell is no number (its row is named).
         """
-        cells = self.cells(column)
+        values, begin = np.empty(len(self.rows)), 0
+        for cells in self.rows.parts(self._place(column)):
+            end = begin + len(cells)
+            values[begin:end] = self._numbers_in(cells, column, begin, empty_is_nan)
+            begin = end
         if empty_is_nan:
-            cells = ["nan" if cell.lower() in LOST else cell for cell in cells]
+            values[np.isinf(values)] = np.nan
+        return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
+
+    def _numbers_in(
+        self, cells: list[str], column: str, begin: int, empty_is_nan: bool
+    ) -> np.ndarray:
+        """Of some cells of a column; the first is of row `begin`."""
+        if empty_is_nan:
+            cells = ["nan" if cell.strip().lower() in LOST else cell for cell in cells]
         try:
             values = np.fromiter(map(float, cells), float, len(cells))
             if "_" in "".join(cells):
                 raise ValueError(column)
-            if empty_is_nan:
-                values[np.isinf(values)] = np.nan
-            return (values - self.zero.get(column, 0.0)) * self.factor.get(column, 1.0)
         except ValueError:
             bad = next(k for k, cell in enumerate(cells) if not is_number(cell))
             raise CellError(
-                f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', not a "
-                "number; correct or remove the row.",
-                self.rows[bad],
+                f"{self.name}: row {self.line[begin + bad]}: {column} is '{cells[bad].strip()}', "
+                "not a number; correct or remove the row.",
+                self,
+                begin + bad,
             ) from None
+        return values
 
     def finite(self, column: str) -> np.ndarray:
         """Like numbers, but NaN and infinity are errors too."""
         values = self.numbers(column)
         if not np.isfinite(values).all():
             k = int(np.isfinite(values).argmin())
-            raise CellError(
-                self._refusal(k, column, values[k], "must be a finite number"), self.rows[k]
-            )
+            raise CellError(self._refusal(k, column, values[k], "must be a finite number"), self, k)
         return values
 
     def flags(self, column: str) -> np.ndarray:
@@ -212,7 +225,7 @@ class Table:
 
     def is_dated(self, column: str) -> bool:
         """Whether a column holds dates with times, or times of day."""
-        first = self.cells(column)[0]
+        first = self.rows[0][self._place(column)].strip()
         kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
         return any(kind.match(first) for kind in kinds) or bool(DIGITS.fullmatch(first))
 
@@ -238,7 +251,8 @@ class Table:
             raise CellError(
                 f"{self.name}: row {self.line[bad]}: {column} is '{cells[bad]}', no time like the "
                 "rows before; correct or remove the row.",
-                self.rows[bad],
+                self,
+                bad,
             )
         seconds = (spans // pd.Timedelta(microseconds=1)).to_numpy(float) / 1e6
         return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=DAY_S)
@@ -360,7 +374,7 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
         last = [""]
         reader = csv.reader(_remembered(lines, last), delimiter=delimiter, skipinitialspace=True)
         header = _names(next(reader, []))
-        rows, line = [], []
+        rows, line = PackedRows(), array("q")
         for row in reader:
             if not any(cell.strip() for cell in row) or row[0].lstrip().startswith("#"):
                 continue
@@ -389,13 +403,11 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     _refuse_transposed(path.name, header, rows)
     comma = _has_decimal_commas(rows, delimiter)
     if comma:
-        rows = [
-            [c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c for c in row] for row in rows
-        ]
+        rows = rows.changed(lambda c: c.replace(",", ".") if DECIMAL_COMMA.fullmatch(c) else c)
     if delimiter != "," or comma:
         more = ", and numbers have decimal commas" if comma else ""
         notes.append(f"{path.name}: cells are separated by {DELIMITERS[delimiter]}{more}.")
-    return Table(path.name, header, rows, line, known, notes=notes)
+    return Table(path.name, header, rows, np.array(line), known, notes=notes)
 
 
 def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str, str]:
@@ -455,7 +467,7 @@ def _delimiter(header: str) -> str:
     return best if best in header else " " if " " in header.strip() else ","
 
 
-def _refuse_transposed(name: str, header: list[str], rows: list[list[str]]) -> None:
+def _refuse_transposed(name: str, header: list[str], rows: PackedRows) -> None:
     """Raises LogError where the rows are the quantities: few, long, and no names above them."""
     unnamed = header[0] == UNNAMED.format(1) or all(map(is_number, header[1:]))
     if unnamed and len(header) > WIDE * (len(rows) + 1):
@@ -495,22 +507,24 @@ def _remembered(lines: Iterator[str], last: list[str]) -> Iterator[str]:
         yield line
 
 
-def _has_decimal_commas(rows: list[list[str]], delimiter: str) -> bool:
+def _has_decimal_commas(rows: PackedRows, delimiter: str) -> bool:
     """Whether commas in cells are decimal points: some are, and no cell has a point as well.
 
     Between commas cells with a comma stand in quotes; those that all have three digits behind it
     may be thousands.
     """
+    if not rows.hold(","):
+        return False
     commas = [c for row in rows for c in row if "," in c and DECIMAL_COMMA.fullmatch(c)]
     if delimiter == "," and all(map(THOUSANDS.fullmatch, commas)):
         return False
     return bool(commas) and not any(is_number(cell) and "." in cell for row in rows for cell in row)
 
 
-def _ends_short(rows: list[list[str]]) -> bool:
+def _ends_short(rows: PackedRows) -> bool:
     """Whether the last cell of all is shorter than any above it."""
-    above = [len(row[-1].strip()) for row in rows[:-1]]
-    return len(above) >= FEWEST_ROWS and len(rows[-1][-1].strip()) < min(above)
+    *above, last = (len(cell.strip()) for cells in rows.parts(-1) for cell in cells)
+    return len(above) >= FEWEST_ROWS and last < min(above)
 
 
 def _cut(name: str, line: int) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was read in the rows of a table of steady drives, before runs at one input are put together."""
+"""Rows of a table of steady drives as they were read, each a run at an input."""
 
 from dataclasses import dataclass
 

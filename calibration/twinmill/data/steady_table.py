@@ -106,12 +106,7 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
     path = Path(path)
     readings = _readings(path, read_table(path, frozenset(COLUMNS)))
     cells = _cells(readings)
-    channels = [
-        _channel(cells, c, *known)
-        for c, known in enumerate(
-            zip(readings.unit, readings.as_zero, readings.reading, strict=True)
-        )
-    ]
+    channels = [_channel(cells, readings, c) for c in range(len(readings.columns))]
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
     robots = sorted({robot for robot, _ in cells})
     sheets = []
@@ -200,12 +195,13 @@ def _cells(readings: Readings) -> dict[Key, _Cell]:
 
 
 def _channel(
-    cells: dict[Key, _Cell], k: int, unit: float, zero: float, reading: float
+    cells: dict[Key, _Cell], readings: Readings, k: int
 ) -> tuple[dict[Key, tuple], Spread]:
     """For each cell median, floor, relative spread over robots; and the spread of all.
 
-    Args: k of the value; unit, zero, reading as in Readings.
+    Args: k of the value.
     """
+    unit, zero, reading = (own[k] for own in (readings.unit, readings.as_zero, readings.reading))
     runs = {key: cell.runs(k) for key, cell in cells.items()}
     middle = {key: float(np.median(r)) if r else np.nan for key, r in runs.items()}
     by_input: dict[tuple, list[float]] = defaultdict(list)

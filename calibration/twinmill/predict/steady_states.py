@@ -26,8 +26,8 @@ DRIVEN_BY = {"wheel_speed": "measured wheel speeds", "twist": "velocities of the
 class SteadyStates:
     """One robot of a table with its model: a data set. Values are (U, C), as `channels`.
 
-    The third of CHANNELS is the rim speed of the slower side where a note says that it stood still: an input
-    that could not be measured tells something, too. NaN is not measured.
+    The third of CHANNELS is the rim speed of the slower side where a note says that it stood still:
+    an input that could not be measured tells something, too. NaN is not measured.
     """
 
     measurement: SteadyTable

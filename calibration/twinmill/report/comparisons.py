@@ -95,8 +95,8 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
 def _steady_advice(robot: SteadyComparison) -> str:
     first = robot.where[0].group
     worst = max((r for r in robot.where if r.group == first), key=lambda r: r.share)
-    at = "at " if first == ON_BENCH else ""
+    where = f"at {worst.regime}" if first == ON_BENCH else worst.regime
     return (
-        f"{100 * worst.share:.0f} % of the error comes {at}{worst.regime} ({number(worst.ratio)} times "
+        f"{100 * worst.share:.0f} % of the error comes {where} ({number(worst.ratio)} times "
         "the floor); `twinmill diagnose` names what is missing."
     )

@@ -6,6 +6,7 @@ same thing. A step and a straight line are told apart by how well each explains 
 whose step it is by the beat of the stamps: a clock that is set leaves a gap or an overlap in it.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -63,12 +64,11 @@ def shift_s(search: Search, coarse_s: float) -> float:
     return found_s - search.motion.ahead_s
 
 
-def _by_lag(search: Search, lates_s: np.ndarray) -> list[tuple[float, Search]]:
-    """The same search at other shifts, of each lag alone."""
+def _by_lag(search: Search, lates_s: np.ndarray) -> Iterator[tuple[float, Search]]:
+    """The same search at other shifts, of each lag alone; one at a time, as each is large."""
     motion, wheels = search.motion, search.wheels
-    return [
-        (lag_s, Search(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)) for lag_s in ANY_LAG_S
-    ]
+    for lag_s in ANY_LAG_S:
+        yield lag_s, Search(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)
 
 
 def _is_shifted(search: Search, late_s: float) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import tomlkit
 import turbopi
 
-from twinmill.data.importers.log_writer import log_bytes
+from twinmill.data.importers.log_writer import log_parts
 from twinmill.data.importers.plain import STEERED, VALUES
 from twinmill.data.importers.series import (
     CommandSeries,
@@ -127,7 +127,7 @@ def log_of_series(
                 f"commands from {start_s:g} to {end_s:g} s; give both in one time."
             )
     source = tomlkit.dumps({"import": {"files": [], "same_clock": same_clock}})
-    return log_of(log_bytes(poses, commands, config_toml=source), name)
+    return log_of(b"".join(log_parts(poses, commands, config_toml=source)), name)
 
 
 def log_of_frames(

@@ -23,7 +23,7 @@ from twinmill.data.checks.bodies import give_back
 from twinmill.data.importers.columns import Guess, explain, read_mapping
 from twinmill.data.importers.corrections import corrected
 from twinmill.data.importers.io_tsv import read_io_tsv
-from twinmill.data.importers.log_writer import log_bytes
+from twinmill.data.importers.log_writer import log_parts
 from twinmill.data.importers.mapped import check_renames, names_in, read_columns
 from twinmill.data.importers.motive import read_motive
 from twinmill.data.importers.options import (
@@ -138,8 +138,9 @@ def import_log(
     seen = _detections(detections, options, by_robot, left_out) if detections else []
     with replacing(out, options.force, inputs=inputs) as temporary:
         provenance = _provenance(given.files, options)
-        content = log_bytes(pose_series, command_series, config_toml=provenance, detections=seen)
-        temporary.write_bytes(content)
+        parts = log_parts(pose_series, command_series, config_toml=provenance, detections=seen)
+        with temporary.open("wb") as file:
+            file.writelines(parts)
         warnings = [f"Left out: {why}" for why in left_out.values()]
         warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
         if not command_series:

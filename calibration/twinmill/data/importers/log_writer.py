@@ -17,17 +17,19 @@ CONTROL_PERIOD_US = 22_000  # a TurboPi tells its duties once per control step, 
 # Head of an event of LCM's log format: sync word, number, stamp in us, sizes of channel and data.
 HEAD, SYNC = struct.Struct(">Iqqii"), 0xEDA1DA01
 
+AT_ONCE = 8192  # rows
+
 Event = tuple[int, str, bytes]  # stamp, channel, encoded message
 
 
-def log_bytes(
+def log_parts(
     poses: list[PoseSeries],
     commands: list[CommandSeries],
     *,
     config_toml: str,
     detections: list[DetectionSeries] | None = None,
-) -> bytes:
-    """Content of a log file, in order of stamps.
+) -> Iterator[bytes]:
+    """Content of a log file, part by part, in order of stamps.
 
     Args:
         poses: one per robot.
@@ -45,11 +47,9 @@ def log_bytes(
             if series.kind == "duty" and not np.any(series.value % 1)  # a board's own, in percent
             else _drive_events(series)
         )
-    parts: list[bytes] = []
     for number, event in enumerate(heapq.merge(*streams, key=lambda event: event[0])):
         stamp_us, channel, data = event[0], event[1].encode(), event[2]
-        parts += [HEAD.pack(SYNC, number, stamp_us, len(channel), len(data)), channel, data]
-    return b"".join(parts)
+        yield HEAD.pack(SYNC, number, stamp_us, len(channel), len(data)) + channel + data
 
 
 def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:
@@ -62,17 +62,17 @@ def _run_event(series: CommandSeries, config_toml: str) -> Iterator[Event]:
 def _pose_events(series: PoseSeries) -> Iterator[Event]:
     channel, message = f"R{series.robot_id:02d}_POSE", turbopi.pose_t()
     message.robot_id = series.robot_id
-    rows = zip(
-        series.utime_us.tolist(),
-        series.valid.tolist(),
-        series.position_m.tolist(),
-        series.orientation_wxyz.tolist(),
-        strict=True,
-    )
+    rows = _listed(series.utime_us, series.valid, series.position_m, series.orientation_wxyz)
     for seq, (utime_us, valid, position, orientation) in enumerate(rows):
         message.utime_us, message.seq, message.valid = utime_us, seq, int(valid)
         message.position_m, message.orientation_wxyz = position, orientation
         yield utime_us, channel, message.encode()
+
+
+def _listed(*columns: np.ndarray) -> Iterator[tuple]:
+    """Rows of arrays as Python has numbers, AT_ONCE at a time: lists take ten times the memory."""
+    for begin in range(0, len(columns[0]), AT_ONCE):
+        yield from zip(*(c[begin : begin + AT_ONCE].tolist() for c in columns), strict=True)
 
 
 def _detection_events(series: DetectionSeries) -> Iterator[Event]:
@@ -88,7 +88,7 @@ def _detection_events(series: DetectionSeries) -> Iterator[Event]:
 def _drive_events(series: CommandSeries) -> Iterator[Event]:
     channel, message = f"R{series.robot_id:02d}_DRIVE", turbopi.drive_t()
     message.robot_id, message.kind = series.robot_id, KINDS.index(series.kind)
-    for utime_us, value in zip(series.utime_us.tolist(), series.value.tolist(), strict=True):
+    for utime_us, value in _listed(series.utime_us, series.value):
         message.utime_us, message.value = utime_us, value
         yield utime_us, channel, message.encode()
 

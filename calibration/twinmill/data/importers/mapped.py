@@ -6,6 +6,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from twinmill.data.importers.columns import (
     LEFT,
     Guess,
@@ -20,6 +22,7 @@ from twinmill.data.importers.columns import (
 from twinmill.data.importers.side_by_side import in_rows
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import Table, read_header, read_table
+from twinmill.data.packed_rows import PackedRows
 from twinmill.data.units import UNITS, split_unit
 
 
@@ -29,7 +32,9 @@ def read_columns(path: Path, known: frozenset[str]) -> Table:
 
 
 def _header(path: Path, known: frozenset[str]) -> list[str]:
-    return in_rows(Table(path.name, read_header(path), [], [], known)).header
+    return in_rows(
+        Table(path.name, read_header(path), PackedRows(), np.empty(0, int), known)
+    ).header
 
 
 def names_in(tables: Collection[Path], known: frozenset[str], rename: dict[str, str]) -> set[str]:

@@ -14,7 +14,7 @@ from twinmill.data.bench_table import is_bench
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.columns import Mapping
 from twinmill.data.importers.mapped import read_mapped
-from twinmill.data.importers.samples import samples_of
+from twinmill.data.importers.samples import filled_in, samples_of
 from twinmill.data.importers.series import (
     CommandSeries,
     DetectionSeries,
@@ -276,7 +276,8 @@ def _of_sound_robots(
             found = read(table, columns)
         except CellError as error:
             ids, _ = _robot_ids(table, columns)
-            number = next(i for i, row in zip(ids, table.rows, strict=True) if row is error.row)
+            own = np.flatnonzero(table.line == error.line)  # one a robot, where these stand aside
+            number = next(ids[k] for k in own if table.rows[k] == error.row)
             left_out.append(f"Left out: robot {number}: {error}")
             table = table.where(ids != number)
             if not table.rows:
@@ -341,10 +342,8 @@ def _columns_of(table: Table, kind: CommandKind) -> tuple[str, ...]:
 
 def _complete(table: Table, kind: CommandKind) -> Table:
     """Without the rows that have an empty cell or NaN: the command before is held over them."""
-    needed = [table.cells(name) for name in _columns_of(table, kind)]
-    whole = np.array(
-        [not any(cell.lower() in LOST for cell in cells) for cells in zip(*needed, strict=True)]
-    )
+    places = [table.header.index(name) for name in _columns_of(table, kind)]
+    whole = np.all([filled_in(table, [place]) for place in places], axis=0)
     if whole.all() or not whole.any():
         return table
     note = (

@@ -28,7 +28,9 @@ def samples_of(table: Table, own: Collection[str], of_others: frozenset[str]) ->
         of_others: our names for columns of other topics.
     """
     places = [k for k, name in enumerate(table.header) if name in own]
-    if not places or all(row[places[0]][-1:].isdecimal() for row in table.rows):
+    if not places or all(
+        cell[-1:].isdecimal() for cells in table.rows.parts(places[0]) for cell in cells
+    ):
         return table
     sampled = filled_in(table, places)
     if sampled.all() or not sampled.any():
@@ -48,5 +50,9 @@ def filled_in(table: Table, places: list[int]) -> np.ndarray:
     """(rows,) bool, where one of some columns, by their places, holds something."""
     filled = np.zeros(len(table.rows), bool)
     for k in places:
-        filled |= np.array([row[k].strip().lower() not in LOST for row in table.rows], bool)
+        filled |= np.fromiter(
+            (cell.strip().lower() not in LOST for cells in table.rows.parts(k) for cell in cells),
+            bool,
+            len(filled),
+        )
     return filled

@@ -10,6 +10,7 @@ from twinmill.data.importers.columns import is_usual
 from twinmill.data.importers.samples import FEWER, filled_in
 from twinmill.data.importers.topics import is_path
 from twinmill.data.measurement_table import Table
+from twinmill.data.packed_rows import PackedRows
 
 ROBOT = "robot_id"
 # A robot has a number: before the name of what is measured (`r1_x`, `robot2.yaw`), or after it.
@@ -50,7 +51,7 @@ def _stacked(table: Table, places: dict[str, dict[str, int]]) -> Table:
     shared = [k for k in range(len(table.header)) if k not in of_robots]
     names = list(next(iter(places.values())))
     sampled = _sampled(table, places)
-    rows, line = [], []
+    rows, line = PackedRows(), []
     for n, (row, number) in enumerate(zip(table.rows, table.line, strict=True)):
         for robot, columns in places.items():
             if sampled[robot][n]:
@@ -61,7 +62,7 @@ def _stacked(table: Table, places: dict[str, dict[str, int]]) -> Table:
         table,
         header=[*(table.header[k] for k in shared), ROBOT, *names],
         rows=rows,
-        line=line,
+        line=np.array(line),
         notes=[*table.notes, note],
     )
 
