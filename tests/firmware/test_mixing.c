@@ -13,7 +13,7 @@ void tearDown(void) {}
 static void assert_sides(int speed_pct, int turn_milli, int left_pct, int right_pct)
 {
     int8_t duty_pct[FW_WHEEL_COUNT];
-    const struct fw_input input = {speed_pct, turn_milli};
+    const struct fw_input input = {(int16_t)speed_pct, (int16_t)turn_milli};
     fw_mix(&input, duty_pct);
     TEST_ASSERT_EQUAL_INT(left_pct, duty_pct[FW_FRONT_LEFT]);
     TEST_ASSERT_EQUAL_INT(right_pct, duty_pct[FW_FRONT_RIGHT]);
@@ -69,7 +69,7 @@ static void test_mix_equals_the_vendors_formula_for_all_inputs(void)
                 continue;
             }
             int8_t duty_pct[FW_WHEEL_COUNT];
-            const struct fw_input input = {speed_pct, turn_milli};
+            const struct fw_input input = {(int16_t)speed_pct, (int16_t)turn_milli};
             fw_mix(&input, duty_pct);
             TEST_ASSERT_EQUAL_INT(clamp_pct(speed_pct - vp_pct), duty_pct[FW_FRONT_LEFT]);
             TEST_ASSERT_EQUAL_INT(clamp_pct(speed_pct + vp_pct), duty_pct[FW_FRONT_RIGHT]);
@@ -97,7 +97,7 @@ static void test_mix_mirrors_with_the_turn_and_negates_with_the_input(void)
         for (int turn_milli = 0; turn_milli <= 2000; turn_milli += 7)
         {
             int8_t duty_pct[FW_WHEEL_COUNT];
-            const struct fw_input input = {speed_pct, turn_milli};
+            const struct fw_input input = {(int16_t)speed_pct, (int16_t)turn_milli};
             fw_mix(&input, duty_pct);
             const int left_pct = duty_pct[FW_FRONT_LEFT], right_pct = duty_pct[FW_FRONT_RIGHT];
             assert_sides(speed_pct, -turn_milli, right_pct, left_pct);
