@@ -154,7 +154,7 @@ static void test_no_stop_can_be_kept_where_nothing_can_be_written(void)
 // A folder that is not there yet.
 static void test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later(void)
 {
-    char path[128];
+    char path[sizeof robot.config.run_dir + 16];
     snprintf(robot.config.run_dir, sizeof robot.config.run_dir, "%s/later", folder);
     snprintf(path, sizeof path, "%s/stopped", robot.config.run_dir);
     robot_boot();

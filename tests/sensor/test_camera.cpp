@@ -80,7 +80,7 @@ Box RandomPost(const std::vector<Pose2> &poses, const CameraSettings &settings, 
 TEST(Camera, SeesABallExactlyWhenAlgebraSeesIt)
 {
     const CameraSettings settings = Pinhole();
-    const int limit_px = fw_config_default().min_blob_px;
+    const int limit_px = fw_bit_default().min_blob_px;
     Random random(1, 0, "scenes"), posts(1, 0, "posts");
     Camera camera(settings, 0, 1);
     int disagree = 0, in_band = 0, otherwise = 0, seen = 0, hidden = 0;

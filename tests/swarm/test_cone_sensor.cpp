@@ -92,7 +92,7 @@ TEST(ConeSensor, DelayHoldsFramesBackAndKeepsTheirTimeStamps)
     // Seen in the frame at 20 ms alone; 50 ms of delay end at the frame at 80 ms.
     for (int64_t t_us = 0; t_us <= 100'000; t_us += 20'000)
     {
-        const auto frame = delayed.Next(t_us == 20'000 ? close : apart, 0, t_us);
+        const auto frame = delayed.Next({t_us == 20'000 ? close : apart, 0}, t_us);
         ASSERT_EQ(frame.has_value(), t_us >= 60'000) << t_us;
         if (frame)
         {
