@@ -142,7 +142,7 @@ def _told(model_file: ModelFile, names: Sequence[str], same_clock: bool, known: 
     unsure = model_file.unsure_speeds()
     for k, name in enumerate(names):
         if name in unsure:
-            cov[k, k] = min(unsure[name], ROUGH * model.get(name)) ** 2
+            _set_std(cov, k, min(unsure[name], ROUGH * model.get(name)))
         elif name == CLOCK:
             cov[k, k] = (
                 model_file.clock_std_s([]) ** 2 + SAME_STD_S**2 if same_clock else CLOCK_STD_S**2
@@ -151,6 +151,15 @@ def _told(model_file: ModelFile, names: Sequence[str], same_clock: bool, known: 
             one = model.clock_same and not known
             cov[k, k] = SAME_STD_PPM**2 if one else RATE_STD_PPM**2
     return cov
+
+
+def _set_std(cov: np.ndarray, k: int, std: float) -> None:
+    """Sets a standard deviation; correlations stay, so that the matrix stays a covariance."""
+    if cov[k, k] > 0:
+        share = std / np.sqrt(cov[k, k])
+        cov[k] *= share
+        cov[:, k] *= share
+    cov[k, k] = std**2
 
 
 def drift(names: Sequence[str], value: np.ndarray) -> np.ndarray:

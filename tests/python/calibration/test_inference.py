@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomlkit
 
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
@@ -117,6 +118,24 @@ def test_what_the_base_misses_in_its_own_log_is_no_news(
     assert news.answer.nothing < 1e-6
     assert known.answer.nothing > 1e3 * news.answer.nothing
     assert not [f for f in known.answer.findings if f.certainty == "sure"]
+
+
+def test_a_speed_that_the_fit_hardly_told_leaves_a_covariance(one_clock_base, measure, tmp_path):
+    """The file says a larger standard deviation of a speed than the 30 % that neighbours tell."""
+    document = tomlkit.parse(one_clock_base.text)
+    own = document["fit"]["covariance"]
+    first = own["names"].index("base.wheel_speed_mps.1")
+    std = 5.0 * one_clock_base.model.get("base.wheel_speed_mps.1")
+    document["base"]["std"]["wheel_speed_mps"][1] = std
+    values = np.array(one_clock_base.covariance.values)
+    scale = std / np.sqrt(values[first, first])
+    values[first] *= scale
+    values[:, first] *= scale
+    own["values"] = values.tolist()
+    path = tmp_path / "unsure.toml"
+    path.write_text(tomlkit.dumps(document))
+    prior = problem_of([measure(seed=5)], ModelFile.load(str(path))).prior
+    assert np.linalg.eigvalsh(prior.cov).min() > 0
 
 
 def test_a_damaged_table_of_what_is_missed_is_told_in_a_sentence(one_clock_base, tmp_path):
