@@ -21,7 +21,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import NoneType
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, Union
+from typing import Any, ParamSpec, TypeVar, Union
 
 import numpy as np
 import pandas as pd
@@ -105,9 +105,6 @@ from twinmill.shown import (
 )
 from twinmill.swarm.compare import compare_swarm
 from twinmill.swarm.metrics import swarm_metrics
-
-if TYPE_CHECKING:
-    import xarray
 
 Frame = Any  # a data frame of pandas or polars, a dataset of xarray, a dictionary of arrays
 Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
@@ -421,7 +418,7 @@ class Log(Shown):
         joined = pd.merge_asof(poses, commands, on="t_s", by=keys)
         return joined.sort_values([*keys, "t_s"], ignore_index=True)
 
-    def to_xarray(self) -> "xarray.Dataset":
+    def to_xarray(self) -> Any:
         """The numbers of `to_pandas` as a dataset of xarray, which must be installed.
 
         Returns:

@@ -92,7 +92,8 @@
 #define SIGN_PLACE(name, wheel, words) \
     {.kind = KEY_INTEGER, .offset = FIELD(sign[wheel]), .min = -1, .max = 1},
 
-const struct config_key config_keys[] = {KEYS(INTEGER_PLACE, TEXT_PLACE, YES_NO_PLACE, BIT_PLACE, SIGN_PLACE)};
+const struct config_key config_keys[] = {
+    KEYS(INTEGER_PLACE, TEXT_PLACE, YES_NO_PLACE, BIT_PLACE, SIGN_PLACE)};
 const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];
 
 #define TEXTS(name, words) #name "\0" words "\0"

@@ -14,34 +14,26 @@
 #define SELF_CENTERING_SPIN_MILLI (-270)
 
 static const struct fw_behavior behaviors[] = {
-    {.name = "diffusing",
-     .summary = "scatter: back off from a neighbour, else spin",
-     .table = {1, {{0, -2000}, {-50, 0}}}},
-    {.name = "diffusing_v2",
-     .summary = "drive at what is seen, else spin",
-     .table = {1, {{0, -500}, {100, 0}}}},
-    {.name = "disperse",
-     .summary = "spin away from a neighbour, else drive straight",
-     .table = {1, {{100, 0}, {100, 2000}}}},
-    {.name = "follow_leader",
-     .summary = "drive at what is seen, else circle left until something is",
-     .table = {1, {{75, 500}, {75, 0}}}},
-    {.name = "milling",
-     .summary = "the swarm turns in one circle",
-     .table = {1, {{100, -500}, {100, 500}}}},
-    {.name = "milling_cmaes",
-     .summary = "milling as found by an evolution strategy",
-     .table = {1, {{95, 900}, {95, -200}}}},
-    {.name = "milling_delay",
-     .summary = "milling as used to test the effect of delay",
-     .table = {1, {{100, 500}, {100, 0}}}},
-    {.name = "orbit", .summary = "circle a neighbour", .table = {1, {{100, 650}, {100, -650}}}},
-    {.name = "self_centering",
-     .summary = "gather: circle left when seeing, else spin right three times as fast",
-     .table = {1, {{0, SELF_CENTERING_SPIN_MILLI}, {100, 500}}}},
-    {.name = "shell",
-     .summary = "drive at what is seen, else circle right until something is",
-     .table = {1, {{100, -500}, {100, 0}}}},
+    // Scatter: back off from a neighbour, else spin.
+    {.name = "diffusing", .table = {1, {{0, -2000}, {-50, 0}}}},
+    // Drive at what is seen, else spin.
+    {.name = "diffusing_v2", .table = {1, {{0, -500}, {100, 0}}}},
+    // Spin away from a neighbour, else drive straight.
+    {.name = "disperse", .table = {1, {{100, 0}, {100, 2000}}}},
+    // Drive at what is seen, else circle left until something is.
+    {.name = "follow_leader", .table = {1, {{75, 500}, {75, 0}}}},
+    // The swarm turns in one circle.
+    {.name = "milling", .table = {1, {{100, -500}, {100, 500}}}},
+    // Milling as found by an evolution strategy.
+    {.name = "milling_cmaes", .table = {1, {{95, 900}, {95, -200}}}},
+    // Milling as used to test the effect of delay.
+    {.name = "milling_delay", .table = {1, {{100, 500}, {100, 0}}}},
+    // Circle a neighbour.
+    {.name = "orbit", .table = {1, {{100, 650}, {100, -650}}}},
+    // Gather: circle left when seeing, else spin right three times as fast.
+    {.name = "self_centering", .table = {1, {{0, SELF_CENTERING_SPIN_MILLI}, {100, 500}}}},
+    // Drive at what is seen, else circle right until something is.
+    {.name = "shell", .table = {1, {{100, -500}, {100, 0}}}},
 };
 
 static const size_t behavior_count = sizeof behaviors / sizeof behaviors[0];

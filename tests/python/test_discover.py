@@ -178,10 +178,13 @@ def test_a_robot_takes_the_table_by_name(archive, monkeypatch):
     assert find_table("milling") == ""
 
 
-def test_genes_reach_all_that_the_firmware_takes():
-    low, high = decode(np.zeros(9), 6), decode(np.ones(9), 6)
-    assert low.ring == low.odd == [-100, -2000, -100, -2000] and low.odd_count == 0
-    assert high.ring == high.odd == [100, 2000, 100, 2000] and high.odd_count == 3
+@pytest.mark.parametrize("bits", [1, 2, 3, 4])
+def test_genes_reach_all_that_the_firmware_takes(bits):
+    """A table of k bits has 2^k rows of two inputs; a swarm has two tables and a count."""
+    rows = 2**bits
+    low, high = (decode(full(4 * rows + 1), 6, bits) for full in (np.zeros, np.ones))
+    assert low.ring == low.odd == [-100, -2000] * rows and low.odd_count == 0
+    assert high.ring == high.odd == [100, 2000] * rows and high.odd_count == 3
 
 
 def test_seeds_that_agree_are_wholly_alike_and_two_extremes_are_not():

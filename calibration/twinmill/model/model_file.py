@@ -171,7 +171,7 @@ class ModelFile:
         return float(self._document.get("fit", {}).get("noise_speed_mps", 0.0))
 
     @property
-    def fit(self) -> dict:
+    def fit(self) -> dict[str, Any]:
         """What the last fit told: `logs`, scores, and tables that others keep there."""
         return dict(self._document.get("fit", {}))
 

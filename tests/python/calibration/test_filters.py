@@ -182,17 +182,6 @@ def test_definite_matrices_are_solved_at_each_rise(count):
         native.solved_risen(grams, rises, moments[:, :0])
 
 
-@pytest.mark.parametrize("count", [0, 1, 4, 7, 30])
-def test_lower_triangular_matrices_times_their_inverses_are_the_identity(count):
-    random = np.random.default_rng(6)
-    whole = random.normal(size=(3, count, count)) + 10 * np.eye(count)
-    found = native.lower_inverse(whole)  # what stands above the diagonal is not looked at
-    assert np.tril(whole) @ found == pytest.approx(np.broadcast_to(np.eye(count), whole.shape))
-    assert not np.triu(found, 1).any()
-    with pytest.raises(ValueError, match="square"):
-        native.lower_inverse(np.ones((3, 2, 4)))
-
-
 def test_sums_refuse_rows_that_are_not_there():
     with pytest.raises(ValueError, match="rows of values"):
         native.led_between(

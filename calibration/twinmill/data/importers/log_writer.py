@@ -4,6 +4,7 @@
 import heapq
 import struct
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import turbopi
@@ -69,7 +70,7 @@ def _pose_events(series: PoseSeries) -> Iterator[Event]:
         yield utime_us, channel, message.encode()
 
 
-def _listed(*columns: np.ndarray) -> Iterator[tuple]:
+def _listed(*columns: np.ndarray) -> Iterator[tuple[Any, ...]]:
     """Rows of arrays as Python has numbers, AT_ONCE at a time: lists take ten times the memory."""
     for begin in range(0, len(columns[0]), AT_ONCE):
         yield from zip(*(c[begin : begin + AT_ONCE].tolist() for c in columns), strict=True)

@@ -14,8 +14,6 @@ extern "C" {
 struct fw_behavior
 {
     const char *name;
-    // What the swarm does, in a few words, for help texts.
-    const char *summary;
     struct fw_table table;
 };
 
