@@ -33,9 +33,10 @@ FOLDERS = (
 CODE_SUFFIXES = {".c", ".h", ".cpp", ".py"}
 # What the core may ask of its surroundings: no heap, clock or I/O is among it.
 CORE_HEADERS = {"limits.h", "stdbool.h", "stddef.h", "stdint.h", "string.h"}
+CORE_HEADERS |= {"arm_neon.h", "tmmintrin.h"}  # names of the processor's instructions, no more
 # Built with the kernel's headers, and for the kernel alone.
 GPL_FILES = {"tests/hil/guest/hilboard.c"}
-CORE_SYMBOLS = {"memcmp", "memcpy", "memmove", "memset", "strcmp", "strlen"}
+CORE_SYMBOLS = {"memcmp", "memcpy", "memmove", "memset", "strcmp", "strcspn", "strlen"}
 MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home/(?!pi\b)\w+)/")
 
 
