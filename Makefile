@@ -83,8 +83,8 @@ docs: build
 	    --requirement docs/requirements.lock && cp docs/requirements.lock .deps/docs; }
 	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
-# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for this machine's glibc
-# and later ones. For older ones see scripts/make_wheel_root.
+# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for this machine's
+# glibc and later ones.
 wheel: build
 	@scripts/wheel dist
 

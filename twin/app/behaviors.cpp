@@ -62,7 +62,7 @@ OwnBehaviors::OwnBehaviors(const std::string &path)
                 "' must be \"speed,turn,speed,turn\", for nothing seen and for seen, as in "
                 "\"100,-0.5,100,0.5\" (speed -100 to 100, turn -2 to 2), or 4, 8 or 16 such pairs");
         names_.emplace_back(key.str());
-        behaviors_.push_back({names_.back().c_str(), "", table});
+        behaviors_.push_back({names_.back().c_str(), table});
     }
 }
 

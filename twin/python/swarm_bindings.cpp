@@ -85,7 +85,7 @@ NamedTables Species(const std::string &text, std::optional<int> n, const NamedTa
 {
     std::vector<fw_behavior> behaviors;
     for (const auto &[name, row] : own)
-        behaviors.push_back({name.c_str(), "", TableOf(row)});
+        behaviors.push_back({name.c_str(), TableOf(row)});
     NamedTables robots;
     for (const fw_behavior *behavior : ParseSpecies(text, n, behaviors))
         robots.emplace_back(behavior->name, RowOf(behavior->table));
