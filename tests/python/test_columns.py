@@ -327,6 +327,21 @@ def test_names_that_mean_nothing_to_us_are_asked_for(imported, tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    ("text", "example"),
+    [(",t_s,x,y_m,fahr\n0,0,1,2,3\n", "fahr"), ("Unnamed: 0,t_s,x,y_m,who\n0,0,1,2,R\n", None)],
+)
+def test_no_column_that_is_known_is_the_example_of_one_that_is_not(text, example, tmp_path):
+    """Poses that were given as commands, with pandas' index before them."""
+    (tmp_path / "c.csv").write_text(text)
+    files = ["--commands", str(tmp_path / "c.csv"), "--explain-columns", str(tmp_path / "m.toml")]
+    result = CliRunner().invoke(app, ["import", *files])
+    assert result.exit_code == 0, result.output
+    told = " ".join(result.output.split())
+    assert "write under [commands] what its columns hold" in told
+    assert re.findall(r'{ column = "(.*?)"', told) == ([example] if example else [])
+
+
 def test_a_speed_and_a_turn_make_a_velocity_command(tmp_path):
     (tmp_path / "p.csv").write_text(POSES)
     (tmp_path / "c.csv").write_text("time,v,w\n0,0.2,0.5\n1.5,-0.2,0\n")

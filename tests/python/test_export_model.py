@@ -436,6 +436,31 @@ def test_sdformat_holds_the_frame_of_friction_by_the_letters_that_each_gazebo_as
     assert frames == [("ignition:expressed_in", "gz:expressed_in")] * rolling
 
 
+@pytest.mark.parametrize("wheels", ["mecanum", "differential"])
+def test_gazebo_whose_physics_has_no_gains_drives_as_told(wheels, folder, model_text):
+    """The inverse kinematics of Gazebo's own drives, by hand, on the wheels of the same file."""
+    gains = {"forward_gain": 0.8, "sideways_gain": 0.72, "yaw_gain": 0.7}
+    text = model_text("m", **gains).replace('"mecanum"', f'"{wheels}"')
+    file = open_text(folder, text)
+    (gain,) = [
+        item["why"]
+        for item in run(["export-model", "m.toml", "--to", "sdf", "--json"])["not_carried"]
+        if "gain" in item["name"]
+    ]
+    assert "the real one moves 0.8 times as far ahead" in gain and "0.7 times as far in t" in gain
+    assert ("0.72 times as far sideways" in gain) == (wheels == "mecanum")
+    plugin = ET.parse("m.sdf").find("model/plugin")
+    told = {key: float(plugin.find(key).text) for key in ("wheel_separation", "wheel_radius")}
+    lever_m = told["wheel_separation"] / 2
+    vx, vy, omega = 0.2, 0.0, 1.5
+    if wheels == "mecanum":
+        vy, lever_m = 0.1, lever_m + float(plugin.find("wheelbase").text) / 2
+    places = [(wheel["x_m"], np.sign(wheel["y_m"])) for wheel in file.model.wheels()]
+    rims_mps = [vx - np.sign(x) * left * vy - left * lever_m * omega for x, left in places]
+    ideal = file.model.body_velocity([v / told["wheel_radius"] for v in rims_mps])
+    np.testing.assert_allclose(ideal, (vx, vy, omega), rtol=1e-6, atol=1e-9)
+
+
 def test_a_controller_told_the_exported_numbers_drives_as_fast_as_it_is_asked(folder, model_text):
     """The inverse kinematics of ros2_control's mecanum controller, by hand: both gains undone."""
     file = open_text(folder, model_text("m", forward_gain=0.9, sideways_gain=0.9, yaw_gain=0.8))

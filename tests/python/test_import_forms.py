@@ -9,9 +9,11 @@ import math
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError, read_log
+from twinmill_cli.main import app
 
 START_S = 1_700_000_000  # 2023-11-14 22:13:20 UTC, by date -u
 T_S = np.arange(20) / 10
@@ -88,6 +90,9 @@ def test_odometry_stands_in_for_commands_and_is_said_to(tmp_path):
                 twist=kinds["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=sure),
             )
             writer.write(topic, k * 10**8, store.serialize_cdr(message, odometry))
+    listed = CliRunner().invoke(app, ["import", "--bag", str(tmp_path / "bag")]).output
+    assert "pose, command" in listed and "--pose /r1/odom --command /r1/odom" in listed
+    assert "stand in for commands" in listed
     options = ImportOptions(pose_topics=("/r1/odom",), command_topics=("/r1/odom",))
     done = import_log(None, None, tmp_path / "o.lcmlog", bag=tmp_path / "bag", options=options)
     robot = read_log(tmp_path / "o.lcmlog").robots[1]

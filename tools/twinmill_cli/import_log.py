@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from pathlib import Path
 from typing import Annotated
@@ -14,11 +15,12 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
 
 if working():  # not for --help
-    from twinmill.data.importers.columns import Guess, to_toml
+    from twinmill.data.importers.columns import Guess, is_usual, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
+    from twinmill.data.importers.plain import KNOWN
     from twinmill.data.importers.robot_files import files_of
     from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics, numbering
-    from twinmill.data.importers.ros_messages import STEERED
+    from twinmill.data.importers.ros_messages import ODOMETRY, STAND_IN, STEERED, roles_of
     from twinmill.data.log import LogError
     from twinmill.data.measurement_table import Table as TableFile
     from twinmill.data.measurement_table import is_number
@@ -27,6 +29,7 @@ if working():  # not for --help
     from twinmill.report.tables import Cell, Table
     from twinmill.terminal import PlainConsole
 
+NAMELESS = re.compile(r"(Unnamed: \d+)?")  # as pandas writes its index, and then reads it
 SHOWN = 10  # warnings in the terminal; --json has all
 # Options that do something where columns are explained, and where a bag is listed.
 EXPLAINED = {
@@ -367,7 +370,7 @@ def _list(bag: Path, topics: list[Topic], log: str, as_json: bool) -> None:
         print_object({"topics": [vars(t) for t in topics], "command": line})
         return
     rows = [
-        [Cell(text) for text in (t.name, t.kind, f"{'about ' * t.about}{t.count}", t.role or "-")]
+        [Cell(text) for text in (t.name, t.kind, f"{'about ' * t.about}{t.count}", _could_be(t))]
         for t in topics
     ]
     table = Table(str(bag), ["topic", "type", "messages", "could be"], rows, words=(0, 1, 3))
@@ -375,6 +378,14 @@ def _list(bag: Path, topics: list[Topic], log: str, as_json: bool) -> None:
     PlainConsole().print(f"Try: {line}" if line else _unpaired(topics), soft_wrap=True)
     if pairs and not any(command for _, command in pairs):
         PlainConsole().print("It has no commands that can be read: a log of poses alone.")
+    for topic in topics:
+        if topic.kind == ODOMETRY and topic.name in {command for _, command in pairs}:
+            PlainConsole().print(f"{topic.name} {STAND_IN}.", soft_wrap=True)
+
+
+def _could_be(topic: Topic) -> str:
+    """All that its messages can be taken for."""
+    return ", ".join(roles_of(topic.kind)) or topic.role or "-"
 
 
 def _unpaired(topics: list[Topic]) -> str:
@@ -423,11 +434,11 @@ def _explain(
     if not several and not any("robot_id" in g.targets for g in guesses.get("poses", [])):
         words += ["--robot-id", str(1 if robot_id is None else robot_id)]
     line = shlex.join([*words, "--mapping", str(out), "-o", log])
-    told = [word for kind in guesses for word in _lacking(kind, guesses[kind])]
+    told = [word for kind, one in explained.items() for word in _lacking(kind, *one)]
     PlainConsole().print(f"Check {out}{''.join(told)}; then:\n  {line}", soft_wrap=True)
 
 
-def _lacking(kind: str, columns: list[Guess]) -> list[str]:
+def _lacking(kind: str, table: TableFile, columns: list[Guess]) -> list[str]:
     """What a person must write down of a table in which nothing was known."""
     known = {target for guess in columns for target in guess.targets} - {
         "t_s",
@@ -438,11 +449,14 @@ def _lacking(kind: str, columns: list[Guess]) -> list[str]:
         return []
     timed = any("t_s" in guess.targets for guess in columns)
     example = {"poses": "x_m", "commands": "vx_mps"}[kind] if timed else "t_s"
-    left = next((g.column for g in columns if not g.targets), "NAME")
-    return [
-        f", and write under [{kind}] what its columns hold, as in "
-        f'{example} = {{ column = "{left}", factor = 1.0 }}'
-    ]
+    strange = (
+        guess.column
+        for guess in columns
+        if not (NAMELESS.fullmatch(guess.column) or is_usual(guess.column, KNOWN))
+        and any(map(is_number, table.cells(guess.column)))
+    )
+    as_in = [f', as in {example} = {{ column = "{name}", factor = 1.0 }}' for name in strange]
+    return [f", and write under [{kind}] what its columns hold", *as_in[:1]]
 
 
 def _pair(text: str, form: str) -> tuple[str, str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers for drive controllers that know a wheel radius and distances, and no gains.
+"""Numbers for a real robot's drive controller, which knows a radius and distances, and no gains.
 
 They turn a wanted velocity into wheel speeds by  w_k = (vx -+ vy -+ (a + b) omega) / r. A robot
 whose true velocity is (f vx, s vy, y omega) of the ideal one does what is wanted with r' = r f and
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.export.carried import Left, RobotModel
+from twinmill.export.carried import RobotModel
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,3 @@ def wheel_gains(robot: RobotModel) -> np.ndarray:
     found = [v for _, card, v in robot.effects() if card["name"] == "wheel_gain"]
     ones = np.ones(len(robot.model.wheels()))
     return np.prod([ones, *(1 + np.array([*v.values()])[: len(ones)] for v in found)], axis=0)
-
-
-def left_by_drive(robot: RobotModel, target: str) -> list[Left]:
-    """What such controllers do not know of the base."""
-    left = robot.base_left(f"{target} has no place for it")
-    forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
-    if sideways != forward and robot.model.wheel_kind in ("mecanum", "none"):
-        why = f"{target} knows one wheel radius; sideways the robot goes "
-        left.append(
-            Left("base.sideways_gain", f"{why}{sideways / forward:.3g} times as far as told")
-        )
-    return left

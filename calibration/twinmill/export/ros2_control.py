@@ -2,7 +2,7 @@
 """A model as parameters for the controllers of ros2_control; joints as in the URDF."""
 
 from twinmill.export.carried import Left, RobotModel
-from twinmill.export.drive import drive_of, left_by_drive, wheel_gains
+from twinmill.export.drive import drive_of, wheel_gains
 from twinmill.extras import needing
 
 TIMEOUT_S = 0.5  # without a command: stop
@@ -25,7 +25,7 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     plugin, parameters = CONTROLLERS[kind]
     name = plugin.split("/")[0]
     left = [
-        *left_by_drive(robot, "ros2_control"),
+        *_base_left(robot),
         Left("sensor", "ros2_control moves the robot, and sees nothing"),
         *robot.left_effects(CARRIED.get(kind, ()), "ros2_control"),
     ]
@@ -40,11 +40,25 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     }
     said = [f"Written by twinmill from {robot.file.path.name} (sha256 {robot.file.hash})."]
     said += [
-        "Radius and distances hold the robot's gains: it goes and turns as fast as it is told.",
+        "Radius and distances undo the real robot's gains: it goes and turns as fast as told.",
+        "A simulator without these gains needs the URDF's wheel radius and distances instead.",
         "Not carried:",
         *(f"- {item.sentence()}" for item in left),
     ]
     return "".join(f"# {s}\n" for s in said) + yaml.safe_dump(data, sort_keys=False), left
+
+
+def _base_left(robot: RobotModel) -> list[Left]:
+    """What such controllers do not know of the base."""
+    left = robot.base_left("ros2_control has no place for it")
+    forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
+    if sideways != forward and robot.model.wheel_kind == "mecanum":
+        why = (
+            "ros2_control knows one wheel radius; sideways the real robot goes "
+            f"{sideways / forward:.3g} times as far as told"
+        )
+        left.append(Left("base.sideways_gain", why))
+    return left
 
 
 def _mecanum(robot: RobotModel) -> dict:

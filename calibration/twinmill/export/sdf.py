@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
-from twinmill.export.drive import drive_of, left_by_drive
+from twinmill.export.drive import drive_of
 
 VERSION = "1.9"  # Gazebo Fortress and later
 DRIVES = {
@@ -57,7 +57,7 @@ def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
 
 
 def _left(robot: RobotModel) -> list[Left]:
-    left = left_by_drive(robot, "SDF")
+    left = [*_gains_left(robot), *robot.base_left("SDF has no place for it")]
     if robot.model.wheel_kind not in DRIVES:
         left.append(Left("drive", f"Gazebo has none for {robot.model.wheel_kind} wheels"))
     if robot.model.wheel_kind == "differential" and robot.get("robot.half_wheelbase_m"):
@@ -65,6 +65,20 @@ def _left(robot: RobotModel) -> list[Left]:
         left.append(Left("middle of curves", why))
     left.append(Left("sensor", "a camera's picture is carried, no bit of detection"))
     return [*left, *robot.left_effects(("view_angle", "view_pan", "view_range"), "Gazebo")]
+
+
+def _gains_left(robot: RobotModel) -> list[Left]:
+    """How far the real robot goes of what it is told, since Gazebo's wheels roll as they turn."""
+    gains = {
+        "ahead": robot.get("base.forward_gain") * robot.get("theta_a1"),
+        "sideways": robot.get("base.sideways_gain") * robot.get("theta_a1"),
+        "in turns": robot.get("base.yaw_gain") * robot.get("theta_a2"),
+    }
+    if robot.model.wheel_kind in ("differential", "ackermann"):
+        del gains["sideways"]
+    told = [f"{gain:.3g} times as far {way}" for way, gain in gains.items() if gain != 1]
+    why = f"in Gazebo the robot moves as told; the real one moves {', '.join(told)}"
+    return [Left("gains of speed and turning", why)] if told else []
 
 
 def _camera(base: ET.Element, robot: RobotModel, x_m: float) -> None:
@@ -123,7 +137,7 @@ def _grip(collision: ET.Element, robot: RobotModel, wheel: dict) -> None:
 
 
 def _drive(model: ET.Element, robot: RobotModel) -> None:
-    """Gazebo's controller, with distances that make the robot turn as fast as it really does."""
+    """Gazebo's controller: the geometry of the wheels, and the real robot's top speeds."""
     kind, drive = robot.model.wheel_kind, drive_of(robot)
     filename, name = DRIVES[kind]
     plugin = ET.SubElement(model, "plugin", filename=filename, name=name)
@@ -131,10 +145,10 @@ def _drive(model: ET.Element, robot: RobotModel) -> None:
         side = "left" if wheel["y_m"] > 0 else "right"
         row = f"{LONG[wheel['name'][0]]}_" if kind == "mecanum" else ""
         _text(plugin, f"{row}{side}_joint", f"{wheel['name']}_wheel_joint")
-    _text(plugin, "wheel_separation", _n(2 * drive.scale * robot.get("robot.half_track_m")))
+    _text(plugin, "wheel_separation", _n(2 * robot.get("robot.half_track_m")))
     if kind == "mecanum":
-        _text(plugin, "wheelbase", _n(2 * drive.scale * robot.get("robot.half_wheelbase_m")))
-    _text(plugin, "wheel_radius", _n(drive.radius_m))
+        _text(plugin, "wheelbase", _n(2 * robot.get("robot.half_wheelbase_m")))
+    _text(plugin, "wheel_radius", _n(robot.get("robot.wheel_radius_m")))
     # The mecanum drive has one number for m/s and rad/s; there the joints' limits hold.
     if kind == "differential" and drive.top_mps and drive.top_radps:
         for key, top in (("linear", drive.top_mps), ("angular", drive.top_radps)):

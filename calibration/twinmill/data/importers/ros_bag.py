@@ -39,7 +39,7 @@ from twinmill.data.importers.ros_messages import (
     Row,
     joints_as_they_stand,
     joints_beside_wheels,
-    role_of,
+    roles_of,
     tag_rows,
     transform_row,
     transforms_of,
@@ -144,7 +144,10 @@ def list_topics(path: Path) -> list[Topic]:
                 parts[f"{connection.topic}:{part}", kind] += 1
     if not sum(counts.values()):
         raise LogError(f"{path}: has no messages; check that the recorder was subscribed.")
-    topics = [Topic(name, kind, counts[name], role_of(kind)) for name, kind in kinds.items()]
+    topics = [
+        Topic(name, kind, counts[name], next(iter(roles_of(kind)), ""))
+        for name, kind in kinds.items()
+    ]
     held = sum(counts[c.topic] for c in many)
     scale, about = max(1.0, held / LOOKED_AT), held > LOOKED_AT
     moving = [
@@ -179,16 +182,16 @@ def _parts(kind: str, message: object) -> Iterator[str]:
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
     """Pose and command topic of each robot: of one name; the one with most messages.
 
-    Where nothing is a command, what odometry measured stands in beside other poses. Poses without
-    either have an empty name as their command.
+    Where nothing is a command, what odometry measured stands in, beside its own poses if there are
+    no others. Poses without either have an empty name as their command.
     """
     pairs = []
     all_commands = [t for t in topics if t.role == "command"]
     if not all_commands:
         poses = [t for t in topics if t.role == "pose"]
         all_commands = [t for t in poses if t.kind == ODOMETRY]
-        topics = [t for t in poses if t.kind != ODOMETRY]
-        if not (topics and all_commands):
+        topics = [t for t in poses if t.kind != ODOMETRY] or poses
+        if not all_commands:
             robots = sorted({t.robot for t in poses})
             own = ([t for t in poses if t.robot == robot] for robot in robots)
             return [(max(of_one, key=_likely).name, "") for of_one in own]
@@ -565,7 +568,7 @@ def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
                     f"{path.name}: {name} holds corners of tags without poses; record /tf, too, "
                     "and name the tag there, as in /tf:tag36h11:3."
                 )
-            if not role_of(kind) and kind not in MANY:
+            if not roles_of(kind) and kind not in MANY:
                 raise LogError(f"{path.name}: {topic} holds {kind}, which is not read here.")
             if kind not in VALUES[role] and (kind not in MANY or role == "command"):
                 raise LogError(f"--{role}: {topic} holds {kind}, which is no {role}.")

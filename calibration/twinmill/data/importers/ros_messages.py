@@ -159,6 +159,6 @@ COMMANDS: dict[str, tuple[CommandKind, Callable[[Any], Row]]] = {
 }
 
 
-def role_of(kind: str) -> str:
-    """`pose`, `command` or empty, by the type of a message; odometry is a pose first."""
-    return "pose" if kind in POSES else "command" if kind in COMMANDS else ""
+def roles_of(kind: str) -> list[str]:
+    """`pose` and `command`, as a message of a type can be either; odometry is a pose first."""
+    return [role for role, kinds in (("pose", POSES), ("command", COMMANDS)) if kind in kinds]
