@@ -26,11 +26,11 @@ if(TWINMILL_FUZZ)
     add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
 
-# Warnings are errors in our own code; another project's compiler, or a wheel's, may know more.
+# Warnings are errors in our own code; another project's compiler may know more warnings.
 function(twinmill_strict target)
     target_compile_options(${target} PRIVATE
         -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wswitch
-        $<$<AND:$<BOOL:${PROJECT_IS_TOP_LEVEL}>,$<NOT:$<BOOL:${SKBUILD}>>>:-Werror>
+        $<$<BOOL:${PROJECT_IS_TOP_LEVEL}>:-Werror>
         $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>)
 endfunction()
 

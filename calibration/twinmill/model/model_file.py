@@ -148,14 +148,14 @@ class ModelFile:
 
         No less than 1: on its own log a fit can look better than it is.
         """
-        score = self._document.get("fit", {}).get("score_after")
+        score = self.fit.get("score_after")
         if score is None or not self.known_from_other_logs(log_sha256):
             return 1.0
         return max(1.0, float(score))
 
     def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:
         """What the model left in other logs: fall of chi2 per step by what it depends on."""
-        table = self._document.get("fit", {}).get("left_over", {})
+        table = self.fit.get("left_over", {})
         if set(table.get("fitted_on", [])) & set(log_sha256):
             return {}
         return {str(g): float(v) for g, v in table.items() if g != "fitted_on"}
@@ -168,7 +168,7 @@ class ModelFile:
     @property
     def noise_speed_mps(self) -> float:
         """RMS speed of the log that told the noise, while it drove; 0 where that is not known."""
-        return float(self._document.get("fit", {}).get("noise_speed_mps", 0.0))
+        return float(self.fit.get("noise_speed_mps", 0.0))
 
     @property
     def fit(self) -> dict[str, Any]:
@@ -182,7 +182,7 @@ class ModelFile:
         Raises:
             ModelError: what stands there is none, or is of quantities that the model has not.
         """
-        table = self._document.get("fit", {}).get("covariance", {})
+        table = self.fit.get("covariance", {})
         try:
             found = Covariance.from_toml(table)
         except ValueError as error:
