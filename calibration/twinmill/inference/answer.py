@@ -158,7 +158,8 @@ def _named(name: str, best: tuple[str, ...], every: list[Belief], table: Table) 
 def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[float, float]]:
     """Numbers of an effect and their standard deviations, over all sets of effects that hold it.
 
-    The spread between sets counts, too: which others are missing is not known for certain.
+    The spread between sets counts, too: which others are missing is not known for certain. So does
+    what a real robot's physics differ from the formula.
     """
     weight: dict[tuple[str, ...], float] = {}
     for b in every:
@@ -172,7 +173,9 @@ def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[f
     for label in own:
         values, stds = np.array([table.numbers[e][label] for e in sets]).T
         mean = float(shares @ values)
-        spread = float(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)))
+        spread = float(
+            np.hypot(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)), PRIORS.form * mean)
+        )
         found[label.split(".", 1)[1]] = mean, spread
     return found
 

@@ -15,10 +15,21 @@ from scipy.special import logsumexp
 from twinmill.inference.search import log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Entry, Table, subsets
-from twinmill.model.parameters import catalogue_name, lasts_for_a_while
+from twinmill.model.parameters import beginning_at_a_moment, catalogue, catalogue_name
 
 DRAWS = 400  # of blocks
 AGAIN = "time"  # what a thing depends on that comes and goes
+TOLD_BY = {  # what a thing depends on that is mistaken for an effect, by what its card needs
+    "steady_speed": ("speed", "coupling of turns"),
+    "poses": ("coupling of turns",),
+    "changes": ("past",),
+    "clocks": ("past", "time"),
+    "history": ("time", "moments"),
+    "battery": ("time",),
+    "room": ("place", "heading"),
+    "heading": ("heading",),
+    "wheel_angle": ("past", "place", "time"),
+}
 
 
 @dataclass(frozen=True)
@@ -59,24 +70,28 @@ class Belief:
 def beliefs(table: Table) -> list[Belief]:
     """All hypotheses with their probabilities, which add up to one.
 
-    Blocks of time are drawn again and again (Bayesian bootstrap; pseudo-BMA+ of Yao et al. 2018,
-    Bayesian Analysis 13), so that what few blocks speak for, or some against, is not sure.
+    Which thing is missing follows from the evidence. That anything is missing is averaged over
+    blocks of time that are drawn again and again (Bayesian bootstrap; pseudo-BMA+ of Yao et al.
+    2018, Bayesian Analysis 13): what few blocks speak for, or some against, is not sure.
     """
     rows = [row for entry in table.entries for row in _rows(entry, table)]
     logs = np.array([log for _, log, _ in rows])
+    nothing = np.array([not (entry.effects or entry.words) for _, _, entry in rows])
     blocks = np.array([e.blocks for _, _, e in rows])
     rest = logs - blocks.sum(axis=1)
     count = blocks.shape[1]
     drawn = np.random.default_rng(0).dirichlet(np.ones(count), DRAWS) * count
     each = blocks @ drawn.T + rest[:, None]
     p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
+    some = np.exp(logs - logsumexp(logs[~nothing]))
+    p[~nothing] = some[~nothing] * (1 - p[nothing].sum())
     return [_belief(mimicked, e, float(v)) for (mimicked, _, e), v in zip(rows, p, strict=True)]
 
 
 def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float) -> Belief:
-    """What comes again after a while is no effect of the catalogue, but depends on time."""
-    kinds = [catalogue_name(n) for n in entry.effects]
-    again = {n for n in kinds if kinds.count(n) > 1 and lasts_for_a_while(n)}
+    """What begins or ends several times is no effect of the catalogue, but depends on time."""
+    at_moments = [n for n in map(catalogue_name, entry.effects) if n in beginning_at_a_moment()]
+    again = at_moments if len(at_moments) > 1 else []
 
     def once(effects) -> tuple[str, ...]:
         return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in again)
@@ -93,12 +108,22 @@ def _rows(entry: Entry, table: Table) -> list[tuple[tuple[str, ...], float, Entr
     stale = np.log(PRIORS.stale if entry.stale else 1 - PRIORS.stale)
     each = np.log(PRIORS.outside / len(table.words))
     other = len(entry.words) * each if entry.words else np.log(1 - PRIORS.outside)
-    real = stale + other + log_prior_of_effects(count, table.candidates) + entry.log_evidence
+    real = stale + other + log_prior_of_effects(count, len(table.candidates)) + entry.log_evidence
     rows = [((), float(real), entry)]
     for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
         if np.isfinite(log_evidence):
             # the first word is no further thing, but the part that the effects' forms do not take
-            like = -len(names) * np.log(table.candidates)
-            rest = log_prior_of_effects(count - len(names), table.candidates)
+            like = sum(_log_likeness(catalogue_name(n), entry.words, table) for n in names)
+            rest = log_prior_of_effects(count - len(names), len(table.candidates))
             rows.append((names, float(stale + other + like + rest + log_evidence), entry))
     return rows
+
+
+def _log_likeness(effect: str, words: tuple[str, ...], table: Table) -> float:
+    """Log probability that an unnamed thing with these dependences looks like an effect."""
+
+    def of_kind(word: str) -> list[str]:
+        return [n for n in table.candidates if word in TOLD_BY[catalogue()[n]["needs"]]]
+
+    kin = max((1 / len(of_kind(w)) for w in words if effect in of_kind(w)), default=0.0)
+    return float(np.log(PRIORS.alike * kin + (1 - PRIORS.alike) / len(table.candidates)))

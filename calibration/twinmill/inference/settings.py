@@ -13,6 +13,9 @@ class Priors(Numbers):
     effects: float = number(1.0, "expected number of missing effects, over the whole catalogue")
     further: float = number(0.1, "factor on the prior odds of each effect after the first")
     outside: float = number(0.3, "probability that something outside the catalogue is there")
+    alike: float = number(
+        0.5, "share of unnamed things that look like an effect which depends on the same"
+    )
     stale: float = number(0.1, "probability that the base is known no better than a data sheet")
     size: float = number(2.0, "size of an effect, times its card's default strength")
     gain_drift: float = number(0.02, "drift of gains between logs of one robot, relative")
@@ -20,6 +23,7 @@ class Priors(Numbers):
     sheet: float = number(
         0.15, "error of a data sheet's speeds, and of a discrepancy in another log, relative"
     )
+    form: float = number(0.05, "error of an effect's formula, relative to its size: a guess")
     moments: float = number(0.05, "expected share of half seconds in which something happens")
     sudden: float = number(0.5, "gain error at such a moment; push over the usual speed")
     sure: float = number(0.9, "posterior probability from which an answer is called sure")

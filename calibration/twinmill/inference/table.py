@@ -55,14 +55,14 @@ class Table:
         entries: hypotheses.
         numbers: of each set of effects, name -> (value, standard deviation).
         excess: squares that the base leaves over those of noise.
-        candidates: number of effects that compete.
+        candidates: effects that compete.
         words: dependences that compete.
     """
 
     entries: list[Entry]
     numbers: dict[tuple[str, ...], dict[str, tuple[float, float]]]
     excess: float
-    candidates: int
+    candidates: tuple[str, ...]
     words: tuple[str, ...]
 
 
@@ -113,7 +113,7 @@ def table_of(search: Search) -> Table:
         [replace(entry, fall=falls[key]) for key, entry in entries.items()],
         {names: own.numbers() for names, (_, own) in best.items()},
         max(search.fitted[()].linear.left - rows, 1e-9),
-        len(p.names),
+        tuple(p.names),
         search.words,
     )
 
@@ -175,7 +175,7 @@ class _Comparison:
             for first in (news, self._likeliest(usual, own)):
                 if first.fall > 0:
                     out += self._with_words(first, self._evidence(first))
-        return out
+        return _as_without_moments(out)
 
     def numbers(self) -> dict[str, tuple[float, float]]:
         """Estimates of the effects and their standard deviations, with the likeliest dependence.
@@ -325,6 +325,15 @@ class _Comparison:
         share = falls / np.maximum(falls + squares, 1e-300)
         with np.errstate(divide="ignore"):
             return np.log(np.minimum(1, share * STEP**2) - share / STEP**2)
+
+
+def _as_without_moments(entries: list[Entry]) -> list[Entry]:
+    """Entries whose moments count whole, whatever blocks are drawn: they are of a few by nature."""
+    blocks = {(e.stale, frozenset(e.words)): e.blocks for e in entries}
+    return [
+        replace(e, blocks=blocks.get((e.stale, frozenset(e.words) - {MOMENTS}), e.blocks))
+        for e in entries
+    ]
 
 
 def _changes(p: Problem, h: Hypothesis) -> np.ndarray:
