@@ -72,7 +72,7 @@ _HOME = {
                 "fit",
                 "import_log",
             ),
-            *("infer", "load", "next_run", "simulate"),
+            *("infer", "infer_robots", "load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),

@@ -1779,6 +1779,40 @@ def infer(
 
 
 @_one_thread
+def infer_robots(
+    log: Log | str | Path,
+    model: Model | str | Path | None = None,
+    *,
+    own: Log | str | Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[int, Inference]:
+    """Infers for each robot of a log by itself.
+
+    Args:
+        log: of several robots, or the path of one.
+        model: of all of them; None is TurboPi's.
+        own: the log (or logs) that the model was fitted to; see `infer`.
+        progress: is told in words what is being done.
+
+    Returns:
+        Robot's number -> verdict, effects and dependences with their probabilities.
+
+    Raises:
+        LogError: the log cannot be used; one sentence.
+        ModelError: the model cannot be read.
+
+    Examples:
+        >>> {robot: found.verdict for robot, found in tm.infer_robots("swarm.lcmlog").items()}
+        {1: 'model_adequate', 2: 'effect_missing'}
+    """
+    log, model = _log(log), _model(model)
+    measurements = log.measurements(model)
+    before = _log(own).measurements(model) if own is not None else ()
+    results = _infer.infer_robots(measurements, model.file, before, _progress(progress))
+    return {r.measurements[0].track.robot_id: _told(Inference(r), measurements) for r in results}
+
+
+@_one_thread
 def explain(
     log: Log | str | Path,
     model: Model | str | Path | None = None,

@@ -20,7 +20,7 @@ if working():  # not for --help
     from threadpoolctl import threadpool_limits
 
     from twinmill.files import check_new_file
-    from twinmill.inference.infer import Inference, infer
+    from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
     from twinmill_cli.frame import command_line, load, open_model, provenance, told
 
@@ -36,7 +36,8 @@ def _infer(
         typer.Argument(
             metavar="LOG...",
             show_default=False,
-            help="Logs with commands and poses of one robot, which are judged together.",
+            help="Logs with commands and poses: those of one robot are judged together, each robot "
+            "by itself.",
         ),
     ],
     *,
@@ -62,7 +63,7 @@ def _infer(
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
-) -> Inference:
+) -> list[Inference]:
     """Give the probability of each effect that a model may lack, and of something nameless.
 
     Effects of the catalogue, dependences without a name (on time, place, heading,
@@ -85,14 +86,21 @@ def _infer(
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
         measurements = load(logs, model_file)
         before = load(own, model_file) if own else ()
-        result = infer(measurements, model_file, before, progress)
+        results = infer_robots(measurements, model_file, before, progress)
     if keep is not None:
-        with_kept(model_file, result.always, keep, source.command).write(force)
-    data = {**result.to_json(), **told(measurements), **source.to_json()}
+        if len(results) > 1:
+            raise ValueError(
+                f"infer: --keep writes what one robot's log tells, and these are {len(results)} "
+                "robots; give logs of the one that the model was fitted to."
+            )
+        with_kept(model_file, results[0].always, keep, source.command).write(force)
+    each = [result.to_json() for result in results]
+    data = each[0] if len(each) == 1 else {"robots": each}
+    data = {**data, **told(measurements), **source.to_json()}
     if as_json:
         deliver(data, None, as_json)
     else:
         from twinmill.report.inference import terminal  # slow to import, and JSON needs none
 
-        deliver(data, terminal(result), as_json)
-    return result
+        deliver(data, terminal(results), as_json)
+    return results

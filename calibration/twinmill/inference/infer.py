@@ -67,26 +67,73 @@ def infer(
         LogError: these are several robots, or tables.
         ModelError: what the file keeps cannot be read.
     """
-    runs = _of_one_robot(measurements, "the logs hold")
+    runs, before = _by_robot(measurements), _by_robot(own)
+    if len(runs) > 1:
+        raise LogError(
+            f"infer: the logs hold {_several(runs)}, and one robot is judged at a time; give logs "
+            "of one robot, or let each be judged by itself: twinmill infer in a shell, "
+            "tm.infer_robots in Python."
+        )
+    ((robot, of_robot),) = runs.items()
+    if before and robot not in before:
+        raise LogError(
+            f"infer: the model's own logs hold {_several(before)}, and not R{robot:02d}, which is "
+            "judged; give own logs of that robot, or none."
+        )
     always = kept(model_file)
-    if own:
+    if before:
         progress("what the model misses in its own log")
-        always = always_of(_of_one_robot(own, "the model's own logs hold"), model_file)
-    problem = problem_of(runs, model_file, always)
+        always = always_of(before[robot], model_file)
+    problem = problem_of(of_robot, model_file, always)
     search = Search(problem, progress).run()
-    return Inference(answer(table_of(search)), runs, always)
+    return Inference(answer(table_of(search)), of_robot, always)
 
 
-def _of_one_robot(measurements: Sequence[Measurement | SteadyTable], who: str) -> list[Measurement]:
+def infer_robots(
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    own: Sequence[Measurement | SteadyTable] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Inference]:
+    """`infer` for each robot of the logs by itself, in the order of their numbers.
+
+    Args:
+        measurements: of the logs.
+        model_file: the model of all of them.
+        own: of the logs that it was fitted to, with one robot at least; what it misses of a robot
+            that is not among these is not known.
+        progress: told in words what is being done.
+
+    Raises:
+        LogError: these are tables.
+        ModelError: what the file keeps cannot be read.
+    """
+    runs, before = _by_robot(measurements), _by_robot(own)
+    known = runs.keys() & before.keys()
+    found = []
+    for k, (robot, of_robot) in enumerate(runs.items()):
+        of = f"R{robot:02d} ({k + 1} of {len(runs)}), " if len(runs) > 1 else ""
+        own_logs = before.get(robot, []) if known else own
+        found.append(infer(of_robot, model_file, own_logs, lambda s, of=of: progress(of + s)))
+    return found
+
+
+def _by_robot(measurements: Sequence[Measurement | SteadyTable]) -> dict[int, list[Measurement]]:
+    """Runs of each robot, in the order of their numbers.
+
+    Raises:
+        LogError: there are tables.
+    """
     runs = [m for m in measurements if isinstance(m, Measurement)]
-    robots = sorted({m.track.robot_id for m in runs})
     if len(runs) < len(measurements):
-        of = "a table of steady speeds"
-    elif len(robots) > 1:
-        of = f"{len(robots)} robots (R{robots[0]:02d} to R{robots[-1]:02d})"
-    else:
-        return runs
-    raise LogError(
-        f"infer: {who} {of}, and one robot's commands and poses are judged at a time; "
-        "give logs of one robot, or use diagnose, which judges several."
-    )
+        raise LogError(
+            "infer: these hold a table of steady speeds, and commands and poses are judged; give "
+            "logs, or use diagnose, which judges tables."
+        )
+    robots = sorted({m.track.robot_id for m in runs})
+    return {n: [m for m in runs if m.track.robot_id == n] for n in robots}
+
+
+def _several(runs: dict[int, list[Measurement]]) -> str:
+    first, last = min(runs), max(runs)
+    return f"{len(runs)} robots (R{first:02d} to R{last:02d})" if len(runs) > 1 else f"R{first:02d}"

@@ -10,6 +10,10 @@ from twinmill.model.parameters import catalogue
 from twinmill.report import show
 from twinmill.report.tables import Cell, Table, number
 
+ONE_BY_ONE = (
+    "Robots of one model differ, and nothing tells infer by how much: a small effect of one robot "
+    "alone may be its own gains. For all that is known of one, give its logs alone."
+)
 SHOWN = 0.01  # probability of an effect that is listed; --json has all
 
 
@@ -31,8 +35,27 @@ def sentence(answer: Answer) -> str:
     return f"Missing: {names}{_on(answer)}."
 
 
-def terminal(result: Inference) -> RenderableType:
-    """What `twinmill infer` prints."""
+def terminal(results: list[Inference]) -> RenderableType:
+    """What `twinmill infer` prints: of one robot all, of several what is missing of each."""
+    if len(results) > 1:
+        return Group(show.table(_robots(results)), Text(ONE_BY_ONE))
+    return _of_one(results[0])
+
+
+def _robots(results: list[Inference]) -> Table:
+    rows = []
+    for result in results:
+        numbers = "; ".join(
+            f"{f.effect}.{name} {number(value)} +- {number(std, 2)}"
+            for f in result.answer.findings
+            for name, (value, std) in f.numbers.items()
+        )
+        robot = f"R{result.measurements[0].track.robot_id:02d}"
+        rows.append([Cell(robot), Cell(sentence(result.answer)), Cell(numbers)])
+    return Table("Each robot by itself", ["robot", "answer", "numbers"], rows, words=(0, 1, 2))
+
+
+def _of_one(result: Inference) -> RenderableType:
     answer = result.answer
     parts: list[RenderableType] = [Text(sentence(answer)), Text()]
     if answer.findings:

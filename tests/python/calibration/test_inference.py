@@ -15,7 +15,7 @@ import tomlkit
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.fit import fit
-from twinmill.inference.infer import infer
+from twinmill.inference.infer import infer, infer_robots
 from twinmill.inference.kept import kept, with_kept
 from twinmill.inference.problem import problem_of
 from twinmill.inference.steps import Steps, StepsOfLog
@@ -151,11 +151,26 @@ def test_the_same_log_gives_the_same_bytes(measure, one_clock_base, own):
     assert texts[0] == texts[1]
 
 
-def test_two_robots_are_refused_in_a_sentence(measure, one_clock_base):
+def test_each_robot_is_judged_by_itself(measure, tanh_robot, one_clock_base, own):
+    """One is as it was and its own log is known, the other rolls on; one alone refuses both."""
     first = measure(seed=5)
-    second = replace(first, track=replace(first.track, robot_id=4))
+    rolls = measure(tanh_robot(coast_mps2=0.6), 7)
+    second = replace(rolls, track=replace(rolls.track, robot_id=4))
+    found = infer_robots([second, first], one_clock_base, [own])
+    assert [f.measurements[0].track.robot_id for f in found] == [3, 4]
+    assert not found[0].answer.findings
+    assert found[1].answer.findings[0].effect == "coasting"
+    assert found[0].always and not found[1].always
     with pytest.raises(LogError, match=r"infer: the logs hold 2 robots \(R03 to R04\)"):
         infer([first, second], one_clock_base)
+
+
+def test_an_own_log_of_another_robot_is_refused_in_a_sentence(measure, one_clock_base, own):
+    first = measure(seed=5)
+    other = replace(first, track=replace(first.track, robot_id=4))
+    for judge in (infer, infer_robots):
+        with pytest.raises(LogError, match=r"own logs hold R03, and not R04, which is judged"):
+            judge([other], one_clock_base, [own])
 
 
 def test_steps_of_two_logs_are_those_of_each(measure, one_clock_base):

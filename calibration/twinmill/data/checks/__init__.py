@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import twinmill_native as native
 
+from twinmill.data.checks.apart import apart
 from twinmill.data.checks.clocks import check_lateness, check_one_clock
 from twinmill.data.checks.commands import (
     body_by_command,
@@ -91,6 +92,9 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
         body = body_by_command(model, track.command_kind)
         if body is None:
             continue
+        if model is not None:
+            others = [t for name, t in tracks if name == label and t is not track]
+            track = apart(track, others, model.get("robot.body_radius_m"))
         checked = CheckedTrack(label, track, body, own_option(track.robot_id, robots[label]))
         wrong, search, explained = check_commands(checked)
         if explained is None:
