@@ -4,8 +4,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from twinmill.data.log import LogError
-from twinmill.data.measurement import Measurement
+from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
@@ -16,6 +15,11 @@ from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
 from twinmill.model.model_file import ModelFile
+
+ONE = (
+    "one robot's commands and poses are judged at a time: give logs of one robot, or use diagnose, "
+    "which judges several"
+)
 
 
 @dataclass(frozen=True)
@@ -67,26 +71,11 @@ def infer(
         LogError: these are several robots, or tables.
         ModelError: what the file keeps cannot be read.
     """
-    runs = _of_one_robot(measurements, "the logs hold")
+    runs = of_one_robot(measurements, "infer: the logs hold", ONE)
     always = kept(model_file)
     if own:
         progress("what the model misses in its own log")
-        always = always_of(_of_one_robot(own, "the model's own logs hold"), model_file)
+        always = always_of(of_one_robot(own, "infer: the model's own logs hold", ONE), model_file)
     problem = problem_of(runs, model_file, always)
     search = Search(problem, progress).run()
     return Inference(answer(table_of(search)), runs, always)
-
-
-def _of_one_robot(measurements: Sequence[Measurement | SteadyTable], who: str) -> list[Measurement]:
-    runs = [m for m in measurements if isinstance(m, Measurement)]
-    robots = sorted({m.track.robot_id for m in runs})
-    if len(runs) < len(measurements):
-        of = "a table of steady speeds"
-    elif len(robots) > 1:
-        of = f"{len(robots)} robots (R{robots[0]:02d} to R{robots[-1]:02d})"
-    else:
-        return runs
-    raise LogError(
-        f"infer: {who} {of}, and one robot's commands and poses are judged at a time; "
-        "give logs of one robot, or use diagnose, which judges several."
-    )
