@@ -526,7 +526,8 @@ def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float, given:
         if alike and getattr(given, long):
             raise LogError(
                 f"robot {robot_id}: the {long} last {long_s:.0f} s, the {short} {short_s:.1f} s; "
-                f"the times of the {long} are in {unit}, so name that column t_{unit}."
+                f"the times of the {long} are in {unit}, so name that column t_{unit}; unless "
+                f"those of the {short} are called so and are in s: then name theirs t_s."
             )
 
 
