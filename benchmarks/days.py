@@ -31,7 +31,7 @@ from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import Alarm, alarm
 from twinmill.runs.changes import kinds_of
 from twinmill.runs.compare import may_alarm, open_run, second_half
-from twinmill.runs.difference import difference
+from twinmill.runs.difference import Difference, difference
 from twinmill.runs.reference import Day, day_of
 
 HEALTHY = 19  # runs that calibrate the alarm, the first one included
@@ -121,12 +121,15 @@ def recorded(number: int, duration_s: float) -> dict:
         has_wheels = drawn.robot.drive != "twist"
         weak = [str(random.choice(names)) for _ in range(WEAK_TESTS * has_wheels)]
         days = []
-        for wheel in [""] * (HEALTHY - 1 + TESTS) + weak:
+        for k, wheel in enumerate([""] * (HEALTHY - 1 + TESTS) + weak):
             second = day(drawn, random, duration_s, wheel)
-            pairs = [difference(first, run) for run in (second, second_half(second))]
-            keys = may_alarm(pairs[0], first.one_clock)
-            told = [[plain(vars(day_of(p.only(keys), k))) for k in (0, 1)] for p in pairs]
-            days.append({"weak": wheel, "whole": told[0], "half": told[1]})
+            pieces = {"whole": second}
+            if k >= HEALTHY - 1:  # only a run in question is looked at by halves
+                pieces["half"] = second_half(second)
+            pairs = {name: difference(first, run) for name, run in pieces.items()}
+            keys = may_alarm(pairs["whole"], first.one_clock)
+            told = {name: _both_days(pair.only(keys)) for name, pair in pairs.items()}
+            days.append({"weak": wheel, **told})
     robot = drawn.robot
     return {
         "robot": number,
@@ -137,6 +140,10 @@ def recorded(number: int, duration_s: float) -> dict:
         "keys": keys,
         "runs": days,
     }
+
+
+def _both_days(pair: Difference) -> list[dict]:
+    return [plain(vars(day_of(pair, k))) for k in (0, 1)]
 
 
 def examined(line: dict) -> list[dict]:

@@ -41,6 +41,13 @@ EUROC = ",".join(
 FORMS = {
     "TUM without names": _text("{t} {x} {y} 0 0 0 {z} {w}"),
     "TUM": _text("{t} {x} {y} 0 0 0 {z} {w}", "# timestamp tx ty tz qx qy qz qw"),
+    "TUM in nanoseconds": _text("{ns} {x} {y} 0 0 0 {z} {w}"),
+    "TUM with spaces at the ends": _text("{t}  {x} {y} 0 0 0  {z} {w} "),
+    "the way to a field once": _text(
+        "{t} {x} {y} 0 0 0 {z} {w}", "#Time pose.position.x y z pose.orientation.x y z w"
+    ),
+    "commas behind the numbers": _text("{t},{x},{y},0.4,", "t_s,x_m,y_m,theta_rad"),
+    "a comma behind the names": _text("{t},{x},{y},0.4", "t_s,x_m,y_m,theta_rad,"),
     "EuRoC": _text("{ns},{x},{y},0,{w},0,0,{z}", EUROC),
     "ros2 topic echo --csv": _text(ECHO),
     "days beside times": _text("{date},{time},{x},{y},0.4", "Date,Time,x_m,y_m,theta_rad"),

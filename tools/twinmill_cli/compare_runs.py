@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import shlex
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,14 +12,14 @@ import typer
 from twinmill.defaults import ALARM_RATE, DEFAULT_MODEL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Model, Out
-from twinmill_cli.output import CHANGED, AsJson, say, telling
+from twinmill_cli.output import AsJson, say, telling
 
 if working():  # not for --help
     from twinmill.data.measurement import load_measurements
     from twinmill.report import runs as present
     from twinmill.runs.compare import RunComparison, compare_runs, of_robot
     from twinmill.runs.history import healthy_logs
-    from twinmill_cli.frame import command_line, finish, open_model, provenance
+    from twinmill_cli.frame import command_line, finish_changed, open_model, provenance
 
 
 def register(app: typer.Typer) -> None:
@@ -93,15 +92,5 @@ def _compare_runs(
         result = compare_runs(
             *(run(first), run(second), model_file), healthy=more, rate=alarm_rate, tell=tell
         )
-    finish(
-        {"sentence": " ".join(present.verdict(result)), **result.to_json()},
-        None if as_json else present.terminal(result),
-        source,
-        section=partial(present.section, result),
-        as_json=as_json,
-        out=out,
-        scored=False,
-    )
-    if result.changed:
-        raise typer.Exit(CHANGED)
+    finish_changed(result, present, source, changed=result.changed, as_json=as_json, out=out)
     return result

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import shlex
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +12,7 @@ import typer
 from twinmill.defaults import ALARM_RATE
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Out
-from twinmill_cli.output import CHANGED, AsJson
+from twinmill_cli.output import AsJson
 
 if working():  # not for --help
     from twinmill.files import check_report
@@ -22,7 +21,7 @@ if working():  # not for --help
     from twinmill.runs.drift import Drift, drift
     from twinmill.runs.history import read_history
     from twinmill.version import __version__
-    from twinmill_cli.frame import finish
+    from twinmill_cli.frame import finish_changed
 
 
 def register(app: typer.Typer) -> None:
@@ -60,15 +59,6 @@ def _drift(
     words = [] if alarm_rate == ALARM_RATE else ["--alarm-rate", f"{alarm_rate:g}"]
     command = shlex.join(["twinmill", "drift", str(history), *words])
     result = drift(read_history(history), alarm_rate)
-    finish(
-        {"sentence": " ".join(present.verdict(result)), **result.to_json()},
-        None if as_json else present.terminal(result),
-        Provenance(command, f"twinmill {__version__}", ""),
-        section=partial(present.section, result),
-        as_json=as_json,
-        out=out,
-        scored=False,
-    )
-    if result.left:
-        raise typer.Exit(CHANGED)
+    source = Provenance(command, f"twinmill {__version__}", "")
+    finish_changed(result, present, source, changed=bool(result.left), as_json=as_json, out=out)
     return result

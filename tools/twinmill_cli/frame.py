@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -15,9 +16,11 @@ from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
 from twinmill.provenance import Provenance
 from twinmill.version import __version__
-from twinmill_cli.output import STOPPED, deliver, say
+from twinmill_cli.output import CHANGED, STOPPED, deliver, say
 
 if TYPE_CHECKING:  # slow to import, and JSON needs none of it
+    from types import ModuleType
+
     from rich.console import RenderableType
 
     from twinmill.report import Section
@@ -114,6 +117,42 @@ def finish(
         if out:
             say("stopped; no report was drawn.")
         raise typer.Exit(STOPPED)
+
+
+def finish_changed(
+    result: Any,
+    present: ModuleType,
+    source: Provenance,
+    *,
+    changed: bool,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Tells whether a robot changed: as `finish`, and by the exit code.
+
+    Args:
+        result: what was found.
+        present: module of the report that shows it: `verdict`, `terminal` and `section`.
+        source: of the report.
+        changed: whether there is an alarm.
+        as_json: as of `finish`.
+        out: likewise.
+
+    Raises:
+        ValueError, Exit: as `finish`.
+        Exit: something changed.
+    """
+    finish(
+        {"sentence": " ".join(present.verdict(result)), **result.to_json()},
+        None if as_json else present.terminal(result),
+        source,
+        section=partial(present.section, result),
+        as_json=as_json,
+        out=out,
+        scored=False,
+    )
+    if changed:
+        raise typer.Exit(CHANGED)
 
 
 def _written(out: Path, drawn: Section, source: Provenance, scored: bool) -> Path:

@@ -375,3 +375,35 @@ def _played(track: Track, heading_rad: np.ndarray) -> native.Track:
         *(np.ascontiguousarray(a, float) for a in (t_s, command, battery_V, track.pose_t_s, pose)),
         np.ascontiguousarray(track.segment, np.int64),
     )
+
+
+def of_one_robot(
+    measurements: Sequence[Measurement | SteadyTable],
+    whose: str,
+    remedy: str,
+    robot: int | None = None,
+) -> list[Measurement]:
+    """Runs of one robot, where commands and poses of one are judged.
+
+    Args:
+        measurements: of all that was given.
+        whose: begin of the sentence where they are not, up to what they hold.
+        remedy: its end.
+        robot: its number, where others may be there, too; None: it is alone.
+
+    Raises:
+        LogError: they are of several robots, of others or of none.
+    """
+    runs = [m for m in measurements if isinstance(m, Measurement)]
+    ids = sorted({m.track.robot_id for m in runs})
+    chosen = [m for m in runs if robot in (None, m.track.robot_id)]
+    known = f"R{ids[0]:02d}" + (f" to R{ids[-1]:02d}" if len(ids) > 1 else "") if ids else ""
+    if len(runs) < len(measurements):
+        held = "a table of steady speeds"
+    elif not chosen:
+        held = f"no robot {robot}, but {known}"
+    elif robot is None and len(ids) > 1:
+        held = f"{len(ids)} robots ({known})"
+    else:
+        return chosen
+    raise LogError(f"{whose} {held}; {remedy}.")

@@ -18,7 +18,7 @@ from typing import TextIO
 import numpy as np
 
 from twinmill.data.log import LogError
-from twinmill.data.nameless import messages, trajectory
+from twinmill.data.nameless import messages, trajectory, whole
 from twinmill.data.other_files import GZIP, other_file
 from twinmill.data.packed_rows import PackedRows
 from twinmill.data.units import UNITS, split_unit
@@ -381,10 +381,14 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
             if len(row) < len(header) and not last[0].endswith(("\n", "\r")):
                 notes.append(_cut(path.name, before + reader.line_num))
                 break
+            if not rows and not header[-1] and len(row) == len(header) - 1:
+                header.pop()  # likewise behind the names
             if not rows and (named := _with_units(header, row)):
                 header = named
                 notes.append(f"{path.name}: the row under the names is taken for their units.")
                 continue
+            if len(row) == len(header) + 1 and not row[-1].strip():
+                row.pop()  # a separator at the end of the line parts nothing
             if len(row) != len(header):
                 raise LogError(
                     f"{path.name}: row {before + reader.line_num}: has {len(row)} cells, but the "
@@ -480,7 +484,7 @@ def _refuse_transposed(name: str, header: list[str], rows: PackedRows) -> None:
 
 
 def _names(header: list[str]) -> list[str]:
-    return [cell.strip() for cell in header]
+    return whole([cell.strip() for cell in header])
 
 
 def _with_units(header: list[str], row: list[str]) -> list[str] | None:

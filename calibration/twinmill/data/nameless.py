@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.data.units import unit_of_stamps
+
 POSE = ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")
 TWIST = tuple(f"twist.{part}.{axis}" for part in ("linear", "angular") for axis in "xyz")
 TUM = ("timestamp", "tx", "ty", "tz", *POSE[3:])  # as that format's page names them
 OFF_ONE = 0.01  # of a unit quaternion's length
 # `ros2 topic echo --csv`: seconds, nanoseconds, frame, and the fields of the message.
 STAMPED = re.compile(r"(\d{1,10}),(\d{1,9}),([^,]*[^,\d.-][^,]*|),")
+AXES = ("x", "y", "z", "w")
+OF_AXIS = re.compile(r"(?<=[./])[xyzw]$")
 COVARIANCE = tuple(f"covariance_{k}" for k in range(36))
 FIELDS = {  # by the number of cells behind the frame
     7: POSE,
@@ -42,7 +46,23 @@ def trajectory(cells: list[str], comment: list[str]) -> str:
     if len(cells) != len(TUM) or (comment and tuple(comment) != TUM):
         return ""
     length = float(np.linalg.norm([float(cell) for cell in cells[4:]]))
-    return " ".join(("t_s", *POSE)) if abs(length - 1) < OFF_ONE else ""
+    stamp = f"t_{unit_of_stamps(float(cells[0]))}"
+    return " ".join((stamp, *POSE)) if abs(length - 1) < OFF_ONE else ""
+
+
+def whole(names: list[str]) -> list[str]:
+    """Names of columns with the way to each field, where only the first axis has it.
+
+    `position.x y z` are all of the position, as people write such a header by hand.
+    """
+    found, way = [], ""
+    for name in names:
+        if not (way and name in AXES):
+            way = OF_AXIS.sub("", name) if OF_AXIS.search(name) else ""
+            found.append(name)
+        else:
+            found.append(way + name)
+    return found
 
 
 def messages(first: str, lines: Iterable[str]) -> Named | None:

@@ -31,6 +31,8 @@ SYMBOLS = {  # as people write them in brackets, beside those above
     **dict.fromkeys(("\u00b0/s", "deg/s"), "degps"),
     **{"%": "pct", "m/s": "mps", "cm/s": "cmps", "mm/s": "mmps", "rad/s": "radps"},
 }
+LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
+SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller
 BRACKETED = re.compile(r"(.*?)[\s_]*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 
 
@@ -47,3 +49,10 @@ def split_unit(column: str) -> tuple[str, str]:
         return plain_name(found[1]), unit if unit in UNITS else ""
     stem, _, unit = plain_name(column).rpartition("_")
     return (stem, unit) if stem and unit in UNITS else (plain_name(column), "")
+
+
+def unit_of_stamps(largest: float) -> str:
+    """Unit of stamps by their size: s, or that in which they count since 1970."""
+    if largest <= LATEST_S:
+        return "s"
+    return next((unit for unit, top in SINCE_1970.items() if largest < top), "ns")

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One robot, one model: what is missing, with probabilities."""
+"""One model, and each robot by itself: what is missing, with probabilities."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from twinmill.data.log import LogError
-from twinmill.data.measurement import Measurement
+from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
@@ -16,6 +15,14 @@ from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
 from twinmill.model.model_file import ModelFile
+
+HELD, HELD_OWN = "infer: the logs hold", "infer: the model's own logs hold"
+ONE = (
+    "one robot's commands and poses are judged at a time: give logs of one robot, or let each be "
+    "judged by itself (twinmill infer in a shell, tm.infer_robots in Python); diagnose judges what "
+    "differs between several, and tables"
+)
+OWN = "give own logs of the robot that is judged, or none"
 
 
 @dataclass(frozen=True)
@@ -59,34 +66,23 @@ def infer(
     Args:
         measurements: of the logs, which are judged together.
         model_file: the model.
-        own: of the logs that the model was fitted to: what it misses there, too, is no news.
-            Without them its file may tell that.
+        own: of the logs that the model was fitted to, with that robot: what it misses there, too,
+            is no news. Without them its file may tell that.
         progress: told in words what is being done.
 
     Raises:
         LogError: these are several robots, or tables.
         ModelError: what the file keeps cannot be read.
     """
-    runs, before = _by_robot(measurements), _by_robot(own)
-    if len(runs) > 1:
-        raise LogError(
-            f"infer: the logs hold {_several(runs)}, and one robot is judged at a time; give logs "
-            "of one robot, or let each be judged by itself: twinmill infer in a shell, "
-            "tm.infer_robots in Python."
-        )
-    ((robot, of_robot),) = runs.items()
-    if before and robot not in before:
-        raise LogError(
-            f"infer: the model's own logs hold {_several(before)}, and not R{robot:02d}, which is "
-            "judged; give own logs of that robot, or none."
-        )
+    runs = of_one_robot(measurements, HELD, ONE)
     always = kept(model_file)
-    if before:
+    if own:
         progress("what the model misses in its own log")
-        always = always_of(before[robot], model_file)
-    problem = problem_of(of_robot, model_file, always)
+        robot = runs[0].track.robot_id
+        always = always_of(of_one_robot(own, HELD_OWN, OWN, robot), model_file)
+    problem = problem_of(runs, model_file, always)
     search = Search(problem, progress).run()
-    return Inference(answer(table_of(search)), of_robot, always)
+    return Inference(answer(table_of(search)), runs, always)
 
 
 def infer_robots(
@@ -100,40 +96,24 @@ def infer_robots(
     Args:
         measurements: of the logs.
         model_file: the model of all of them.
-        own: of the logs that it was fitted to, with one robot at least; what it misses of a robot
-            that is not among these is not known.
+        own: of the logs that it was fitted to, with one of the robots at least; what it misses of
+            a robot that is not among these is not known.
         progress: told in words what is being done.
 
     Raises:
         LogError: these are tables.
         ModelError: what the file keeps cannot be read.
     """
-    runs, before = _by_robot(measurements), _by_robot(own)
-    known = runs.keys() & before.keys()
+    robots, known = _robots(measurements), _robots(own)
     found = []
-    for k, (robot, of_robot) in enumerate(runs.items()):
-        of = f"R{robot:02d} ({k + 1} of {len(runs)}), " if len(runs) > 1 else ""
-        own_logs = before.get(robot, []) if known else own
-        found.append(infer(of_robot, model_file, own_logs, lambda s, of=of: progress(of + s)))
-    return found
+    for k, robot in enumerate(robots):
+        of = f"R{robot:02d} ({k + 1} of {len(robots)}), " if len(robots) > 1 else ""
+        runs = of_one_robot(measurements, HELD, ONE, robot)
+        strange = robot not in known and set(known) & set(robots)
+        own_logs = () if strange else own
+        found.append(infer(runs, model_file, own_logs, lambda s, of=of: progress(of + s)))
+    return found or [infer(measurements, model_file, own, progress)]
 
 
-def _by_robot(measurements: Sequence[Measurement | SteadyTable]) -> dict[int, list[Measurement]]:
-    """Runs of each robot, in the order of their numbers.
-
-    Raises:
-        LogError: there are tables.
-    """
-    runs = [m for m in measurements if isinstance(m, Measurement)]
-    if len(runs) < len(measurements):
-        raise LogError(
-            "infer: these hold a table of steady speeds, and commands and poses are judged; give "
-            "logs, or use diagnose, which judges tables."
-        )
-    robots = sorted({m.track.robot_id for m in runs})
-    return {n: [m for m in runs if m.track.robot_id == n] for n in robots}
-
-
-def _several(runs: dict[int, list[Measurement]]) -> str:
-    first, last = min(runs), max(runs)
-    return f"{len(runs)} robots (R{first:02d} to R{last:02d})" if len(runs) > 1 else f"R{first:02d}"
+def _robots(measurements: Sequence[Measurement | SteadyTable]) -> list[int]:
+    return sorted({m.track.robot_id for m in measurements if isinstance(m, Measurement)})

@@ -8,7 +8,7 @@ import numpy as np
 
 from twinmill.chance import f_above, t_quantile
 from twinmill.data.log import LogError
-from twinmill.data.measurement import Measurement
+from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.defaults import ALARM_RATE
 from twinmill.fitting.opening import Opened, open_measurements
@@ -226,27 +226,13 @@ def _sized_anew(own: Named, named: Sequence[Named], after: Judged) -> Change:
 def of_robot(
     measurements: Sequence[Measurement | SteadyTable], name: str, robot: int | None
 ) -> Measurement:
-    """The run of one robot in a log.
-
-    Args:
-        measurements: of all its robots.
-        name: of the log.
-        robot: its number; None: the log has one robot.
+    """The run of one robot in a log, by the log's name and the robot's number if it has several.
 
     Raises:
-        LogError: there is no such robot, or no number and several robots.
+        LogError: it is not there.
     """
-    runs = [m for m in measurements if isinstance(m, Measurement)]
-    if not runs:
-        raise LogError(f"{name}: is a table, and no run; give a log with commands and poses.")
-    ids = [m.track.robot_id for m in runs]
-    known = ", ".join(map(str, ids))
-    if robot is None and len(runs) > 1:
-        raise LogError(f"{name}: has robots {known}; say which one with --robot.")
-    chosen = [m for m in runs if robot in (None, m.track.robot_id)]
-    if not chosen:
-        raise LogError(f"{name}: has no robot {robot}, but {known}.")
-    return chosen[0]
+    remedy = "give commands and poses of one robot, or its number with --robot"
+    return of_one_robot(measurements, f"{name}: holds", remedy, robot)[0]
 
 
 def open_run(run: Measurement, model_file: ModelFile) -> Opened:

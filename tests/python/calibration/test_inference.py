@@ -169,7 +169,7 @@ def test_an_own_log_of_another_robot_is_refused_in_a_sentence(measure, one_clock
     first = measure(seed=5)
     other = replace(first, track=replace(first.track, robot_id=4))
     for judge in (infer, infer_robots):
-        with pytest.raises(LogError, match=r"own logs hold R03, and not R04, which is judged"):
+        with pytest.raises(LogError, match=r"own logs hold no robot 4, but R03; give"):
             judge([other], one_clock_base, [own])
 
 

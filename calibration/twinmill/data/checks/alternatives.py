@@ -202,6 +202,13 @@ class Search:
         self._told: dict[Callable, object] = {}
         self._sums_by_shift: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
+    @classmethod
+    def of_lag(
+        cls, motion: Motion, wheels: np.ndarray, lag_s: float, lates_s: np.ndarray
+    ) -> "Search":
+        """At one lag alone; of many lags, one after the other, as each is large."""
+        return cls(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)
+
     def once(self, tell: Callable[["Search"], Told]) -> Told:
         """What `tell` says of this search; several ask, and it takes long."""
         if tell not in self._told:

@@ -65,10 +65,9 @@ def shift_s(search: Search, coarse_s: float) -> float:
 
 
 def _by_lag(search: Search, lates_s: np.ndarray) -> Iterator[tuple[float, Search]]:
-    """The same search at other shifts, of each lag alone; one at a time, as each is large."""
-    motion, wheels = search.motion, search.wheels
+    """The same search at other shifts, of each lag alone."""
     for lag_s in ANY_LAG_S:
-        yield lag_s, Search(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)
+        yield lag_s, Search.of_lag(search.motion, search.wheels, lag_s, lates_s)
 
 
 def _is_shifted(search: Search, late_s: float) -> bool:

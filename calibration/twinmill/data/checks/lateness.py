@@ -7,13 +7,15 @@ change leave as little, or the shift goes by stretch as it likes, as where a lag
 command. Shares of the speed are free in each stretch, so that a battery that sags is no lateness.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from twinmill.data.checks.alternatives import Search
+from twinmill.data.checks.motion import SHAPES, Motion
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.clock import place_of_least
 
@@ -129,10 +131,9 @@ def lateness_of(whole: Search) -> Lateness | None:
     Args:
         whole: of its motion, the columns as they are right.
     """
-    motion = replace(whole.motion, block_s=STRETCH_S)
+    motion = whole.motion.in_stretches(STRETCH_S)
     for lags_s in (FEW_LAGS_S, LAGS_S):
-        felt = {lag_s: motion.felt(lag_s) for lag_s in lags_s}
-        left = _normal(*_left_by_stretch(Search(motion, whole.wheels, felt, SHIFTS_S)))
+        left = _normal(*_left_by_stretch(motion, whole.wheels, lags_s))
         by_shift = left[left.min(axis=1).sum(axis=1).argmin()]
         found = _best(by_shift)
         if found is None:
@@ -145,7 +146,7 @@ def lateness_of(whole: Search) -> Lateness | None:
     least = float(left.min(axis=(0, 1)).sum())  # by any shift and lag of each stretch
     if path.left - least > CHECKS.step_leaves * (min(of_lags[0].left, rival.left) - least):
         return None
-    return _in_time(path, shape, motion.t_s)
+    return _in_time(path, shape, motion)
 
 
 def _best(left: np.ndarray) -> tuple[_Path, Shape] | None:
@@ -165,21 +166,24 @@ def _best(left: np.ndarray) -> tuple[_Path, Shape] | None:
     return drift, "drift" if gained > CHECKS.shape_sure else "changes"
 
 
-def _left_by_stretch(search: Search) -> tuple[np.ndarray, np.ndarray]:
-    """(L, S, B) squares that lags and shifts leave, by the best bend; (B,) those of the motion."""
-    best, least = None, np.inf
-    sums = [search.by_shift(lag_s) for lag_s in search.felt]
-    total = sums[0][2]
-    power, along = (np.array([own[k] for own in sums]) for k in (0, 1))
-    for bend in range(power.shape[3]):
-        p, m = power[:, :, :, bend], along[:, :, :, bend]
-        gain = np.maximum(m.sum(2), 0) / np.maximum(p.sum(2), 1e-12)
-        usual = SHRUNK * p.mean(2, keepdims=True)
-        own = np.maximum(m + usual * gain[:, :, None], 0) / np.maximum(p + usual, 1e-12)
-        left = total + (own**2 * p - 2 * own * m).sum(axis=-1)
-        if (sum_ := left.min(axis=1).sum(axis=1).min()) < least:
-            best, least = left, sum_
-    return best, total
+def _left_by_stretch(
+    motion: Motion, wheels: np.ndarray, lags_s: Sequence[float]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(L, S, B) squares that lags and shifts leave, by the best bend; (B,) those of the motion.
+
+    Lag by lag, as what is summed for one is large.
+    """
+    by_bend: list[list[np.ndarray]] = [[] for _ in range(SHAPES)]
+    for lag_s in lags_s:
+        power, along, total = Search.of_lag(motion, wheels, lag_s, SHIFTS_S).by_shift(lag_s)
+        for bend, of_lags in enumerate(by_bend):
+            p, m = power[:, :, bend], along[:, :, bend]
+            gain = np.maximum(m.sum(1), 0) / np.maximum(p.sum(1), 1e-12)
+            usual = SHRUNK * p.mean(1, keepdims=True)
+            own = np.maximum(m + usual * gain[:, None], 0) / np.maximum(p + usual, 1e-12)
+            of_lags.append(total + (own**2 * p - 2 * own * m).sum(axis=-1))
+    least = [min(left.min(axis=0).sum() for left in of_lags) for of_lags in by_bend]
+    return np.array(by_bend[int(np.argmin(least))]), total
 
 
 def _normal(left: np.ndarray, total: np.ndarray) -> np.ndarray:
@@ -197,15 +201,18 @@ def _stepwise(left: np.ndarray, places: np.ndarray) -> list[_Path]:
     """The best paths of 1, 2, ... pieces, by (S, B) left; by dynamic programming."""
     count = left.shape[1]
     sums = np.concatenate([np.zeros((len(left), 1)), np.cumsum(left, axis=1)], axis=1)
-    piece = np.full((count + 1, count + 1), np.inf)
-    for i in range(count):
-        piece[i, i + 1 :] = (sums[:, i + 1 :] - sums[:, [i]]).min(axis=0)
-        piece[i, i + 1 : i + FEWEST] = np.inf
-    costs, came, found = [piece[0]], [], []
-    for _ in range(MOST_STEPS):
-        step = costs[-1][:, None] + piece
-        came.append(step.argmin(axis=0))
-        costs.append(step.min(axis=0))
+    costs = np.full((MOST_STEPS + 1, count + 1), np.inf)  # of paths up to a stretch, by steps
+    came = np.zeros((MOST_STEPS, count + 1), int)  # where their last pieces begin
+    for i in range(count):  # at which all is known of what ends there
+        piece = (sums[:, i + 1 :] - sums[:, [i]]).min(axis=0)
+        piece[: FEWEST - 1] = np.inf
+        if not i:
+            costs[0, 1:] = piece
+        step = costs[:-1, i, None] + piece
+        better = step < costs[1:, i + 1 :]
+        costs[1:, i + 1 :][better] = step[better]
+        came[:, i + 1 :][better] = i
+    found = []
     for pieces in range(1, len(costs) + 1):
         edges = [count]
         for back in came[pieces - 2 :: -1] if pieces > 1 else []:
@@ -303,15 +310,15 @@ def _of_steps(path: _Path) -> Shape:
     return "while" if back else "steps"
 
 
-def _in_time(path: _Path, shape: Shape, t_s: np.ndarray) -> Lateness:
-    """A path in the time of its log, from times (N,) of poses."""
-    begin_s, end_s = (float(t) for t in t_s[[0, -1]])
+def _in_time(path: _Path, shape: Shape, motion: Motion) -> Lateness:
+    """A path in the time of its log."""
+    begin_s, end_s = (float(t) for t in motion.t_s[[0, -1]])
     first_s = path.at_s[0]
     if path.straight:
         return Lateness(shape, (begin_s, end_s), (0.0, path.at_s[1] - first_s), first_s)
     at, late_s = [begin_s], [0.0]
     for edge, (before_s, after_s) in zip(path.edges[1:-1], pairwise(path.at_s), strict=True):
-        step_s = begin_s + STRETCH_S * edge
+        step_s = begin_s + motion.block_s * edge
         at += [step_s, step_s + JUST_AFTER_S]
         late_s += [before_s - first_s, after_s - first_s]
     return Lateness(shape, (*at, end_s), (*late_s, late_s[-1]), first_s)

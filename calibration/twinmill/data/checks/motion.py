@@ -66,7 +66,7 @@ class Motion:
         first = min(track.command_t_s[0], track.pose_t_s[0]) - LATE_S - 1
         last = max(track.command_t_s[-1], track.pose_t_s[-1]) + 1
         grid_s = np.arange(first, last, GRID_S)
-        return cls(
+        motion = cls(
             t_s=track.pose_t_s[known],
             world_mps=slope[known, 0] + 1j * slope[known, 1],
             turn_radps=slope[known, 2],
@@ -76,6 +76,12 @@ class Motion:
             shapes=_shapes(track, grid_s),
             half_s=half_s,
         )
+        return motion.in_stretches(BLOCK_S)
+
+    def in_stretches(self, block_s: float) -> "Motion":
+        """The same in stretches of a length; of a longer one where that makes more than MOST."""
+        span_s = float(np.ptp(self.t_s)) if len(self.t_s) else 0.0
+        return replace(self, block_s=max(block_s, span_s / MOST))
 
     @cached_property
     def block(self) -> np.ndarray:
@@ -135,8 +141,13 @@ class Motion:
     def felt(self, lag_s: float) -> Felt:
         """Commands through a first-order lag, averaged over the window."""
         keep = np.exp(-GRID_S / lag_s)
-        lagged = filtered([1 - keep], [1, -keep], self.shapes, axis=0)
-        return float(self.grid_s[0]), _averaged(lagged, self._window)
+        found = np.zeros_like(self.shapes)
+        for at in np.ndindex(found.shape[1:]):  # one at a time, as a log may be long
+            told = self.shapes[:, *at]
+            if told.any():
+                lagged = filtered([1 - keep], [1, -keep], told)
+                found[:, *at] = _averaged(lagged, self._window)
+        return float(self.grid_s[0]), found
 
     def at(self, felt: Felt, late_s: float) -> np.ndarray:
         """(K, ...) of what was felt `late_s` before each pose."""
@@ -152,28 +163,30 @@ class Motion:
 
 
 def _averaged(signal: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """(G, ...) weighted means around each time; ends go on as they are.
+    """(G,) weighted means around each time; ends go on as they are.
 
     `scipy.ndimage` does the same, and takes a tenth of a second to import.
     """
     before = (len(weight) - 1) // 2
-    around = np.pad(signal, ((before, len(weight) - 1 - before), (0, 0), (0, 0)), "edge")
+    around = np.pad(signal, (before, len(weight) - 1 - before), "edge")
     return sum(w * around[k : k + len(signal)] for k, w in enumerate(weight))
 
 
 def _shapes(track: Track, grid_s: np.ndarray) -> np.ndarray:
     """(G, SHAPES, 4) the command in force in each grid step, averaged over the step."""
-    shapes = _powers(track.command)
     knots_s = np.append(track.command_t_s, max(grid_s[-1], track.command_t_s[-1]) + 1)
-    area = np.concatenate(
-        [np.zeros((1, SHAPES, 4)), np.cumsum(shapes * np.diff(knots_s)[:, None, None], axis=0)]
-    )
     place = np.clip(np.searchsorted(knots_s, grid_s, side="right") - 1, 0, len(knots_s) - 2)
     within = np.clip(grid_s - knots_s[place], 0, None)
     before = grid_s < knots_s[0]
-    at_grid = area[place] + shapes[place] * within[:, None, None]
-    at_grid[before] = 0
-    return np.diff(at_grid, axis=0, prepend=0.0) / GRID_S
+    found = np.zeros((len(grid_s), SHAPES, 4))
+    told = _powers(track.command)
+    for at in np.ndindex(SHAPES, 4):  # one at a time, as a log may be long
+        held = told[:, *at]
+        area = np.concatenate([[0.0], np.cumsum(held * np.diff(knots_s))])
+        at_grid = area[place] + held[place] * within
+        at_grid[before] = 0
+        found[:, *at] = np.diff(at_grid, prepend=0.0) / GRID_S
+    return found
 
 
 def _powers(command: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 """Makes a log from motion capture exports and command tables of others."""
 
 import hashlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -115,6 +115,17 @@ def import_log(
     _check_wheelbase(options, commands)
     inputs = [*given.files, bag, options.mapping]
     check_new_file(out, options.force, inputs)
+    parts, rows, warnings = _log_of(given, options)
+    with replacing(out, options.force, inputs=inputs) as temporary:
+        with temporary.open("wb") as file:
+            file.writelines(parts)  # which holds all that was read until its end
+        return _summary(read_log(temporary), out, warnings, rows)
+
+
+def _log_of(
+    given: Sources, options: ImportOptions
+) -> tuple[Iterator[bytes], dict[int, int], list[str]]:
+    """Content of the log, rows of commands by robot, and what is to be said of the sources."""
     pose_series, command_series = _read(given, options)
     _check_names(options, given, [*pose_series, *command_series])
     pose_series = _exchanged(pose_series, options.exchange)
@@ -135,17 +146,14 @@ def import_log(
         in_body_frame(series, by_robot.get(series.robot_id)) if series.world else series
         for series in command_series
     ]
-    seen = _detections(detections, options, by_robot, left_out) if detections else []
-    with replacing(out, options.force, inputs=inputs) as temporary:
-        provenance = _provenance(given.files, options)
-        parts = log_parts(pose_series, command_series, config_toml=provenance, detections=seen)
-        with temporary.open("wb") as file:
-            file.writelines(parts)
-        warnings = [f"Left out: {why}" for why in left_out.values()]
-        warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
-        if not command_series:
-            warnings.append(POSES_ALONE)
-        return _summary(read_log(temporary), out, warnings, rows)
+    seen = _detections(given.detections, options, by_robot, left_out) if given.detections else []
+    provenance = _provenance(given.files, options)
+    parts = log_parts(pose_series, command_series, config_toml=provenance, detections=seen)
+    warnings = [f"Left out: {why}" for why in left_out.values()]
+    warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
+    if not command_series:
+        warnings.append(POSES_ALONE)
+    return parts, rows, warnings
 
 
 def _read(given: Sources, options: ImportOptions) -> tuple[list[PoseSeries], list[CommandSeries]]:
@@ -518,7 +526,8 @@ def _check_unit_of_time(robot_id: int, poses_s: float, commands_s: float, given:
         if alike and getattr(given, long):
             raise LogError(
                 f"robot {robot_id}: the {long} last {long_s:.0f} s, the {short} {short_s:.1f} s; "
-                f"the times of the {long} are in {unit}, so name that column t_{unit}."
+                f"the times of the {long} are in {unit}, so name that column t_{unit}; unless "
+                f"those of the {short} are called so and are in s: then name theirs t_s."
             )
 
 
@@ -553,10 +562,11 @@ def _check_rate(poses: PoseSeries, in_tables: bool) -> None:
 
 def _provenance(sources: list[Path], options: ImportOptions) -> str:
     """TOML for run_t: files with their hashes, and what was changed on the way."""
-    files = [
-        {"name": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
-        for path in sources
-    ]
+    files = []
+    for path in sources:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        files.append({"name": path.name, "sha256": digest})
     return tomlkit.dumps(
         {
             "import": {

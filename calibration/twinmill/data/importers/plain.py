@@ -26,6 +26,7 @@ from twinmill.data.importers.series import (
 from twinmill.data.importers.stamps import sound_rows
 from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import LOST, CellError, Table, is_number
+from twinmill.data.units import unit_of_stamps
 from twinmill.model.mixing import duties_from_inputs
 
 HEADING_LIKE = re.compile(r"theta|yaw|heading|psi|orient|angle|rot|^q_?[wxyz0-3]$", re.IGNORECASE)
@@ -33,8 +34,6 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
 STEERED = ("vx_mps", "steering_rad")
-LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
-SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller
 WRAP_DEG = 20  # more than a robot turns from row to row
 VALUES: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
@@ -462,8 +461,7 @@ def _stamped(table: Table, columns: Columns) -> tuple[Table, np.ndarray, np.ndar
 
 def _utime_us(table: Table, t_s: np.ndarray) -> np.ndarray:
     largest = np.abs(t_s).max()
-    if largest > LATEST_S:
-        unit = next((u for u, top in SINCE_1970.items() if largest < top), "ns")
+    if (unit := unit_of_stamps(largest)) != "s":
         raise LogError(
             f"{table.name}: t_s goes to {largest:.4g}, which are no seconds; if it counts {unit} "
             f"since 1970, name the column t_{unit} there, or with --rename t_s=t_{unit} if no "
