@@ -144,8 +144,8 @@ class Rig:
         command = (
             # Even if this process is killed, QEMU does not outlive it.
             "setpriv --pdeathsig KILL qemu-system-aarch64"
-            # 2^2 ns for each instruction, 250 million a second (a Pi 4: 1500 million cycles): what it
-            # works takes the same time in the guest, however slowly it is emulated.
+            # 2^2 ns for each instruction, 250 million a second (a Pi 4: 1500 million cycles): what
+            # it works takes the same time in the guest, however slowly it is emulated.
             " -accel tcg,thread=single -icount shift=2,sleep=on -M virt -cpu cortex-a53 -nodefaults"
             f" -m {memory_mb}M -display none -monitor none -no-reboot -device virtio-serial-pci"
             " -device virtserialport,chardev=port,name=hil.0"
