@@ -87,6 +87,11 @@ FAULTS = {
         ("R01 drives: another operator said select milling at", "All stand."),
         0,
     ),
+    "other_operator_of_another_key": Fault(
+        "an operator with another key starts robots that are held; then Ctrl-C of the first",
+        ("R01, R02: nothing was started: signs nothing with this operator's key",),
+        1,
+    ),
     "stopped_in_the_countdown": Fault(
         "`swarm stop` from elsewhere in the countdown of `swarm start --in-s 4`",
         ("Called off: R01, R02 were stopped by another command.", "All stand."),
@@ -249,6 +254,13 @@ def test_a_count_that_another_stopped_ends_with_it(session):
 @pytest.mark.skipif(not ALL, reason="part of make check-long")
 def test_who_is_taken_over_holds_the_others_alone(session):
     assert session["taken_over_by_one_who_is_killed"]["drove"]
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_another_key_stops_nobody(session):
+    row = session["other_operator_of_another_key"]
+    code, said = row["first"]
+    assert row["drove"] and code == 0 and "All stand." in said
 
 
 @pytest.mark.skipif(not ALL, reason="part of make check-long")

@@ -447,6 +447,20 @@ class Field:
         operator.process.send_signal(signal.SIGINT)
         return self.row(fault_s, operator.end())
 
+    def other_operator_of_another_key(self) -> dict:
+        """His start stops nobody: the robots drive on until Ctrl-C of their own operator."""
+        first = self.held(terminal=False)
+        (self.folder / "other").mkdir()
+        key, _ = operator_key(self.folder / "other")
+        other = Operator(key, *START, terminal=False)
+        code = other.end()
+        drove = all(robot.duties() != ZERO for robot in self.robots.values())
+        fault_s = time.monotonic()
+        first.process.send_signal(signal.SIGINT)
+        first_code = first.end()
+        self.operator = other
+        return self.row(fault_s, code) | {"drove": drove, "first": [first_code, first.plain]}
+
     def stopped_in_the_countdown(self) -> dict:
         """By another, once both have accepted; nothing starts at the instant."""
         begin_s, fleet, ahead_s = time.monotonic(), Fleet(URL, key=self.key), 4.0

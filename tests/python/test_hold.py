@@ -169,8 +169,8 @@ def test_what_takes_nothing_over_leaves_the_robot_held(held, verb):
     robots, robot, words = held
     hear(robot, verb, "select milling at 12:00:01")
     said = words(TABLE, stands=False, counter=OWN + 1)
-    assert ("said select milling at 12:00:01" in said) == (verb == VERBS.VERB_SELECT)
-    assert robots._fleet.held == {3}
+    assert "drives: another operator said select milling at 12:00:01" in said
+    assert robots._fleet.held == {3} and robots.states["R03"].is_meant
 
 
 def test_a_command_that_a_robot_has_not_obeyed_takes_nothing_over(held):

@@ -73,6 +73,17 @@ def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
     assert fleet.bus.said == []
 
 
+def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, tmp_path, twinmill):
+    """A start that none can obey would end in a stop, which all do."""
+    strange = robot(1, DRIVING)
+    strange.link = None
+    fleet = fleet_of(strange)
+    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", tmp_path / "key")
+    assert code == 1 and "R01: nothing was started: signs nothing with this operator's key" in err
+    assert fleet.bus.said == []
+
+
 def test_who_drives_already_is_said_with_who_holds_it():
     held, alone, free = robot(1, DRIVING), robot(2, DRIVING), robot(3, DRIVING, 0)
     fleet = fleet_of(held, alone, free)

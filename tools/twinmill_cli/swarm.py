@@ -124,7 +124,7 @@ def _start(
     fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
     asked = tell.find(fleet, parse_robots(robots))
     if not partial:
-        refuse_missing(fleet, asked)
+        refuse_unheard(fleet, asked)
     refuse_doubles(fleet, asked)
     warn_of_clocks(fleet, asked)
     driving = tell.find_driving(fleet, asked)
@@ -345,7 +345,7 @@ def _tell_fault(fault: str) -> None:
 
 def _waiting_words(left: set[int], unheard: list[str], timeout_s: float) -> str:
     """What a stop waits for."""
-    names = ", ".join(f"R{i:02d}" for i in sorted(left))
+    names = _names(left)
     where = f" from {', '.join(unheard)}" if unheard else ""
     whom = f"{names} to sign that they stand" if names else f"a robot to be heard{where}"
     return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
@@ -371,14 +371,24 @@ def _select(
     return _finish("select", given, of_select(given, behavior), {}, as_json=as_json)
 
 
-def refuse_missing(fleet: Fleet, robots: set[int]) -> None:
-    """Raises ValueError if some are not there; while nobody was told anything, none must stop."""
-    missing = ", ".join(f"R{i:02d}" for i in sorted(robots - fleet.here()))
+def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
+    """Raises ValueError if some are not there, or cannot be told anything with this key.
+
+    While nobody was told anything, nobody has to be stopped: another operator may hold them.
+    """
+    missing = _names(robots - fleet.here())
     if missing:
         raise ValueError(
             f"{missing}: not heard in {tell.FIND_S:g} s, so nothing was started; `twinmill swarm "
             "status` shows who is there, --partial starts the others."
         )
+    strange = _names({i for i in robots if not fleet.robots[i].link})
+    if strange:
+        raise ValueError(f"{strange}: nothing was started: {tell.NO_SIGNATURE}")
+
+
+def _names(robots: set[int]) -> str:
+    return ", ".join(f"R{i:02d}" for i in sorted(robots))
 
 
 def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:

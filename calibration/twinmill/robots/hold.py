@@ -131,9 +131,8 @@ class Held:
     def _drives(self, robot: Robot) -> State:
         """As was told from here, or as another operator told it."""
         link, others = robot.link, self._others(robot)
-        selected = next((c for c in others if c.verb == VERBS.VERB_SELECT), None)
-        if selected:
-            return State(f"drives: another operator said {selected.words}", is_meant=True)
+        if others:
+            return State(f"drives: another operator said {others[0].words}", is_meant=True)
         known = max([self._fleet.counter, *(c.counter for c in robot.commands.values())])
         is_own = link.session == self._sessions[robot.robot_id]
         return DRIVES_AS_UNHEARD if is_own and link.counter > known else DRIVES
