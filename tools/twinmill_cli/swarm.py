@@ -382,6 +382,8 @@ def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
             f"{missing}: not heard in {tell.FIND_S:g} s, so nothing was started; `twinmill swarm "
             "status` shows who is there, --partial starts the others."
         )
+    # Half of all packets lost, one of a thousand has not been heard to sign in the first second.
+    fleet.listen(tell.FIND_S, lambda: tell.all_linked(fleet, robots))
     strange = _names({i for i in robots if not fleet.robots[i].link})
     if strange:
         raise ValueError(f"{strange}: nothing was started: {tell.NO_SIGNATURE}")

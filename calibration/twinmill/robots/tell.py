@@ -98,7 +98,7 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
         ValueError: none is there.
     """
     if robots:
-        fleet.listen(FIND_S, lambda: robots <= fleet.here() and _all_linked(fleet, robots))
+        fleet.listen(FIND_S, lambda: robots <= fleet.here() and all_linked(fleet, robots))
         return robots
     fleet.listen(FIND_S)
     if not fleet.here():
@@ -120,7 +120,8 @@ def find_driving(fleet: Fleet, robots: set[int]) -> list[Robot]:
     return driving
 
 
-def _all_linked(fleet: Fleet, robots: set[int]) -> bool:
+def all_linked(fleet: Fleet, robots: set[int]) -> bool:
+    """All of some robots were heard, and have signed how they may be commanded."""
     return all(i in fleet.robots and fleet.robots[i].link for i in robots)
 
 
