@@ -397,7 +397,7 @@ class Field:
         for pid in hung:
             os.kill(pid, signal.SIGSTOP)
         code = operator.end(40)
-        for pid in hung:
+        for pid in reversed(hung):  # the supervisor last: it kills who was silent for so long
             os.kill(pid, signal.SIGCONT)
         fleet.listen(1.5)
         row = self._unmoved(begin_s, code, [2])
