@@ -68,23 +68,24 @@ FAULTS = {
     ),
     "taken_over": Fault(
         "another operator starts R01 while it is held; then Ctrl-C of the first",
-        ("R01 was taken over by another operator (start at", "All stand; R01 was taken over"),
+        ("R01 was taken over by another operator", "start at", "All stand; R01 was taken over"),
         1,
         is_brief=True,
     ),
     "taken_over_by_one_who_is_killed": Fault(
         "another operator starts R01 and is killed (R01); then Ctrl-C of the first",
         (
-            "R01 was taken over by another operator (start at",
+            "R01 was taken over by another operator",
+            "start at",
             "then it had lost its link to that operator.",
-            "All stand; R01 stood before: taken over by another operator (start at",
+            "All stand; R01 stood before: taken over by another operator",
         ),
         1,
         LINK_LOST_S,
     ),
     "selected_by_another": Fault(
         "another operator selects a behaviour for R01; then Ctrl-C",
-        ("R01 drives: another operator said select milling at", "All stand."),
+        ("R01 drives: another operator said select milling", "All stand."),
         0,
     ),
     "other_operator_of_another_key": Fault(
