@@ -66,6 +66,52 @@ FAULTS = {
     "stopped_by_another": Fault(
         "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 0
     ),
+    "taken_over": Fault(
+        "another operator starts R01 while it is held; then Ctrl-C of the first",
+        ("R01 was taken over by another operator", "start at", "All stand; R01 was taken over"),
+        1,
+        is_brief=True,
+    ),
+    "taken_over_by_one_who_is_killed": Fault(
+        "another operator starts R01 and is killed (R01); then Ctrl-C of the first",
+        (
+            "R01 was taken over by another operator",
+            "start at",
+            "then it had lost its link to that operator.",
+            "All stand; R01 stood before: taken over by another operator",
+        ),
+        1,
+        LINK_LOST_S,
+    ),
+    "selected_by_another": Fault(
+        "another operator selects a behaviour for R01; then Ctrl-C",
+        ("R01 drives: another operator said select milling", "All stand."),
+        0,
+    ),
+    "other_operator_of_another_key": Fault(
+        "an operator with another key starts robots that are held; then Ctrl-C of the first",
+        ("R01, R02: nothing was started: signs nothing with this operator's key",),
+        1,
+    ),
+    "stopped_in_the_countdown": Fault(
+        "`swarm stop` from elsewhere in the countdown of `swarm start --in-s 4`",
+        ("Called off: R01, R02 were stopped by another command.", "All stand."),
+        1,
+        NEVER,
+        is_brief=True,
+    ),
+    "one_is_missing": Fault(
+        "`swarm start --robots 1,9` where there is no R09",
+        ("R09: not heard in 1 s, so nothing was started",),
+        1,
+        NEVER,
+    ),
+    "killed_with_a_long_link": Fault(
+        "tool killed under --link-timeout-s 600; then `swarm status`, `swarm stop` (from its first "
+        "packet)",
+        ("no operator heard (600 s)", "no operator heard (600 s)", "All stand."),
+        0,
+    ),
     "driver_dies": Fault(
         "one robot's driver dies; then Ctrl-C",
         ("R01 stands: its program was started anew.", "All stand; R01 stood before: its program"),
@@ -191,6 +237,43 @@ def test_a_halted_terminal_keeps_no_robot_without_its_operator(session):
 
 def test_one_robot_that_drops_out_does_not_end_the_others(session):
     assert session["driver_dies"]["drove"]
+
+
+def test_who_takes_over_is_told_that_somebody_drove(session):
+    """By whom the robot was held is said before it is started; then that the first stopped it."""
+    code, said = session["taken_over"]["second"]
+    assert said.index("R01 drives already, held by another operator") < said.index("Started at")
+    assert code == 0 and "All stand: R01: stopped by another command." in said
+
+
+def test_a_count_that_another_stopped_ends_with_it(session):
+    """The stop itself is over after that; the instant was later."""
+    row = session["stopped_in_the_countdown"]
+    assert row["ended_s"] < row["ahead_s"] - 1 and not row["ok"]
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_who_is_taken_over_holds_the_others_alone(session):
+    assert session["taken_over_by_one_who_is_killed"]["drove"]
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_another_key_stops_nobody(session):
+    row = session["other_operator_of_another_key"]
+    code, said = row["first"]
+    assert row["drove"] and code == 0 and "All stand." in said
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_who_looks_is_told_that_nobody_holds_the_robots(session):
+    """Looking is no failure, whatever is seen."""
+    assert session["killed_with_a_long_link"]["status_code"] == 0
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_nobody_is_told_anything_where_one_is_missing(session):
+    """So there is nothing that would have to be taken back."""
+    assert session["one_is_missing"]["commands"] == 0
 
 
 def test_names_of_strangers_are_shown_as_they_are(session):

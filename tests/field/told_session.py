@@ -29,7 +29,7 @@ from robot_process import ZERO, Robot, wait_until
 
 from twinmill.data.bus import UdpBus
 from twinmill.robots import tell
-from twinmill.robots.fleet import URL, Fleet
+from twinmill.robots.fleet import GONE_S, URL, Fleet
 
 IDS = (1, 2)
 COMMAND = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
@@ -397,31 +397,141 @@ class Field:
         for pid in hung:
             os.kill(pid, signal.SIGSTOP)
         code = operator.end(40)
-        for pid in hung:
+        for pid in reversed(hung):  # the supervisor last: it kills who was silent for so long
             os.kill(pid, signal.SIGCONT)
         fleet.listen(1.5)
         row = self._unmoved(begin_s, code, [2])
         tell.stop(fleet, set())
         return row
 
+    def taken_over(self) -> dict:
+        """By another operator, who starts R01 while the first holds both; the first then ends."""
+        first = self.held(terminal=False)
+        second = self._takes_r01(first)
+        fault_s = time.monotonic()
+        first.process.send_signal(signal.SIGINT)
+        code = first.end()
+        row = self.row(fault_s, code)
+        return row | {"second": [second.end(), second.plain]}
+
+    def taken_over_by_one_who_is_killed(self) -> dict:
+        """Then the first does not hold R01: it has lost its operator. R02 drives on."""
+        first = self.held(terminal=False)
+        second = self._takes_r01(first)
+        fault_s = time.monotonic()
+        second.process.kill()
+        second.end()
+        wait_until(lambda: "lost its link" in first.plain, 10)
+        after_s = self.stood_after(fault_s, [1])
+        drove = self.robots[2].duties() != ZERO
+        first.process.send_signal(signal.SIGINT)
+        return self.row(fault_s, first.end()) | {"after_s": after_s, "drove": drove}
+
+    def _takes_r01(self, first: Operator) -> Operator:
+        words = ("start", "--arm", "--robots", "1")
+        for _ in range(TRIES):
+            second = Operator(self.key_file, *words, terminal=False)
+            wait_until(lambda s=second: s.has_ended or "Ctrl-C stops them" in s.plain, 20)
+            if not second.has_ended:
+                break
+        assert wait_until(lambda: "taken over" in first.plain, 10), second.plain + first.plain
+        return second
+
+    def selected_by_another(self) -> dict:
+        """From a second terminal: the first says so, and all goes on."""
+        operator = self.held(terminal=False)
+        select = Operator(self.key_file, "select", "milling", "--robots", "1", terminal=False)
+        assert select.end() == 0, select.plain
+        wait_until(lambda: "another operator" in operator.plain, 10)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        return self.row(fault_s, operator.end())
+
+    def other_operator_of_another_key(self) -> dict:
+        """His start stops nobody: the robots drive on until Ctrl-C of their own operator."""
+        first = self.held(terminal=False)
+        (self.folder / "other").mkdir()
+        key, _ = operator_key(self.folder / "other")
+        other = Operator(key, *START, terminal=False)
+        code = other.end()
+        drove = all(robot.duties() != ZERO for robot in self.robots.values())
+        fault_s = time.monotonic()
+        first.process.send_signal(signal.SIGINT)
+        first_code = first.end()
+        self.operator = other
+        return self.row(fault_s, code) | {"drove": drove, "first": [first_code, first.plain]}
+
+    def stopped_in_the_countdown(self) -> dict:
+        """By another, once both have accepted; nothing starts at the instant."""
+        begin_s, fleet, ahead_s = time.monotonic(), Fleet(URL, key=self.key), 4.0
+        self.operator = operator = Operator(
+            self.key_file, *START, "--json", "--in-s", str(ahead_s), terminal=False
+        )
+        # The answers to arm and to start.
+        fleet.listen(
+            20, lambda: all(i in fleet.robots and len(fleet.robots[i].signed_acks) > 1 for i in IDS)
+        )
+        said_s = time.monotonic()
+        tell.stop(fleet, set())
+        code = operator.end()
+        ended_s = time.monotonic() - said_s
+        data = json.loads(operator.plain[operator.plain.index("{") :].splitlines()[0])
+        fleet.listen(data["start_utime_us"] / 1e6 + 0.5 - time.time())
+        row = self._unmoved(begin_s, code)
+        said = [data["sentence"]]
+        return row | {"said": said, "ended_s": ended_s, "ahead_s": ahead_s, "ok": data["ok"]}
+
+    def one_is_missing(self) -> dict:
+        """Nobody is told anything: neither to start nor, then, to stop."""
+        begin_s = time.monotonic()
+        with self.hearing_commands() as commands:
+            self.operator = operator = Operator(
+                self.key_file, "start", "--robots", "1,9", terminal=False
+            )
+            code = operator.end()
+        return self._unmoved(begin_s, code) | {"commands": len(commands)}
+
+    def killed_with_a_long_link(self) -> dict:
+        """The robots drive on, and whoever looks is told that nobody holds them."""
+        operator = self.start("--link-timeout-s", "600", terminal=False)
+        operator.process.kill()
+        operator.end()
+        time.sleep(GONE_S)
+        status = Operator(self.key_file, "status", "--once", terminal=False)
+        status_code = status.end()
+        with self.hearing_stops() as stops_s:
+            self.operator = Operator(self.key_file, "stop", terminal=False)
+            code = self.operator.end()
+        row = self.row(stops_s[0], code) | {"status_code": status_code}
+        return row | {"said": [*status.plain.splitlines(), *row["said"]]}
+
     @contextmanager
     def hearing_stops(self):
         """When stops are said; how long a tool takes to begin is the machine's business."""
-        over, stops_s, bus = threading.Event(), [], UdpBus(URL)
+        stop = turbopi.swarm_command_t.VERB_STOP
+        with self.hearing_commands() as commands:
+            yield commands
+        commands[:] = [t_s for t_s, verb in commands if verb == stop]
 
-        def on_command(_: str, data: bytes) -> None:
-            if turbopi.swarm_command_t.decode(data).verb == turbopi.swarm_command_t.VERB_STOP:
-                stops_s.append(time.monotonic())
+    @contextmanager
+    def hearing_commands(self):
+        """When commands are said, and their verbs."""
+        over, commands, bus = threading.Event(), [], UdpBus(URL)
+
+        def on_command(channel: str, data: bytes) -> None:
+            if channel == "SWARM_SIGNED":
+                data = turbopi.signed_command_t.decode(data).command
+            commands.append((time.monotonic(), turbopi.swarm_command_t.decode(data).verb))
 
         def hear():
-            bus.subscribe("SWARM_COMMAND", on_command)
+            bus.subscribe("SWARM_(COMMAND|SIGNED)", on_command)
             while not over.is_set():
                 bus.handle_timeout(50)
 
         thread = threading.Thread(target=hear)
         thread.start()
         try:
-            yield stops_s
+            yield commands
         finally:
             over.set()
             thread.join()

@@ -10,6 +10,7 @@ wheels.
 import itertools
 import os
 import signal
+import statistics
 import time
 
 import pytest
@@ -169,6 +170,24 @@ def test_processes(drive, table, roles, number):
         table[f"guard {what}"] = "drives on: another guard is started"
         return
     note(table, f"{' and '.join(roles)} {what}", stands_after(robot, fault_s))
+
+
+def work_us(robot):
+    """The middle of what a step of a driving robot takes, by its own clock."""
+    end = len(robot.telemetry()) + 30
+    robot.show_until(lambda: len(robot.telemetry()) >= end)
+    return statistics.median(t.loop_us for t in robot.telemetry()[-30:])
+
+
+@by_hand
+def test_what_the_robot_works_takes_no_longer_on_a_machine_that_is_busy(guest, drive):
+    """Times in this table are the robot's: as many instructions are as long, however emulated."""
+    robot = drive()
+    usual_us = work_us(robot)
+    with guest.slowed():
+        slowed_us = work_us(robot)
+    print(f"hil: a step works {usual_us:.0f} us, {slowed_us:.0f} us on a busy machine")
+    assert slowed_us < 2 * usual_us
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGTSTP])

@@ -7,11 +7,11 @@ import pytest
 import turbopi
 
 from twinmill.robots import hold
-from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
+from twinmill.robots.fleet import TELEMETRY, Fleet, Heard, Robot
 from twinmill.robots.hold import Held
-from twinmill.robots.tell import Answer, Start
+from twinmill.robots.tell import SIGNED_VERBS, VERBS, Answer, Start
 
-SESSION = 7
+SESSION, OWN = 7, 100  # and the counter of the start
 STOPPED, TABLE, SCRIPT, FAULT = 0, 1, 2, 3
 
 
@@ -30,13 +30,15 @@ def held(monkeypatch):
     robot = fleet.robots[3] = Robot(3)
     answer = Answer(3, True, True, "", "running", False, False, [])
 
-    def say(mode, said_mode=None, *, stands=True, session=SESSION, flags=0):
+    def say(mode, said_mode=None, *, stands=True, session=SESSION, flags=0, counter=OWN):
         link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
+        link.counter = counter
         link.mode, link.stands, link.session, link.status_flags = mode, stands, session, flags
         telemetry.mode = mode if said_mode is None else said_mode
         robot.link, robot.telemetry, robot.link_s = link, telemetry, time.monotonic()
 
     say(TABLE, stands=False)
+    fleet.counter, fleet.held = OWN, {3}
     robots = Held(fleet, Start(0, [answer], {3: SESSION}, []))
 
     def words(*arguments, **options) -> str:
@@ -125,3 +127,58 @@ def test_a_camera_that_stutters_is_no_flood_of_words(held, monkeypatch):
     monkeypatch.setattr(hold, "SETTLE_S", 0.3)
     flicker = [words(FAULT if k % 2 else TABLE, stands=False) for k in range(20)]
     assert flicker == [""] * 20
+
+
+def hear(robot, verb, words, *, counter=OWN + 1, session=SESSION):
+    robot.commands[counter] = Heard(9, verb, session, counter, words)
+
+
+def test_a_start_of_another_operator_takes_a_robot_over(held):
+    robots, robot, words = held
+    hear(robot, VERBS.VERB_START, "start milling at 12:00:01")
+    said = words(TABLE, stands=False, counter=OWN + 1)
+    assert "taken over by another operator (start milling at 12:00:01)" in said
+    assert robots._fleet.held == set() and not robots.is_over
+    (state,) = robots.states.values()
+    assert not state.is_meant
+
+
+@pytest.mark.parametrize(
+    ("says", "reason"),
+    [
+        ({"flags": TELEMETRY.STATUS_LINK_LOST}, "then it had lost its link to that operator"),
+        ({"flags": TELEMETRY.STATUS_LATCHED}, "then stopped by another command"),
+    ],
+)
+def test_what_became_of_a_robot_that_was_taken_over_is_not_laid_to_the_first(held, says, reason):
+    robots, robot, words = held
+    hear(robot, VERBS.VERB_START, "start at 12:00:01")
+    words(TABLE, stands=False, counter=OWN + 1)
+    said = words(STOPPED, counter=OWN + 1, **says)
+    assert "taken over" in said and reason in said and robots.is_over
+
+
+def test_one_that_was_started_anew_by_another_operator_has_no_autostart(held):
+    _, robot, words = held
+    hear(robot, VERBS.VERB_START, "start at 12:00:01", session=SESSION + 1)
+    assert "taken over" in words(TABLE, stands=False, session=SESSION + 1, counter=OWN + 1)
+
+
+@pytest.mark.parametrize("verb", [VERBS.VERB_SELECT, SIGNED_VERBS.VERB_ARM])
+def test_what_takes_nothing_over_leaves_the_robot_held(held, verb):
+    robots, robot, words = held
+    hear(robot, verb, "select milling at 12:00:01")
+    said = words(TABLE, stands=False, counter=OWN + 1)
+    assert "drives: another operator said select milling at 12:00:01" in said
+    assert robots._fleet.held == {3} and robots.states["R03"].is_meant
+
+
+def test_a_command_that_a_robot_has_not_obeyed_takes_nothing_over(held):
+    _, robot, words = held
+    hear(robot, VERBS.VERB_START, "start at 12:00:01")
+    assert words(TABLE, stands=False) == ""
+
+
+def test_a_command_that_was_not_heard_shows_in_what_the_robot_has_obeyed(held):
+    _, _, words = held
+    assert "whose words were not heard" in words(TABLE, stands=False, counter=OWN + 1)

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from twinmill.robots.hold import BY_BUTTON, BY_COMMAND, DRIVES, LINK_LOST, RESTARTED, SILENT
+from twinmill.robots.fleet import Heard
+from twinmill.robots.hold import (
+    BY_BUTTON,
+    BY_COMMAND,
+    DRIVES,
+    LINK_LOST,
+    RESTARTED,
+    SILENT,
+    of_taken,
+)
 from twinmill.robots.tell import NEVER_HEARD, Answer, Start
 from twinmill_cli import swarm
 from twinmill_cli.swarm_verdict import Verdict, of_arm, of_end, of_select, of_start, of_stop
@@ -37,8 +46,12 @@ FAULTY = answer(6, mode="fault", alarms=["camera lost"])
 DOUBLE = answer(7, mode="stopped", stands=True, is_double=True)
 
 
-def begun(*answers: Answer, stopped=(), late=()) -> Start:
-    return Start(0, list(answers), {}, list(stopped), list(late))
+def begun(*answers: Answer, stopped=(), late=(), by_another=()) -> Start:
+    return Start(0, list(answers), {}, list(stopped), list(late), list(by_another))
+
+
+BY_START = Heard(9, 1, 7, 8, "start milling at 12:00:01")
+TAKEN, TAKEN_AND_LOST = of_taken(BY_START), of_taken(BY_START, LINK_LOST)
 
 
 # What is said begins so, and the command ends with that code.
@@ -71,6 +84,13 @@ SENTENCES = [
         "Called off: R05 did not acknowledge in time",
         1,
     ),
+    (
+        of_start(begun(GOOD, stopped=[STANDS], by_another=[1, 2]), untethered=False),
+        "Called off: R01, R02 were stopped by another command. All were told to stop: All stand.",
+        1,
+    ),
+    (of_end(WELL, {"R01": TAKEN, "R02": DRIVES}, WELL), "All stand; R01 was taken over by", 1),
+    (of_end(WELL, {"R01": TAKEN_AND_LOST}, None), "All stand: R01: taken over by another", 1),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),
     (of_end(ILL, {"R01": DRIVES}, WELL), "All stand; not all had started.", 1),

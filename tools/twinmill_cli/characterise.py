@@ -262,7 +262,7 @@ class Run:
         """
         self._listen()
         tell.find(self.fleet, {self.robot_id})
-        self._check_ready()
+        self._check_ready("" if end_s is not None else script)
         warn_of_clocks(self.fleet, {self.robot_id})
         refuse_doubles(self.fleet, {self.robot_id})
         if self.arm:
@@ -296,15 +296,24 @@ class Run:
 
         self.fleet.bus.subscribe(prefix + ".*", on_message)
 
-    def _check_ready(self) -> None:
+    def _check_ready(self, elsewhere: str) -> None:
+        """Raises ValueError if it is not there or not seen.
+
+        Args:
+            elsewhere: a script that is not here; empty: it is.
+        """
         if self.robot_id not in self.fleet.here():
             raise ValueError(
                 f"robot {self.robot_id} is not heard; `twinmill swarm status` shows who is."
             )
         self.fleet.listen(1.0, lambda: self.pose_s > 0)
         if self.pose_s < 0:
+            script = (
+                f"{elsewhere}: no such script here, so the robot has to have it (--host copies "
+            )
+            script = f"{script}one there); besides, " if elsewhere else ""
             raise ValueError(
-                f"no pose of robot {self.robot_id} is heard; does motion capture publish "
+                f"{script}no pose of robot {self.robot_id} is heard; does motion capture publish "
                 f"R{self.robot_id:02d}_POSE, and does it see the robot?"
             )
         # So that the log says whose it is.
@@ -321,7 +330,8 @@ class Run:
         )
         (answer,) = begun.answers
         if begun.called_off:
-            raise ValueError(f"robot {self.robot_id} does not play {script}: {answer.reason}.")
+            why = "it was stopped by another command" if begun.by_another else answer.reason
+            raise ValueError(f"robot {self.robot_id} does not play {script}: {why}.")
         return Held(self.fleet, begun)
 
     def _play(self, held: Held, end_s: float | None) -> None:

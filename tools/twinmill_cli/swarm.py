@@ -34,6 +34,7 @@ if working():  # not for --help
         DRIVING,
         Verdict,
         of_arm,
+        of_driving,
         of_end,
         of_select,
         of_start,
@@ -122,16 +123,22 @@ def _start(
         raise ValueError("--untethered and --link-timeout-s: give one of them.")
     fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
     asked = tell.find(fleet, parse_robots(robots))
+    if not partial:
+        refuse_unheard(fleet, asked)
     refuse_doubles(fleet, asked)
     warn_of_clocks(fleet, asked)
+    driving = tell.find_driving(fleet, asked)
+    if driving:
+        say(f"{of_driving(driving)}; this start takes over.")
     if arm:
         tell.arm(fleet, asked)
     timeout_ms = 0 if untethered else round(1e3 * link_timeout_s) if link_timeout_s else -1
     options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
+    data = {"drove_before": [robot.robot_id for robot in driving]}
     code, voice = 1, Voice()
     try:
         with ended_by_signals(fleet, voice.check):
-            verdict = _drive(fleet, asked, behavior, voice, as_json=as_json, **options)
+            verdict = _drive(fleet, asked, behavior, voice, data=data, as_json=as_json, **options)
         code = verdict.code
     finally:
         voice.end(code)
@@ -140,14 +147,31 @@ def _start(
 
 
 def _drive(
-    fleet: Fleet, asked: set[int], behavior: str, voice: Voice, *, as_json: bool, **options
+    fleet: Fleet,
+    asked: set[int],
+    behavior: str,
+    voice: Voice,
+    *,
+    data: dict,
+    as_json: bool,
+    **options,
 ) -> Verdict:
-    """Starts robots and holds them. Whatever ends that stops them before a word is said of it."""
+    """Starts robots and holds them. Whatever ends that stops them before a word is said of it.
+
+    Args:
+        fleet: where they are.
+        asked: the robots.
+        behavior: as of tell.start().
+        voice: what tells it.
+        data: printed besides.
+        as_json: how it is printed.
+        options: of tell.start().
+    """
     begun = held = None
     try:
         started = tell.start(fleet, asked, behavior, **options)
         begun, held = of_start(started, options["link_timeout_ms"] == 0), Held(fleet, started)
-        data = {"start_utime_us": started.utime_us, "called_off": started.called_off}
+        data |= {"start_utime_us": started.utime_us, "called_off": started.called_off}
         voice.tell(lambda: _finish("start", started.answers, begun, data, as_json=as_json))
         if started.called_off or not held.robots or options["link_timeout_ms"] == 0:
             while not voice.is_idle:
@@ -161,7 +185,7 @@ def _drive(
         ended = of_end(begun, held.states if held else {}, of_stop(given))
         ended = ended.beside(_driving(fleet, asked))
         if begun is None:
-            data = {"start_utime_us": None, "called_off": False}
+            data |= {"start_utime_us": None, "called_off": False}
             voice.tell(lambda: _finish("start", given, ended, data, as_json=as_json))
         if not isinstance(error, KeyboardInterrupt):
             voice.say(ended.sentence)
@@ -226,6 +250,9 @@ def _arm(
     fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
     asked = tell.find(fleet, parse_robots(robots))
     refuse_doubles(fleet, asked)
+    driving = tell.find_driving(fleet, asked)
+    if driving:
+        say(f"{of_driving(driving)}.")
     given = tell.arm(fleet, asked)
     return _finish("arm", given, of_arm(given), {}, as_json=as_json)
 
@@ -318,7 +345,7 @@ def _tell_fault(fault: str) -> None:
 
 def _waiting_words(left: set[int], unheard: list[str], timeout_s: float) -> str:
     """What a stop waits for."""
-    names = ", ".join(f"R{i:02d}" for i in sorted(left))
+    names = _names(left)
     where = f" from {', '.join(unheard)}" if unheard else ""
     whom = f"{names} to sign that they stand" if names else f"a robot to be heard{where}"
     return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
@@ -342,6 +369,28 @@ def _select(
     command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
     given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
     return _finish("select", given, of_select(given, behavior), {}, as_json=as_json)
+
+
+def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
+    """Raises ValueError if some are not there, or cannot be told anything with this key.
+
+    While nobody was told anything, nobody has to be stopped: another operator may hold them.
+    """
+    missing = _names(robots - fleet.here())
+    if missing:
+        raise ValueError(
+            f"{missing}: not heard in {tell.FIND_S:g} s, so nothing was started; `twinmill swarm "
+            "status` shows who is there, --partial starts the others."
+        )
+    # Half of all packets lost, one of a thousand has not been heard to sign in the first second.
+    fleet.listen(tell.FIND_S, lambda: tell.all_linked(fleet, robots))
+    strange = _names({i for i in robots if not fleet.robots[i].link})
+    if strange:
+        raise ValueError(f"{strange}: nothing was started: {tell.NO_SIGNATURE}")
+
+
+def _names(robots: set[int]) -> str:
+    return ", ".join(f"R{i:02d}" for i in sorted(robots))
 
 
 def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:

@@ -67,6 +67,8 @@ def _link(robot: Robot) -> Text:
         return Text("not signed", "red")
     if not robot.is_armed:
         return Text("stopped: arm it", "yellow")
+    if robot.is_held is False:
+        return Text(f"no operator heard ({robot.link.link_timeout_ms / 1e3:g} s)", "red")
     return Text({None: "armed", True: "held", False: "untethered"}[robot.is_tethered])
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from twinmill.robots.fleet import Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import NEVER_HEARD, Answer, Start
 
@@ -74,6 +75,22 @@ def of_stop(
     return Verdict(False, f"{words} {hint}" if silent or unheard else words)
 
 
+def of_driving(driving: list[Robot]) -> str:
+    """That robots drive already, and who has them in hand; empty where none drives."""
+    by: dict[str, list[str]] = {}
+    for robot in driving:
+        who = {
+            None: "untethered",
+            True: "held by another operator",
+            False: "and no operator is heard who holds it",
+        }[robot.is_held]
+        by.setdefault(who, []).append(f"R{robot.robot_id:02d}")
+    return "; ".join(
+        f"{', '.join(names)} {'drives' if len(names) == 1 else 'drive'} already, {who}"
+        for who, names in by.items()
+    )
+
+
 def of_arm(given: list[Answer]) -> Verdict:
     """Who may be started."""
     wrong = _disobeyed(given)
@@ -95,10 +112,12 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     """Who drives."""
     given = begun.answers
     if begun.called_off:
+        told = f"All were told to stop: {of_stop(begun.stopped).sentence}"
+        more = "" if begun.by_another else "; --partial starts some"
         return Verdict(
             False,
-            f"Called off: {_why(given)}. All were told to stop: {of_stop(begun.stopped).sentence} "
-            "They must be armed before they start (--arm); --partial starts some.",
+            f"Called off: {_why_called_off(begun)}. {told} They must be armed before they start "
+            f"(--arm){more}.",
         )
     going_on = "They drive on by themselves." if untethered else "Ctrl-C stops them."
     at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
@@ -146,10 +165,9 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
         return stopped
     early: dict[State, list[str]] = {}
     for name, state in states.items():
-        if state.stands and not (stopped and state.is_meant):
+        if state.is_taken or (state.stands and not (stopped and state.is_meant)):
             early.setdefault(state, []).append(name)
-    before = " stood before" if stopped else ""
-    told = [f"{', '.join(names)}{before}: {state.words}" for state, names in early.items()]
+    told = [_told_early(names, state, bool(stopped)) for state, names in early.items()]
     if begun is None:
         told.append("the start was ended before all had confirmed it")
     elif not begun.ok:
@@ -160,12 +178,26 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
     return Verdict(ok, f"All stand{';' if stopped else ':'} {'; '.join(told)}.")
 
 
+def _told_early(names: list[str], state: State, is_stopped: bool) -> str:
+    """What became of robots before they were stopped."""
+    if not state.stands:
+        return f"{', '.join(names)} {state.words}"
+    return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {state.words}"
+
+
 def _disobeyed(given: list[Answer]) -> list[Answer]:
     return [a for a in given if not (a.accepted and a.signed)]
 
 
 def _names(given: list[Answer]) -> str:
     return ", ".join(f"R{a.robot_id:02d}" for a in given)
+
+
+def _why_called_off(begun: Start) -> str:
+    if not begun.by_another:
+        return _why(begun.answers)
+    names = ", ".join(f"R{i:02d}" for i in begun.by_another)
+    return f"{names} {'was' if len(begun.by_another) == 1 else 'were'} stopped by another command"
 
 
 def _why(given: list[Answer]) -> str:

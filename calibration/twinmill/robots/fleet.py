@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any
 
 import turbopi
@@ -39,7 +40,31 @@ ALARMS = (
 MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
 # Fields of text, which may be anybody's: most of these messages are not signed.
 TEXTS = {"source": NAME_MAX, "version": NAME_MAX, "behavior": NAME_MAX, "reason": LINE_MAX}
+SIGNED_COMMANDS = "SWARM_SIGNED"
+COMMANDS = {
+    turbopi.swarm_command_t.VERB_START: "start",
+    turbopi.swarm_command_t.VERB_SELECT: "select",
+    turbopi.swarm_command_t.VERB_SCRIPT: "play",
+    turbopi.signed_command_t.VERB_ARM: "arm",
+}
+FRESH_US = 3_000_000  # FW_COMMAND_FRESH_US: robots obey no older word
 HOLD_S = 0.1  # so often robots that were started hear that the operator is there
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A command that an operator was heard to sign.
+
+    Attributes:
+        seq, verb, session, counter: as in swarm_command_t and signed_command_t.
+        words: the command as a person would write it, and when it was heard.
+    """
+
+    seq: int
+    verb: int
+    session: int
+    counter: int
+    words: str
 
 
 @dataclass
@@ -53,6 +78,8 @@ class Robot:
         senders: of its telemetry.
         acks, signed_acks: by number of the command; the latter with the robot's signature.
         link, link_s: its newest link_t with its signature, and when that was heard.
+        hold_s: when an operator was heard last, or said from here, that somebody is there.
+        commands: that operators were heard to sign for it, by their counters.
     """
 
     robot_id: int
@@ -66,6 +93,8 @@ class Robot:
     signed_acks: dict = field(default_factory=dict)
     link: Any = None
     link_s: float = 0.0
+    hold_s: float = 0.0
+    commands: dict[int, Heard] = field(default_factory=dict)
 
     @property
     def mode(self) -> str:
@@ -105,6 +134,15 @@ class Robot:
             and (self.stands or not self.telemetry)
         )
 
+    def has_obeyed(self, command: Heard) -> bool:
+        """It has signed so, to whoever said it or in its link."""
+        ack, link = self.signed_acks.get(command.seq), self.link
+        is_newest = bool(link) and (link.session, link.counter) == (
+            command.session,
+            command.counter,
+        )
+        return is_newest or bool(ack and ack.accepted and ack.session == command.session)
+
     @property
     def session_us(self) -> int:
         """Now by its clock since its session began, or a little before; it must have a link."""
@@ -118,9 +156,17 @@ class Robot:
     @property
     def is_tethered(self) -> bool | None:
         """It stops when its operator is lost; None if it does not drive or has not signed that."""
-        if not self.link or self.link.mode == TELEMETRY.MODE_STOPPED:
-            return None
-        return self.link.link_timeout_ms > 0
+        return self.link.link_timeout_ms > 0 if self.drives else None
+
+    @property
+    def drives(self) -> bool:
+        """It has signed so; one in a fault drives on once that is over."""
+        return bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
+
+    @property
+    def is_held(self) -> bool | None:
+        """An operator is heard who holds it; None if it needs none."""
+        return time.monotonic() - self.hold_s < GONE_S if self.is_tethered else None
 
     @property
     def is_double(self) -> bool:
@@ -180,6 +226,8 @@ class Robot:
             "signed": self.link is not None,
             "armed": self.is_armed,
             "tethered": self.is_tethered,
+            "held": self.is_held,
+            "link_timeout_s": self.link.link_timeout_ms / 1e3 if self.link else None,
             "battery_V": t.battery_V if t else None,
             "camera": self.camera,
             "clock_ahead_s": self.clock_s,
@@ -217,10 +265,14 @@ class Fleet:
         self.watch: Callable[[], None] = lambda: None
         # Robots that shall hear all the time that the operator is there.
         self.held: set[int] = set()
+        # Numbers of the commands that were said from here, and the highest counter of those.
+        self.said: set[int] = set()
+        self.counter = 0
         self._prefix, self._key, self._hold_s = channel_prefix, key, 0.0
         try:
             self.bus = connect(url)
-            channels = re.escape(channel_prefix) + "R[0-9]{2,3}_(TELEMETRY|RUN|ACK|LINK|SIGNED_ACK)"
+            kinds = "TELEMETRY|RUN|ACK|LINK|SIGNED_ACK"
+            channels = f"{re.escape(channel_prefix)}(R[0-9]{{2,3}}_({kinds})|{SIGNED_COMMANDS})"
             self.bus.subscribe(channels, self._on_message)
         except RuntimeError as error:
             raise ValueError(
@@ -230,6 +282,9 @@ class Fleet:
 
     def _on_message(self, channel: str, data: bytes) -> None:
         name, _, kind = channel.removeprefix(self._prefix).partition("_")
+        if channel == self._prefix + SIGNED_COMMANDS:
+            self._on_command(data)
+            return
         try:
             message = getattr(turbopi, f"{kind.lower()}_t").decode(data)
         except (ValueError, struct.error, IndexError):
@@ -262,6 +317,28 @@ class Fleet:
         old = robot.link
         if not old or message.session != old.session or message.session_us > old.session_us:
             robot.link, robot.link_s = message, time.monotonic()
+
+    def _on_command(self, data: bytes) -> None:
+        """Notes what operators sign: that they hold a robot, or what they tell it."""
+        try:
+            sealed = turbopi.signed_command_t.decode(data)
+            command = turbopi.swarm_command_t.decode(sealed.command)
+        except (ValueError, struct.error, IndexError):
+            return
+        robot = self.robots.get(sealed.robot_id)
+        if not (self._key and robot and robot.link and robot.link.session == sealed.session):
+            return
+        is_fresh = sealed.made_us > robot.session_us - FRESH_US
+        if not is_fresh or not keys.is_signed(keys.of_robot(self._key, robot.robot_id), data):
+            return
+        if command.verb == sealed.VERB_HOLD:
+            robot.hold_s = time.monotonic()
+        elif sealed.counter not in robot.commands:
+            words = f"{COMMANDS.get(command.verb, '?')} {plain_line(command.behavior, NAME_MAX)}"
+            words = f"{words.strip()} at {datetime.now():%H:%M:%S}"
+            robot.commands[sealed.counter] = Heard(
+                command.seq, command.verb, sealed.session, sealed.counter, words
+            )
 
     def listen(self, duration_s: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Takes in what robots say for some time, or until that is enough.
@@ -298,6 +375,7 @@ class Fleet:
             if robot and robot.link:
                 with suppress(OSError):  # the robots notice
                     self.send_signed(command, robot, robot.link.session, 0)
+                    robot.hold_s = time.monotonic()
 
     def send_signed(
         self, command: Any, robot: Robot, session: int, counter: int, *, link_timeout_ms: int = -1
@@ -323,7 +401,9 @@ class Fleet:
         sealed.command_size = len(sealed.command)
         sealed.tag = bytes(keys.TAG_BYTES)
         message = keys.sign(keys.of_robot(self._key, robot.robot_id), sealed.encode())
-        self.bus.publish(f"{self._prefix}SWARM_SIGNED", message)
+        self.said.add(command.seq)
+        self.counter = max(self.counter, counter)
+        self.bus.publish(self._prefix + SIGNED_COMMANDS, message)
 
     def send(self, command: Any, host: str = "") -> None:
         """Says a swarm_command_t once, to all or to one machine.
@@ -331,6 +411,7 @@ class Fleet:
         Raises:
             OSError: there is no way to.
         """
+        self.said.add(command.seq)
         channel = f"{self._prefix}SWARM_COMMAND"
         if not host:
             self.bus.publish(channel, command.encode())

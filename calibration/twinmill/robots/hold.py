@@ -4,12 +4,13 @@
 import time
 from dataclasses import dataclass
 
-from twinmill.robots.fleet import MAY_MOVE, TELEMETRY, Fleet, Robot
-from twinmill.robots.tell import Start
+from twinmill.robots.fleet import MAY_MOVE, TELEMETRY, Fleet, Heard, Robot
+from twinmill.robots.tell import VERBS, Start
 
 # A robot signs ten times a second; without a word for as long as it would wait for its operator,
 # nobody knows what it does.
 SILENT_S = 2.0
+STARTING = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 SETTLE_S = 0.3  # a state that lasts is told; a camera that stutters would be a flood of words
 
 
@@ -21,19 +22,25 @@ class State:
         words: to go on behind its name; of one that stands, why it does.
         stands: it has signed so, and will not drive on by itself.
         is_meant: somebody wished it so: it drives, or was stopped by a person or its script.
+        is_taken: another operator has commanded it since, and it is his.
     """
 
     words: str
     stands: bool = False
     is_meant: bool = False
+    is_taken: bool = False
 
     def told_of(self, name: str) -> str:
         """A sentence without its full stop."""
-        return f"{name} stands: {self.words}" if self.stands else f"{name} {self.words}"
+        if self.stands:
+            return f"{name} stands: {self.words}"
+        more = ", and is not held from here any more; Ctrl-C stops it all the same"
+        return f"{name} {self.words}{more if self.is_taken else ''}"
 
 
 DRIVES = State("drives", is_meant=True)
 WAITS = State("has accepted the start, and has not driven yet: its clock may be behind")
+DRIVES_AS_UNHEARD = State("drives, and obeyed another operator whose words were not heard here")
 DRIVES_ANEW = State("drives, though its program was started anew: it has autostart")
 SILENT = State("is not heard any more: nobody knows whether it stands")
 UNSIGNED = State("signs nothing with this operator's key any more: nobody knows whether it stands")
@@ -41,16 +48,30 @@ DOUBLE = State("is two robots of one number, or hears another: nobody knows whic
 UNCONFIRMED = State("says that it stands, but not that its motor board took zero")
 RESTARTED = State("its program was started anew", stands=True)
 LINK_LOST = State("it had lost its link to this command", stands=True)
+LINK_LOST_TO_OTHER = State("it had lost its link to that operator", stands=True)
 BY_COMMAND = State("stopped by another command", stands=True, is_meant=True)
 SCRIPT_OVER = State("its script is over, or its button was pressed", stands=True, is_meant=True)
 BY_BUTTON = State("its button was pressed", stands=True, is_meant=True)
 
 
+def of_taken(command: Heard, then: State | None = None) -> State:
+    """A robot that was taken over by another operator, and why it stands by now."""
+    words = f"taken over by another operator ({command.words})"
+    if not then:
+        return State(f"was {words}", is_taken=True)
+    became = LINK_LOST_TO_OTHER if then is LINK_LOST else then
+    return State(f"{words}, then {became.words}", stands=True, is_taken=True)
+
+
 class Held:
-    """Robots that were started together."""
+    """Robots that were started together.
+
+    One that obeys another operator's start since is that operator's: it is held from here no more.
+    """
 
     def __init__(self, fleet: Fleet, begun: Start):
         """Takes all of them that have signed that they start, or drive all the same."""
+        self._fleet = fleet
         known = [fleet.robots[a.robot_id] for a in begun.answers if a.robot_id in fleet.robots]
         accepted = {a.robot_id for a in begun.answers if a.accepted and a.signed}
         self.robots = [
@@ -73,6 +94,7 @@ class Held:
             return UNSIGNED if robot.is_here else SILENT
         if robot.link_s < self._begin_s:
             return self._told[robot.robot_id]
+        taken = self._taken(robot)
         is_anew = link.session != self._sessions[robot.robot_id]
         if link.mode == TELEMETRY.MODE_FAULT:
             is_blind = link.status_flags & TELEMETRY.STATUS_FRAME_STALE
@@ -81,12 +103,15 @@ class Held:
             return State(f"has a fault: {what}; it may drive again once that is over")
         if link.mode != TELEMETRY.MODE_STOPPED:
             self._drove[robot.robot_id] = link.mode
-            return DRIVES_ANEW if is_anew else DRIVES
+            if taken:
+                return of_taken(taken)
+            return DRIVES_ANEW if is_anew else self._drives(robot)
         if robot.mode in ("running", "script"):
             return self._told[robot.robot_id]
         if not (link.stands and robot.stands) or link.status_flags & MAY_MOVE:
             return UNCONFIRMED
-        return RESTARTED if is_anew else self._why_it_stands(robot)
+        why = RESTARTED if is_anew and not taken else self._why_it_stands(robot)
+        return of_taken(taken, why) if taken else why
 
     def _why_it_stands(self, robot: Robot) -> State:
         flags = robot.link.status_flags
@@ -99,10 +124,39 @@ class Held:
         was_script = self._drove[robot.robot_id] == TELEMETRY.MODE_SCRIPT
         return SCRIPT_OVER if was_script else BY_BUTTON
 
+    def _taken(self, robot: Robot) -> Heard | None:
+        """The start of another operator that it obeyed last."""
+        return next((c for c in self._others(robot) if c.verb in STARTING), None)
+
+    def _drives(self, robot: Robot) -> State:
+        """As was told from here, or as another operator told it."""
+        link, others = robot.link, self._others(robot)
+        if others:
+            return State(f"drives: another operator said {others[0].words}", is_meant=True)
+        known = max([self._fleet.counter, *(c.counter for c in robot.commands.values())])
+        is_own = link.session == self._sessions[robot.robot_id]
+        return DRIVES_AS_UNHEARD if is_own and link.counter > known else DRIVES
+
+    def _others(self, robot: Robot) -> list[Heard]:
+        """Commands of other operators that it has obeyed since it was started; newest first."""
+        session = robot.link.session
+        since = self._fleet.counter if session == self._sessions[robot.robot_id] else 0
+        heard = sorted(robot.commands.values(), key=lambda c: c.counter, reverse=True)
+        return [
+            c
+            for c in heard
+            if c.seq not in self._fleet.said
+            and c.session == session
+            and c.counter > since
+            and robot.has_obeyed(c)
+        ]
+
     def news(self) -> list[str]:
         """A sentence of each robot that has for a while been in another state than was told."""
         said, now_s = [], time.monotonic()
         for robot in self.robots:
+            if robot.link and self._taken(robot):
+                self._fleet.held.discard(robot.robot_id)
             state, (before, since_s) = self._state(robot), self._seen[robot.robot_id]
             if state != before:
                 self._seen[robot.robot_id] = state, now_s

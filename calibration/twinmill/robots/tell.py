@@ -98,7 +98,7 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
         ValueError: none is there.
     """
     if robots:
-        fleet.listen(FIND_S, lambda: robots <= fleet.here() and _all_linked(fleet, robots))
+        fleet.listen(FIND_S, lambda: robots <= fleet.here() and all_linked(fleet, robots))
         return robots
     fleet.listen(FIND_S)
     if not fleet.here():
@@ -110,12 +110,29 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     return fleet.here()
 
 
-def _all_linked(fleet: Fleet, robots: set[int]) -> bool:
+def find_driving(fleet: Fleet, robots: set[int]) -> list[Robot]:
+    """Those of some robots that drive already; who holds them is heard by then.
+
+    To be asked before this program holds any.
+    """
+    driving = [r for i in sorted(robots) if (r := fleet.robots.get(i)) and r.drives]
+    fleet.listen(FIND_S, lambda: all(robot.is_held is not False for robot in driving))
+    return driving
+
+
+def all_linked(fleet: Fleet, robots: set[int]) -> bool:
+    """All of some robots were heard, and have signed how they may be commanded."""
     return all(i in fleet.robots and fleet.robots[i].link for i in robots)
 
 
 def tell(
-    fleet: Fleet, command, robots: set[int], *, until_s: float, link_timeout_ms: int = -1
+    fleet: Fleet,
+    command,
+    robots: set[int],
+    *,
+    until_s: float,
+    link_timeout_ms: int = -1,
+    enough: Callable[[], object] = lambda: False,
 ) -> list[Answer]:
     """Repeats one command to some robots until each has answered, or time.monotonic() is until_s.
 
@@ -128,9 +145,12 @@ def tell(
         until_s: when to give up.
         link_timeout_ms: of a start: how long robots drive on without hearing the operator; 0: for
             ever; -1: as they are configured.
+        enough: what else ends it.
     """
     order = Order(command, link_timeout_ms)
     while (waiting := _unanswered(fleet, command, robots)) and time.monotonic() < until_s:
+        if enough():
+            break
         for robot_id in sorted(waiting):
             _say_signed(fleet, order, robot_id)
         fleet.listen(REPEAT_S, lambda: not _unanswered(fleet, command, robots))
@@ -285,6 +305,7 @@ class Start:
             acknowledged in time; else empty.
         late: what those answered to a stop that had accepted, were to drive on by themselves, and
             had not begun.
+        by_another: robots that somebody stopped once they had accepted, before the instant.
     """
 
     utime_us: int
@@ -292,6 +313,7 @@ class Start:
     sessions: dict[int, int]
     stopped: list[Answer]
     late: list[Answer] = field(default_factory=list)
+    by_another: list[int] = field(default_factory=list)
 
     @property
     def called_off(self) -> bool:
@@ -329,20 +351,30 @@ def start(
     command.start_utime_us = command.utime_us + int(ahead_s * 1e6)
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
+
+    def stoppers() -> list[int]:
+        return _stopped_by_another(fleet, robots, command.seq)
+
     given = tell(
-        fleet, command, robots, until_s=instant_s - CALL_OFF_S, link_timeout_ms=link_timeout_ms
+        fleet,
+        command,
+        robots,
+        until_s=instant_s - CALL_OFF_S,
+        link_timeout_ms=link_timeout_ms,
+        enough=stoppers,
     )
+    agreed = partial or all(a.accepted and a.signed for a in given)
+    if agreed:
+        fleet.listen(instant_s - time.monotonic(), stoppers)
+    by_another = stoppers()
     stopped: list[Answer] = []
     late: list[Answer] = []
-    if partial or all(a.accepted and a.signed for a in given):
-        fleet.listen(instant_s - time.monotonic())
-        accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-        patience_s = BEGUN_S if link_timeout_ms else LATE_S
-        fleet.listen(patience_s, lambda: not any(robot.mode == "stopped" for robot in accepted))
-        waiting = {robot.robot_id for robot in accepted if robot.mode == "stopped"}
-        late = stop(fleet, waiting) if waiting and not link_timeout_ms else []
+    if agreed and not by_another:
+        late = _begin(fleet, given, is_held=link_timeout_ms != 0)
     else:
         stopped = stop(fleet, robots)
+        told = _stopped_by_another(fleet, robots, command.seq, was_told=True)
+        by_another = sorted({*by_another, *told})
     sessions = {
         i: robot.signed_acks[command.seq].session
         for i in robots
@@ -350,7 +382,54 @@ def start(
     }
     # An answer that came after the start was called off does not tell why it was.
     final = given if stopped else answers(fleet, command, robots)
-    return Start(command.start_utime_us, final, sessions, stopped, late)
+    return Start(command.start_utime_us, final, sessions, stopped, late, by_another)
+
+
+def _stopped_by_another(
+    fleet: Fleet, robots: set[int], seq: int, *, was_told: bool = False
+) -> list[int]:
+    """Those that have accepted a command, and signed since that they obeyed another's stop.
+
+    Args:
+        fleet: where they are.
+        robots: of whom it is asked.
+        seq: the command's number.
+        was_told: a stop was said from here, too: that one is not armed shows no other's.
+    """
+    known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
+    accepted = [
+        (robot, ack) for robot in known if (ack := robot.signed_acks.get(seq)) and ack.accepted
+    ]
+    return [
+        robot.robot_id
+        for robot, ack in accepted
+        if _obeyed_a_stop(fleet, robot, ack) or (not was_told and _was_disarmed(robot, ack))
+    ]
+
+
+def _was_disarmed(robot: Robot, since) -> bool:
+    """After this signed_ack_t, as it has signed."""
+    link = robot.link
+    is_later = link.session == since.session and link.session_us > since.session_us
+    return is_later and not link.armed
+
+
+def _obeyed_a_stop(fleet: Fleet, robot: Robot, since) -> bool:
+    """Of somebody else, after this signed_ack_t."""
+    return any(
+        ack.verb == VERBS.VERB_STOP and ack.accepted and ack.session_us > since.session_us
+        for seq, ack in robot.signed_acks.items()
+        if seq not in fleet.said and ack.session == since.session
+    )
+
+
+def _begin(fleet: Fleet, given: list[Answer], *, is_held: bool) -> list[Answer]:
+    """Waits until those that have accepted drive; of those that nobody holds, stops the others."""
+    accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
+    patience_s = BEGUN_S if is_held else LATE_S
+    fleet.listen(patience_s, lambda: not any(robot.mode == "stopped" for robot in accepted))
+    waiting = {robot.robot_id for robot in accepted if robot.mode == "stopped"}
+    return stop(fleet, waiting) if waiting and not is_held else []
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Before a command is said: who is missing, who drives already, and whom an operator holds."""
+
+import time
+
+import pytest
+import turbopi
+
+from twinmill.robots import key as keys
+from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
+from twinmill.terminal import PlainConsole
+from twinmill_cli import characterise, swarm
+from twinmill_cli.swarm_screen import status_table
+from twinmill_cli.swarm_verdict import of_driving
+
+KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
+VERBS = turbopi.signed_command_t
+
+
+class Bus:
+    """A network of which nothing comes, and that keeps what is said."""
+
+    def __init__(self):
+        self.said = []
+
+    def subscribe(self, _, handler):
+        self.hear = handler
+
+    def handle_timeout(self, timeout_ms):
+        time.sleep(timeout_ms / 1e3)
+        return False
+
+    def publish(self, channel, _):
+        self.said.append(channel)
+
+
+def fleet_of(*robots: Robot) -> Fleet:
+    fleet = Fleet("", connect=lambda _: Bus(), key=KEY)
+    fleet.robots = {robot.robot_id: robot for robot in robots}
+    return fleet
+
+
+def robot(robot_id: int, mode: int = TELEMETRY.MODE_STOPPED, link_timeout_ms: int = 2000) -> Robot:
+    """One that has just said all that it is."""
+    link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
+    link.session, link.mode, link.armed, link.link_timeout_ms = SESSION, mode, 1, link_timeout_ms
+    telemetry.mode = mode
+    now_s = time.monotonic()
+    return Robot(robot_id, telemetry=telemetry, heard_s=now_s + 60, link=link, link_s=now_s)
+
+
+def hold(fleet: Fleet, robot_id: int, *, key=KEY, session=SESSION, made_us=0) -> None:
+    """Somebody else says that he is there."""
+    command, sealed = turbopi.swarm_command_t(), turbopi.signed_command_t()
+    command.verb = VERBS.VERB_HOLD
+    sealed.robot_id, sealed.session, sealed.made_us = robot_id, session, made_us
+    sealed.command = command.encode()
+    sealed.command_size = len(sealed.command)
+    sealed.tag = bytes(keys.TAG_BYTES)
+    fleet.bus.hear("SWARM_SIGNED", keys.sign(keys.of_robot(key, robot_id), sealed.encode()))
+
+
+@pytest.mark.parametrize("arm", [[], ["--arm"]])
+def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
+    monkeypatch, tmp_path, twinmill, arm
+):
+    """Nobody was told to start: so there is no stop that a missing robot would have to confirm."""
+    fleet = fleet_of(robot(1))
+    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    words = ["start", "--robots", "1,9", *arm, "--key", tmp_path / "key"]
+    code, _, err = twinmill("swarm", *words)
+    assert code == 1 and "R09: not heard" in err
+    assert fleet.bus.said == []
+
+
+def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, tmp_path, twinmill):
+    """A start that none can obey would end in a stop, which all do."""
+    strange = robot(1, DRIVING)
+    strange.link = None
+    fleet = fleet_of(strange)
+    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", tmp_path / "key")
+    assert code == 1 and "R01: nothing was started: signs nothing with this operator's key" in err
+    assert fleet.bus.said == []
+
+
+def test_who_drives_already_is_said_with_who_holds_it():
+    held, alone, free = robot(1, DRIVING), robot(2, DRIVING), robot(3, DRIVING, 0)
+    fleet = fleet_of(held, alone, free)
+    hold(fleet, 1)
+    said = of_driving([held, alone, free])
+    assert "R01 drives already, held by another operator" in said
+    assert "R02 drives already, and no operator is heard who holds it" in said
+    assert "R03 drives already, untethered" in said
+
+
+@pytest.mark.parametrize(
+    "says", [{"key": bytes(32)}, {"session": SESSION + 1}, {"made_us": -10_000_000}]
+)
+def test_only_a_hold_of_just_now_with_the_operators_key_counts(says):
+    held = robot(1, DRIVING)
+    fleet = fleet_of(held)
+    hold(fleet, 1, **says)
+    assert held.is_held is False
+    hold(fleet, 1)
+    assert held.is_held is True
+
+
+def test_status_says_that_nobody_is_heard_who_holds_a_robot(capsys):
+    """As after `kill -9` of a tool that told robots to wait for it ten minutes."""
+    alone = robot(1, DRIVING, 600_000)
+    fleet = fleet_of(alone)
+    PlainConsole(width=200).print(status_table([alone]))
+    assert "no operator heard (600 s)" in capsys.readouterr().out
+    assert alone.to_json()["held"] is False and alone.to_json()["link_timeout_s"] == 600
+    hold(fleet, 1)
+    PlainConsole(width=200).print(status_table([alone]))
+    assert " held" in capsys.readouterr().out and alone.to_json()["held"] is True
+
+
+def test_a_script_that_is_not_here_is_said_before_what_else_is_missing(
+    monkeypatch, tmp_path, twinmill
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(characterise, "Fleet", lambda *_, **__: fleet_of(robot(1)))
+    words = ["--robot", "1", "--out", "run.lcmlog", "--key", tmp_path / "key"]
+    code, _, err = twinmill("characterise", "--script", "missing.csv", *words)
+    assert code == 1 and "missing.csv: no such script here" in err and "no pose" in err
+    (tmp_path / "there.csv").write_text("t_s,speed_input,turn_input\n0,0,0\n1,0,0\n")
+    code, _, err = twinmill("characterise", "--script", "there.csv", *words, "--force")
+    assert code == 1 and "no such script" not in err and "no pose" in err
