@@ -8,6 +8,7 @@ from interop import (
     mcap_file,
     mjcf,
     rerun_file,
+    ros2_control,
     rosbag,
     sdf,
     tables,
@@ -16,5 +17,6 @@ from interop import (
 )
 from interop.cells import cells_of
 
-MODULES = (mjcf, urdf, sdf, rosbag, mcap_file, lcm_log, tables, rerun_file, films, tags, capture)
+MODULES = (mjcf, urdf, ros2_control, sdf, rosbag, mcap_file, lcm_log, tables)
+MODULES += (rerun_file, films, tags, capture)
 CELLS = [cell for module in MODULES for cell in cells_of(module)]

@@ -93,4 +93,6 @@ def node(folder: Path) -> Told:
     }
 
 
-NOT_RUN = [Cell("MCAP", "writes", "mcap CLI", why_not="Go's module proxy does not have it")]
+NOT_RUN = [
+    Cell("MCAP", "writes", "mcap CLI", why_not="neither Go's module proxy nor crates.io has it"),
+]
