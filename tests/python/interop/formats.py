@@ -9,6 +9,7 @@ from interop import (
     mjcf,
     rerun_file,
     ros2_control,
+    ros_node,
     rosbag,
     sdf,
     tables,
@@ -17,6 +18,6 @@ from interop import (
 )
 from interop.cells import cells_of
 
-MODULES = (mjcf, urdf, ros2_control, sdf, rosbag, mcap_file, lcm_log, tables)
+MODULES = (mjcf, urdf, ros2_control, ros_node, sdf, rosbag, mcap_file, lcm_log, tables)
 MODULES += (rerun_file, films, tags, capture)
 CELLS = [cell for module in MODULES for cell in cells_of(module)]
