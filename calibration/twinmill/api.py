@@ -2058,7 +2058,8 @@ def import_log(
     )
     given = {"poses": poses, "commands": commands, "motive": motive, "vicon": vicon, "bag": bag}
     given["detections"] = detections
-    files = {k: None if path is None else path_of(k, path, A_PATH) for k, path in given.items()}
+    wanted = f"{A_PATH}; data frames go into tm.Log.from_frames"
+    files = {k: None if path is None else path_of(k, path, wanted) for k, path in given.items()}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
     with TemporaryDirectory(prefix="twinmill.") as folder, said_in_python():
         out = Path(folder) / "imported.lcmlog"

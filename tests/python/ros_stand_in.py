@@ -10,8 +10,9 @@ START_S = 1_700_000_000  # of its clock, since the Unix epoch
 class StandIn:
     """As much of rclpy as a publisher needs; its clock runs a tick at a time."""
 
-    def __init__(self, monkeypatch, stop_after=10**9):
+    def __init__(self, monkeypatch, stop_after=10**9, listens_at_s=0.0):
         self.said, self.now_s, self.stop_after = [], 0.0, stop_after
+        self.listens_at_s = listens_at_s
         stand_in = self
 
         class Node:
@@ -19,7 +20,11 @@ class StandIn:
                 pass
 
             def create_publisher(self, kind, topic, depth):
-                return types.SimpleNamespace(publish=stand_in.hear)
+                return types.SimpleNamespace(
+                    publish=stand_in.hear,
+                    topic_name=f"/{topic}",
+                    get_subscription_count=lambda: int(stand_in.now_s >= stand_in.listens_at_s),
+                )
 
             def create_timer(self, period_s, call):
                 stand_in.period_s, stand_in.call = period_s, call

@@ -339,6 +339,10 @@ WRONG_TYPES = {  # what is called, and what the sentence says
         "'R02' in pose_shift_s: is 'R02', and must be the number of a robot",
     ),
     "poses": (lambda log, model: tm.import_log(5, 6), "poses: is 5, and must be the path"),
+    "frames": (
+        lambda log, model: tm.import_log(log.table(), log.commands()),
+        "poses: is a DataFrame, and must be the path of a file; data frames go into tm.Log.from_fr",
+    ),
     "card": (lambda log, model: tm.effect(None), "name: is a NoneType, and must be"),
     "progress": (
         lambda log, model: tm.diagnose(log, progress=True),

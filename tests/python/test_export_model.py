@@ -245,11 +245,21 @@ def test_what_the_file_says_of_its_delay_holds_in_mujoco(folder, model_text):
         assert np.argmax(np.abs(states[0, :, 1 + model.nq]) > 1e-6) == moves
 
 
+def speed_in(path, rim_mps):
+    """Of a robot in MuJoCo after 0.1 s, all rims told the same."""
+    model = mujoco.MjModel.from_xml_path(path)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = rim_mps
+    mujoco.mj_step(model, data, 100)
+    return data.qvel[0]
+
+
 def test_what_the_page_on_other_simulators_shows_runs(folder, model_text):
     text = model_text("m", motor_lag_s=0) + '[[effect]]\nname = "input_delay"\ndelay_s = 0.03\n'
-    open_text(folder, text)
-    for kind, name in (("mjcf", "better.xml"), ("urdf", "better.urdf")):
-        run(["export-model", "m.toml", "--to", kind, "--out", name])
+    text += "[base.std]\nforward_gain = 0.04\n[idiosyncrasy]\ntheta_a1_std = 0.03\n"
+    (folder / "better.toml").write_text(text)
+    run(["export-model", "better.toml", "--to", "mjcf", "--ranges", "--samples", "60"])
+    run(["export-model", "better.toml", "--to", "urdf"])
     page = (DOCS / "simulators.md").read_text()
     exec("".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)), names := {})
     model, data, swarm = (names[name] for name in ("model", "data", "swarm"))
@@ -266,6 +276,11 @@ def test_what_the_page_on_other_simulators_shows_runs(folder, model_text):
     np.testing.assert_allclose(np.delete(many.qpos, 3), 0, atol=1e-6)
 
     assert names["free"].body_mass.sum() == pytest.approx(1.2)
+
+    told = dict(zip(names["ranges"]["names"], names["ranges"]["samples"].T, strict=True))
+    speeds = [speed_in(f"better_{k:03}.xml", 0.3) for k in range(60)]
+    gains = told["base.forward_gain"] * told["theta_a1"]
+    np.testing.assert_allclose(speeds, 0.3 * gains, rtol=1e-4)
 
 
 BY_HAND = """

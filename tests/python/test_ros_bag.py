@@ -146,6 +146,19 @@ def test_what_is_no_bag_or_a_broken_one_is_one_sentence(tmp_path):
             list_topics(tmp_path / name)
 
 
+def test_an_mcap_file_of_another_kind_is_told_by_its_profile(tmp_path):
+    """As written by MCAP's own library; `mcap recover` would not help."""
+    from mcap.writer import Writer
+
+    with (tmp_path / "x.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="protobuf")
+        writer.finish()
+    with pytest.raises(LogError, match=r"its profile is 'protobuf', so .* not of ROS 2") as raised:
+        list_topics(tmp_path / "x.mcap")
+    assert "recover" not in str(raised.value)
+
+
 def test_a_topic_that_is_not_there_is_named_with_those_that_are(tmp_path):
     bag = _bag(tmp_path / "bag", StoragePlugin.SQLITE3)
     options = ImportOptions(pose_topics=("/r03/odom",), command_topics=("/r03/cmd_vel",))

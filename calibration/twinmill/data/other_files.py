@@ -9,7 +9,7 @@ from twinmill.data.lcm_log import LogError
 LOOKED_AT = 65536  # bytes
 RAW = "get the file itself, as by the button for raw contents or a download"
 TO_CSV = "save it as CSV"
-OF_PANDAS = "write its table as CSV, as with pandas: to_csv; or give the table to tm.import_log"
+OF_PANDAS = "write its table as CSV, as with pandas: to_csv; or give frames to tm.Log.from_frames"
 LCM_LOG = "an LCM log"
 OF_BAG = "give it to `twinmill import --bag`"
 # What it begins with, what it is, and what to do. From the formats' own specifications.

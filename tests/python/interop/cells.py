@@ -48,6 +48,16 @@ class Cell:
     ours: Callable[[Path], Told | None] | None = None
     why_not: str = ""
 
+    @property
+    def pinned(self) -> bool:
+        """The other program's version stands here."""
+        return any(mark in self.packages[0] for mark in ("==", "@"))
+
+    @property
+    def quick(self) -> bool:
+        """Nothing is fetched or compiled for it."""
+        return not any(mark in name for name in self.packages for mark in ("==", "@", "-dev"))
+
     def run(self, folder: Path) -> Told:
         """Both sides, the writing one first.
 
@@ -63,17 +73,14 @@ class Cell:
         return self.ours(folder)
 
     def _theirs_apart(self, folder: Path) -> Told | None:
-        paths = [str(Path(__file__).parents[1])]
         pinned = [name for name in self.packages if "==" in name]
-        if pinned:
-            paths.insert(0, str(_installed(pinned)))
-        python = [sys.executable, *(["-S"] if pinned else [])]
+        python = _python_with(pinned) if pinned else sys.executable
         names = [self.theirs.__module__, self.theirs.__name__, str(folder)]
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+        environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
         if of_npm := [name for name in self.packages if "@" in name]:
             environment["NODE_PATH"] = str(_installed_by_npm(of_npm))
         subprocess.run(
-            [*python, "-m", "interop.apart", *names], env=environment, cwd=folder, check=True
+            [python, "-m", "interop.apart", *names], env=environment, cwd=folder, check=True
         )
         return json.loads((folder / "told.json").read_text())
 
@@ -127,28 +134,20 @@ def _debian(package: str) -> str:
 
 def packages_at(*names: str) -> Path:
     """Folder of packages of PyPI, for a program in them."""
-    return _installed(list(names))
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    return _python_with(list(names)).parents[1] / "lib" / version / "site-packages"
 
 
-def _installed(pinned: list[str]) -> Path:
-    """Folder of these packages of PyPI and what they need."""
+def _python_with(pinned: list[str]) -> Path:
+    """A Python that has these packages of PyPI and what they need."""
     folder = ROOT / ".deps/interop" / "_".join(pinned)
-    done = folder / "complete"
+    python, done = folder / "bin/python", folder / "installed"
     if not done.exists():
-        pip = [
-            sys.executable,
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--no-compile",
-            "--no-warn-conflicts",
-            "--upgrade",
-            "--target",
-        ]
-        subprocess.run([*pip, str(folder), *pinned], check=True)
+        subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+        pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet"]
+        subprocess.run([*pip, "--no-compile", *pinned], check=True)
         done.touch()
-    return folder
+    return python
 
 
 def _installed_by_npm(names: list[str]) -> Path:
@@ -178,7 +177,7 @@ def rows_of(page: str) -> list[str]:
     return table.strip().splitlines()[2:]
 
 
-def dateless(line: str) -> str:
-    """A line of the table without the day that it was run."""
+def lasting(line: str, *, pinned: bool) -> str:
+    """A line of the table without its day, and without a version that Debian chooses."""
     parts = line.split("|")
-    return "|".join([*parts[:5], "", *parts[6:]])
+    return "|".join([*parts[: 5 if pinned else 4], *parts[6:]])

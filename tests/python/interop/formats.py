@@ -8,6 +8,8 @@ from interop import (
     mcap_file,
     mjcf,
     rerun_file,
+    ros2_control,
+    ros_node,
     rosbag,
     sdf,
     tables,
@@ -16,5 +18,6 @@ from interop import (
 )
 from interop.cells import cells_of
 
-MODULES = (mjcf, urdf, sdf, rosbag, mcap_file, lcm_log, tables, rerun_file, films, tags, capture)
+MODULES = (mjcf, urdf, ros2_control, ros_node, sdf, rosbag, mcap_file, lcm_log, tables)
+MODULES += (rerun_file, films, tags, capture)
 CELLS = [cell for module in MODULES for cell in cells_of(module)]

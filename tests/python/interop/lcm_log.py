@@ -8,14 +8,14 @@ from itertools import pairwise
 from pathlib import Path
 
 from interop import drive
-from interop.cells import Told, reads, writes
+from interop.cells import ROOT, Told, reads, writes
 
 FILE = "run.lcmlog"
 POSE = "R01_POSE"
 
 
 def _write(folder: Path) -> None:
-    """By `twinmill import`, from tables."""
+    """By `Log.save`, from data frames."""
     import numpy as np
     import pandas as pd
 
@@ -28,7 +28,7 @@ def _write(folder: Path) -> None:
     poses = pd.DataFrame({"t_s": t_s, "robot_id": 1, "x_m": x_m, "y_m": 0.0, "theta_rad": 0.0})
     told = pd.DataFrame({"t_s": t_s, "robot_id": 1, "vy_mps": 0.0, "omega_radps": 0.0})
     told["vx_mps"] = drive.SPEED_MPS * (k >= drive.STANDS)
-    tm.import_log(poses, told).save(folder / FILE)
+    tm.Log.from_frames(poses, told, robot_id=1).save(folder / FILE)
 
 
 def _told(events: list[tuple[int, str, bytes]]) -> Told:
@@ -107,7 +107,6 @@ def c_writes(folder: Path) -> None:
 
 @reads("LCM log", "LCM, Python", "lcm==1.5.3", ours=_read)
 def python_writes(folder: Path) -> None:
-    """`lcm.EventLog`; the messages' code is that of our environment."""
-    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
-    sys.path.append(str(Path(sys.executable).parents[1] / "lib" / version / "site-packages"))
+    """`lcm.EventLog`; the messages' code is what lcm-gen made for the build."""
+    sys.path.append(str(ROOT / "build/lcm_types/generated/python"))
     drive.write_log(folder)

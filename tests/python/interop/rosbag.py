@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ROS bags: of Foxglove's ROS 2 library, rosbags, PlotJuggler's parser, and ROS 1."""
+"""ROS bags: of Foxglove's ROS 2 library, rosbags, PlotJuggler's parser, ROS 2 and ROS 1."""
 
+import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 from interop import drive
@@ -10,8 +12,9 @@ from interop.cells import Cell, Told, reads, writes
 
 BAG, LOG = "bag", "read.lcmlog"
 POSE, TWIST = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Twist"
+ROS2 = ("ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-geometry-msgs==5.3.6")
 TOPICS = {"/r01/pose": POSE, "/r01/cmd_vel": TWIST}
-FILES = {"foxglove": "bag.mcap", "ros2": "bag_db3", "ros1": "drive.bag"}
+FILES = {"foxglove": "bag.mcap", "ros2": "bag_db3", "rclpy": "ros.mcap", "ros1": "drive.bag"}
 LINE = "=" * 80 + "\n"
 DEFINITIONS = {  # as `ros2 bag record` puts them into a file
     POSE: LINE.join(
@@ -55,6 +58,18 @@ def _told(rows: dict[str, list]) -> Told:
     }
 
 
+def _frames(rows: dict[str, list]) -> Told:
+    """What `/tf` has beside them."""
+    frames = [message.transforms[0] for _, message in rows["/tf"]]
+    here = [k for k in range(drive.COUNT) if drive.seen(k)]
+    return {
+        "frames of tf": all(
+            abs(one.transform.translation.x - drive.x_m(k)) < 1e-9
+            for k, one in zip(here, frames, strict=True)
+        )
+    }
+
+
 @writes("rosbag2", "mcap-ros2-support", "mcap-ros2-support==0.6.0", ours=_write)
 def foxglove(folder: Path) -> Told:
     """Foxglove's library."""
@@ -67,7 +82,7 @@ def foxglove(folder: Path) -> Told:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         for _, channel, message, decoded in reader.iter_decoded_messages():
             rows.setdefault(channel.topic, []).append((message.log_time, decoded))
-    return _told(rows)
+    return _told(rows) | _frames(rows)
 
 
 @writes("rosbag2", "rosbags", "rosbags==0.11.9", ours=_write)
@@ -80,7 +95,40 @@ def rosbags(folder: Path) -> Told:
         for connection, at_ns, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             rows.setdefault(connection.topic, []).append((at_ns, message))
-    return _told(rows)
+    return _told(rows) | _frames(rows)
+
+
+@writes("rosbag2", "ROS 2 Jazzy, its messages", *ROS2, "mcap==1.6.0", ours=_write)
+def ros2(folder: Path) -> Told:
+    """ROS's own messages out of the file's bytes; the file around them is opened by Foxglove's."""
+    import yaml
+    from geometry_msgs.msg import PoseStamped
+    from mcap.reader import make_reader
+    from rclpy.serialization import deserialize_message
+    from std_msgs.msg import Float64, Float64MultiArray, Int8
+
+    known = {f"geometry_msgs/msg/{PoseStamped.__name__}": PoseStamped}
+    known |= {f"std_msgs/msg/{kind.__name__}": kind for kind in (Float64, Float64MultiArray, Int8)}
+    rows: dict[str, list] = {}
+    with (folder / BAG / f"{BAG}.mcap").open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            if schema.name in known:
+                decoded = deserialize_message(message.data, known[schema.name])
+                rows.setdefault(channel.topic, []).append((message.log_time, decoded))
+    information = yaml.safe_load((folder / BAG / "metadata.yaml").read_text())
+    of_topics = [
+        topic["topic_metadata"]
+        for topic in information["rosbag2_bagfile_information"]["topics_with_message_count"]
+    ]
+    hashes = {topic["type"]: topic["type_description_hash"] for topic in of_topics}
+    return _told(rows) | {"hashes of types": all(hashes[kind] == _hash(kind) for kind in known)}
+
+
+def _hash(kind: str) -> str:
+    """ROS's own, of one of its types."""
+    package, _, name = kind.split("/")
+    described = Path(sys.prefix) / "share" / package / "msg" / f"{name}.json"
+    return json.loads(described.read_text())["type_hashes"][0]["hash_string"]
 
 
 @writes("rosbag2", "PlotJuggler's parser", "mcap-bag-parser==0.3.1", "mcap==1.6.0", ours=_write)
@@ -174,6 +222,39 @@ def rosbags_writes(folder: Path) -> None:
             writer.write(of[topic], at_ns, store.serialize_cdr(message, TOPICS[topic]))
 
 
+@reads("rosbag2", "ROS 2 Jazzy, its messages", *ROS2, "mcap==1.6.0", ours=_reads("rclpy"))
+def ros2_writes(folder: Path) -> None:
+    """Bytes that a node would send; the file around them is written by Foxglove's library."""
+    from geometry_msgs.msg import PoseStamped, Twist
+    from mcap.writer import Writer
+    from rclpy.serialization import serialize_message
+
+    with (folder / FILES["rclpy"]).open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channels = {
+            topic: writer.register_channel(
+                topic, "cdr", writer.register_schema(kind, "ros2msg", DEFINITIONS[kind].encode())
+            )
+            for topic, kind in TOPICS.items()
+        }
+        for k in range(drive.COUNT):
+            pose, told, at_ns = PoseStamped(), Twist(), 1000 * (drive.START_US + k * drive.STEP_US)
+            pose.header.stamp.sec, pose.header.stamp.nanosec = divmod(at_ns, 10**9)
+            _fill(k, pose, told)
+            for topic, message in zip(TOPICS, (pose, told), strict=True):
+                writer.add_message(channels[topic], at_ns, serialize_message(message), at_ns)
+        writer.finish()
+
+
+def _fill(k: int, pose, told) -> None:
+    """Messages of ROS, but for their stamps, which differ between ROS 1 and 2."""
+    pose.header.frame_id = "map"
+    pose.pose.position.x = drive.x_m(k) if drive.seen(k) else float("nan")
+    pose.pose.orientation.w = 1.0
+    told.linear.x = drive.SPEED_MPS * (k >= drive.STANDS)
+
+
 @reads("rosbag1", "rosbags", "rosbags==0.11.9", ours=_reads("ros1"))
 def rosbags_writes_ros1(folder: Path) -> None:
     """A file as `rosbag record` makes it."""
@@ -205,10 +286,8 @@ def by_ros(path: str) -> None:
         for k in range(drive.COUNT):
             at = Time(*divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9))
             pose, told = PoseStamped(), Twist()
-            pose.header.stamp, pose.header.frame_id = at, "map"
-            pose.pose.position.x = drive.x_m(k) if drive.seen(k) else float("nan")
-            pose.pose.orientation.w = 1.0
-            told.linear.x = drive.SPEED_MPS * (k >= drive.STANDS)
+            pose.header.stamp = at
+            _fill(k, pose, told)
             bag.write("/r01/pose", pose, at)
             bag.write("/r01/cmd_vel", told, at)
 
@@ -240,5 +319,10 @@ NOT_RUN = [
         "PlotJuggler, the program",
         why_not="no registry has it; its parser was run",
     ),
-    Cell("rosbag2", "reads", "`ros2 bag`", why_not="ROS is in no registry that is used here"),
+    Cell(
+        "rosbag2",
+        "reads",
+        "`ros2 bag`",
+        why_not="no registry has rosbag2; ROS's own messages, from PyPI, were run",
+    ),
 ]

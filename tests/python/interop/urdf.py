@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""URDF: ROS's own parser, MuJoCo's and sdformat's readers."""
+"""URDF: ROS's own parser, and the readers of MuJoCo, sdformat, Bullet and Drake."""
 
 import math
 import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from interop.cells import Cell, Told, writes
-from interop.robot import MASS_KG, WHEEL_RADIUS_M, WHEELS, write
+from interop.cells import Told, writes
+from interop.robot import DRAKE, MASS_KG, WHEEL_RADIUS_M, WHEELS, held_by_drake, write
 from interop.sdf import held_by_sdformat
 
 FILE = "robot.urdf"
@@ -86,6 +86,7 @@ def bullet(folder: Path) -> Told:
     }
 
 
-NOT_RUN = [
-    Cell("ros2_control", "writes", "ros2_control", why_not="no package registry has it"),
-]
+@writes("URDF", "Drake", DRAKE, ours=_write)
+def drake(folder: Path) -> Told:
+    """Its own parser, which makes motors of `<transmission>` alone."""
+    return held_by_drake(folder / FILE)

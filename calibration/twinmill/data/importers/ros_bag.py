@@ -57,6 +57,7 @@ from twinmill.extras import needing
 from twinmill.terminal import progress_bar
 
 WIDTH = 4  # wheels; velocity commands have a zero in the last place
+LONGEST_PROFILE = 256  # bytes of a file that are looked at for it
 LONGEST_REASON = 200  # letters of what the library says
 LOOKED_AT = 5000  # messages of tf, to see which frames there are; of more, counts are estimates
 STEP_BACK_S = 1.0  # messages are never exchanged by that much: a clock was set
@@ -419,8 +420,28 @@ def _remedy(path: Path) -> str:
     if path.is_dir():
         return "if it was cut off, mend it with `ros2 bag reindex`, or name the file in it"
     if path.exists() and path.suffix in mend:
+        profile = _profile(path)
+        if profile not in (None, "ros2"):
+            return (
+                f"its profile is '{profile}', so its messages are not of ROS 2: convert it, or, if "
+                "Twinmill exported it, take the log that it was made from"
+            )
         return mend[path.suffix]
     return "name the .bag or .mcap file, or the folder with metadata.yaml"
+
+
+def _profile(path: Path) -> str | None:
+    """What an MCAP file says that its messages are of; None: it is none, or cut off there."""
+    with path.open("rb") as stream:
+        begin = stream.read(LONGEST_PROFILE)
+    head = struct.Struct("<8sBQI")  # https://mcap.dev/spec: magic, then the record `Header`
+    if len(begin) < head.size:
+        return None
+    magic, record, _, length = head.unpack_from(begin)
+    name = begin[head.size : head.size + length]
+    if magic != b"\x89MCAP0\r\n" or record != 1 or len(name) != length:
+        return None
+    return name.decode(errors="replace")
 
 
 @dataclass
