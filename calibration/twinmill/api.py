@@ -32,7 +32,7 @@ from rich.console import RenderableType
 from threadpoolctl import threadpool_limits
 
 from twinmill import report
-from twinmill.arguments import checked, in_python, known
+from twinmill.arguments import checked, known
 from twinmill.data.importers import import_log as _import
 from twinmill.data.importers.from_arrays import (
     MOST_ROBOTS,
@@ -69,7 +69,7 @@ from twinmill.experiment.design import check as check_limits
 from twinmill.export.carried import open_robot
 from twinmill.export.log_files import export_log
 from twinmill.export.model_files import export_model
-from twinmill.files import plain
+from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
@@ -100,8 +100,6 @@ from twinmill.shown import (
     Reported,
     Shown,
     path_of,
-    replacing_in_python,
-    said_in_python,
 )
 from twinmill.swarm.compare import compare_swarm
 from twinmill.swarm.metrics import swarm_metrics
@@ -326,10 +324,9 @@ class Log(Shown):
         model = None if model is None else _model(model)
         key = model.file.hash if model else ""
         if key not in self._measurements:
-            with said_in_python():
-                self._measurements[key] = load_measurements(
-                    [*self._logs, *self._tables], model.file.model if model else None
-                )
+            self._measurements[key] = load_measurements(
+                [*self._logs, *self._tables], model.file.model if model else None
+            )
         return self._measurements[key]
 
     @property
@@ -504,7 +501,7 @@ class Log(Shown):
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
         (run,) = self._recorded("file of its own")
-        with replacing_in_python(path, force) as temporary:
+        with replacing(path_of("path", path, A_PATH), force) as temporary:
             temporary.write_bytes(run.read_bytes())
 
     def export(
@@ -542,14 +539,13 @@ class Log(Shown):
         logs, file = self._recorded("messages"), _model(model).file
         if len(logs) > 1:
             raise ValueError(f"{path}: one export cannot hold {len(logs)} logs; export each.")
-        with said_in_python():
-            done = export_log(
-                *(logs[0].path, form, path_of("path", path, A_PATH)),
-                model=file.model,
-                command="twinmill.Log.export",
-                force=force,
-                data=logs[0].data,
-            )
+        done = export_log(
+            *(logs[0].path, form, path_of("path", path, A_PATH)),
+            model=file.model,
+            command="twinmill.Log.export",
+            force=force,
+            data=logs[0].data,
+        )
         return done.files
 
     def compare_swarm(
@@ -591,8 +587,7 @@ class Log(Shown):
             raise LogError(f"compare_swarm: is of one log, and these are {len(logs)}.")
         series = swarm_metrics(logs[0], *_scale(twin))
         seeds = range(1, int(n_seeds) + 1)
-        with said_in_python():
-            result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
+        result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
         return SwarmComparison(result)
 
     def to_json(self) -> dict[str, Any]:
@@ -750,7 +745,7 @@ class Model(Shown):
             Traceback (most recent call last):
             ValueError: fitted.toml: exists; choose another name, or replace it with force=True.
         """
-        with replacing_in_python(path, force) as temporary:
+        with replacing(path_of("path", path, A_PATH), force) as temporary:
             temporary.write_text(self.file.text)
 
     def compare(self, log: "Log | str | Path") -> "Comparison":
@@ -892,12 +887,11 @@ class Model(Shown):
         form = _format(to, ModelFormat)
         checked("robot", robot, (Integral, NoneType), "the number of a robot")
         out = path_of("path", path, A_PATH)
-        with said_in_python():
-            done = export_model(
-                *(open_robot(self.file, robot, None), form, out),
-                ranges_stem=out.with_suffix("") if ranges else None,
-                force=force,
-            )
+        done = export_model(
+            *(open_robot(self.file, robot, None), form, out),
+            ranges_stem=out.with_suffix("") if ranges else None,
+            force=force,
+        )
         return [*(left.sentence() for left in done.left), *done.warnings]
 
     def explain(
@@ -1570,13 +1564,12 @@ def compare_runs(
     if not 0 < rate < 1:
         raise ValueError(f"alarm_rate: is {rate:g}, and must be between 0 and 1.")
     given = [_log(log) for log in (first, second, *healthy)]
-    with said_in_python():
-        a, b, *others = (of_robot(g.measurements(model), g.paths[0].name, robot) for g in given)
-        known = (a.log_sha256, b.log_sha256)
-        others = [m for m in others if m.log_sha256 not in known]
-        found = _compare_runs(
-            *(a, b, model.file), healthy=others, rate=rate, tell=progress or (lambda _: None)
-        )
+    a, b, *others = (of_robot(g.measurements(model), g.paths[0].name, robot) for g in given)
+    known = (a.log_sha256, b.log_sha256)
+    others = [m for m in others if m.log_sha256 not in known]
+    found = _compare_runs(
+        *(a, b, model.file), healthy=others, rate=rate, tell=progress or (lambda _: None)
+    )
     return RunComparison(found)
 
 
@@ -2026,7 +2019,7 @@ def import_log(
     given["detections"] = detections
     files = {k: None if path is None else path_of(k, path, A_PATH) for k, path in given.items()}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
-    with TemporaryDirectory(prefix="twinmill.") as folder, said_in_python():
+    with TemporaryDirectory(prefix="twinmill.") as folder:
         out = Path(folder) / "imported.lcmlog"
         told = _import.import_log(
             *(files["poses"], files["commands"], out),
@@ -2038,7 +2031,7 @@ def import_log(
             options=how,
         )
         made = log_of(out.read_bytes(), out.name)
-        said = [in_python(text) for text in told["warnings"] if text not in made.warnings]
+        said = [text for text in told["warnings"] if text not in made.warnings]
         return Log([made], said=said)
 
 
@@ -2112,7 +2105,9 @@ def _run_twin(place: Path, options: list[Any]) -> list[str]:
     )
     if done.returncode:
         said = done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed."
-        raise ValueError(in_python(said))
+        for option in filter(lambda word: str(word).startswith("--"), options):
+            said = said.replace(option, option[2:].replace("-", "_"))
+        raise ValueError(said)
     return [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
 
 

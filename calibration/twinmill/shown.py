@@ -3,8 +3,6 @@
 
 import html
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
 from typing import Any, Self
@@ -13,8 +11,8 @@ import pandas as pd
 from rich.console import RenderableType
 
 from twinmill import report
-from twinmill.arguments import checked, in_python
-from twinmill.files import check_report, plain, replacing
+from twinmill.arguments import checked
+from twinmill.files import check_report, plain
 from twinmill.terminal import PlainConsole
 from twinmill.version import __version__
 
@@ -110,20 +108,3 @@ def path_of(name: str, path: Any, wanted: str) -> Path:
     if not str(checked(name, path, (str, Path), wanted)):
         raise ValueError(f"{name}: is empty, and must be {wanted}.")
     return Path(path)
-
-
-@contextmanager
-def replacing_in_python(path: str | Path, force: bool) -> Iterator[Path]:
-    """As `replacing`, in the words of the library."""
-    with said_in_python(), replacing(path_of("path", path, A_PATH), force) as temporary:
-        yield temporary
-
-
-@contextmanager
-def said_in_python() -> Iterator[None]:
-    """Errors of the library in the words of Python: options of commands as arguments."""
-    try:
-        yield
-    except ValueError as error:
-        error.args = (in_python(str(error)),)
-        raise

@@ -13,6 +13,7 @@ import typer
 
 from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
+from twinmill_cli.spelling import typed
 
 if working():  # not for --help
     from twinmill.data.importers.columns import Guess, is_usual, to_toml
@@ -289,8 +290,8 @@ def _command(
     if explain_columns_to:
         _refuse_others(context, "--explain-columns", EXPLAINED, "it only says what columns are")
         asked = {
-            "poses": files_of(poses, "--poses"),
-            "commands": files_of(commands, "--commands"),
+            "poses": files_of(poses, "poses"),
+            "commands": files_of(commands, "commands"),
         }
         explained = explain_columns(
             *(paths[0] if paths else None for paths in asked.values()),
@@ -364,7 +365,9 @@ def _list(bag: Path, topics: list[Topic], log: str, as_json: bool) -> None:
     for pose, command in pairs:
         words += ["--pose", pose, *(["--command", command] if command else [])]
     steered = {t.name for t in topics if t.kind in STEERED} & {command for _, command in pairs}
-    words += numbering(pairs) + (["--wheelbase-m", "METRES"] if steered else [])
+    words += shlex.split(typed(numbering(pairs), None)) + (
+        ["--wheelbase-m", "METRES"] if steered else []
+    )
     line = shlex.join([*words, "-o", log]) if pairs else None
     if as_json:
         print_object({"topics": [vars(t) for t in topics], "command": line})

@@ -8,8 +8,10 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from twinmill.arguments import spelled
 from twinmill_cli.ending import leave
 from twinmill_cli.lazy import LazyCommand
+from twinmill_cli.spelling import typed
 
 # Name, module and what it does, in the order of the help. The modules are imported when called.
 COMMANDS = (
@@ -235,6 +237,7 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     show_version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
@@ -249,6 +252,7 @@ def _options(
     Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line, 3 something
     changed (compare-runs, drift), 130 stopped.
     """
+    context.with_resource(spelled(typed))
 
 
 def run(arguments: list[str]) -> Any:

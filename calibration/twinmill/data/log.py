@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.data.lcm_log import (
     Events,
     LogError,
@@ -174,7 +175,7 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
             raise LogError(
                 f"{path.name}: tells what cameras saw ({names}), and nothing of where the robots "
                 "were or what they were told; import the poses and commands of the same time with "
-                "it: twinmill import --poses P --commands C --detections D."
+                f"it ({option('poses')}, {option('commands')}, {option('detections')})."
             )
         raise LogError(
             f"{path.name}: no channel {channel_prefix}R<nn>_TELEMETRY, _DRIVE or _POSE "

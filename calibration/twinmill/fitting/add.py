@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
@@ -388,7 +389,7 @@ def _check_not_new(held: Collection[str], fresh: Sequence[Parameter]) -> None:
     if name := next((p.name for p in fresh if p.name in held), None):
         raise ModelError(
             f"{name}: is of what is added, and has no value yet that could be held; add it, put a "
-            "value in with `twinmill set`, and hold that with `twinmill fit --hold`."
+            f"value in with `twinmill set`, and hold that in a fit ({option('hold')})."
         )
 
 

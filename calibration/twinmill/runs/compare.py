@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.chance import f_above, t_quantile
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
@@ -242,7 +243,7 @@ def of_robot(
     ids = [m.track.robot_id for m in runs]
     known = ", ".join(map(str, ids))
     if robot is None and len(runs) > 1:
-        raise LogError(f"{name}: has robots {known}; say which one with --robot.")
+        raise LogError(f"{name}: has robots {known}; say which one with {option('robot')}.")
     chosen = [m for m in runs if robot in (None, m.track.robot_id)]
     if not chosen:
         raise LogError(f"{name}: has no robot {robot}, but {known}.")
