@@ -93,7 +93,7 @@ def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
     """The object of a command that failed before it had printed one."""
     if "--json" not in words or has_told():
         return
-    findings = [] if words[0] in OF_TABLES else _findings(error)
+    findings = [] if {*words[:2]} & {*OF_TABLES} else _findings(error)
     with suppress(OSError):  # stdout itself may be what failed
         print_object({"verdict": "bad_input", "sentence": sentence, "input": findings})
 
