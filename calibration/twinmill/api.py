@@ -74,10 +74,12 @@ from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
 from twinmill.fitting import model_comparison as _models
+from twinmill.fitting.equations import EQUATION
 from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
+from twinmill.model.python_effect import PythonEffect
 from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
 from twinmill.report import detections, sections, show
@@ -787,12 +789,17 @@ class Model(Shown):
 
     @_one_thread
     def add(
-        self, effect: str, log: "Log | str | Path", robot: int | None = None, **texts: str
+        self,
+        effect: str | PythonEffect,
+        log: "Log | str | Path",
+        robot: int | None = None,
+        **texts: str,
     ) -> "Addition":
         """Adds an effect, fits it with all the rest, and judges it on data it was not fitted to.
 
         Args:
-            effect: name from the catalogue; of one robot also `gains`.
+            effect: name from the catalogue, of one robot also `gains`; or what `python_effect`
+                made.
             log: what it is fitted to.
             robot: number of the robot that alone has it; by default all have.
             texts: of the effect `equation`: adds_to, formula, state_rate and second_rate.
@@ -813,6 +820,10 @@ class Model(Shown):
         """
         checked("robot", robot, (Integral, NoneType), "the number of a robot")
         own = () if robot is None else (_add.OWN_GAINS,)
+        name, priors = effect, None
+        if isinstance(effect, PythonEffect):
+            name, texts, priors = effect.name, effect.texts, effect.priors
+            effect = EQUATION
         known("effect", (effect,), {*catalogue(), *own})
         for key, text in texts.items():
             checked(key, text, str, "a text of the effect `equation`; numbers are fitted")
@@ -821,12 +832,29 @@ class Model(Shown):
             effect,
             measurements,
             self.file,
-            path=Path(f"{self.file.path.stem}+{effect}.toml"),
-            command=f"twinmill.add {effect}",
+            path=Path(f"{self.file.path.stem}+{name}.toml"),
+            command=f"twinmill.add {name}",
             texts=texts,
+            priors=priors,
             robot_id=None if robot is None else int(robot),
         )
         return _told(Addition(result), measurements)
+
+    def numbers(self, effect: PythonEffect) -> dict[str, float]:
+        """Values of an effect that is written in Python, by the names that it has for them.
+
+        Raises:
+            ValueError: the model does not have it.
+
+        Examples:
+            >>> @tm.python_effect("vx_mps", {"drag": tm.Number("s/m", low=0)})
+            ... def air(vx, drag):
+            ...     return -drag * vx * abs(vx)
+            >>> list(tm.Model.load("turbopi.toml").add(air, "run.lcmlog").model.numbers(air))
+            ['drag']
+        """
+        checked("effect", effect, PythonEffect, "an effect made by `python_effect`")
+        return {own: self[name] for own, name in effect.names(self.file.model).items()}
 
     def set(self, values: Mapping[str, float]) -> "Model":
         """Sets numbers by hand; what fits told of these is forgotten.

@@ -5,7 +5,7 @@ An effect on motion is fitted together with the base; one of the camera to detec
 the model's other effects of the camera.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -195,6 +195,7 @@ def add_to_model(
     path: Path,
     command: str,
     texts: dict[str, str] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
 ) -> AddResult:
@@ -207,6 +208,7 @@ def add_to_model(
         path: where the new model may be written.
         command: recorded in it.
         texts: the effect's formula and the like, by name.
+        priors: mean and standard deviation of its parameters, by name, where they are known.
         held: names of quantities that keep their values; beside an effect of the camera all of the
             motion do.
         robot_id: of the robot that alone has it; by default all have.
@@ -237,8 +239,11 @@ def add_to_model(
         for own in judged(enlarged):
             check_states(own.data, _begun(own.model, fresh))
         fresh = sized(fresh, enlarged)
+    known = {f"{name}.{own}": prior for own, prior in (priors or {}).items()}
+    fresh = Choice(priors=known).of(fresh, richer)
     if robot_id is None:
-        moved, found = fitted(enlarged, [*old, *fresh], fresh)
+        unknown = [p for p in fresh if p.name not in known]
+        moved, found = fitted(enlarged, [*old, *fresh], unknown, informed=known)
     else:
         moved, found = fitted(with_own(enlarged, robot_id, fresh), old, fresh)
     _check_acts(found, fresh, texts or {})
