@@ -202,7 +202,7 @@ def test_a_model_of_several_equations_asks_which(copy, model):
     path = model(EQUATIONS["tiles"])
     path.write_text(path.read_text() + '[[effect]]\nname = "equation"\nformula = "p2*vx"\np2 = 1\n')
     words = ["effects", "new", "play", "--from", str(path), "--into", str(copy)]
-    with pytest.raises(ValueError, match="by equation: equation, equation#2"):
+    with pytest.raises(ValueError, match="by --equation: equation, equation#2"):
         run(words)
     run([*words, "--equation", "equation#2"])
     source = (copy / "twin/effects/catalogue/play.cpp").read_text()
