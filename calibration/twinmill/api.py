@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `import twinmill as tm` gives: logs, models, and what one tells of the other.
+"""The library that `import twinmill as tm` gives: logs, models, and comparisons of the two.
 
 Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. The
 example of a method goes on where that of its class, or of the function that made it, ends. All
@@ -438,7 +438,7 @@ class Log(Shown):
         return dataset.swap_dims(row="t_s").drop_vars("row") if one else dataset
 
     def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
-        """What the swarm does over time.
+        """Measures of the swarm's behaviour over time.
 
         Args:
             model: whose range of sight and radius of the body scale the metrics.
@@ -593,7 +593,7 @@ class Log(Shown):
         return SwarmComparison(result)
 
     def to_json(self) -> dict[str, Any]:
-        """What the log holds, in numbers and names.
+        """Contents of the log, in numbers and names.
 
         Returns:
             paths, robots, duration_s, warnings.
@@ -670,7 +670,7 @@ class Model(Shown):
 
     @property
     def name(self) -> str:
-        """Of its file; of a model that was not saved, what it was made from.
+        """Name of its file; of a model that was not saved, of the one it was made from.
 
         Examples:
             >>> tm.Model.load("turbopi.toml").name
@@ -713,7 +713,7 @@ class Model(Shown):
         return pd.DataFrame(self.file.model.values())
 
     def to_json(self) -> dict[str, Any]:
-        """What the model holds.
+        """Contents of the model.
 
         Returns:
             name, sha256 of its text, effects, values by full name (units as of `table`).
@@ -1257,7 +1257,7 @@ class Finding(Shown):
         self.parameters = {key_of(e.name): e.value for e in finding.parameters}
 
     def to_json(self) -> dict[str, Any]:
-        """What the diagnosis tells of this effect.
+        """All results of the diagnosis for this effect.
 
         Returns:
             An entry of findings[] of `twinmill diagnose --json`, and what ranking[] has beside.
@@ -1311,7 +1311,7 @@ class Finding(Shown):
 
 
 class Diagnosis(Reported):
-    """What a model lacks.
+    """Physical effects that a model lacks.
 
     Attributes:
         verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue
@@ -2092,7 +2092,7 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _of_robots(name: str, given: Any, kinds: Any, wanted: str) -> Any:
-    """What is given for all robots, or by robot, once it is known to be of its kind."""
+    """Checks an option's value, which is one for all robots or a dictionary by robot."""
     checked(name, given, kinds, wanted)
     if isinstance(given, Mapping) and kinds is not Mapping:
         of_one: tuple[Any, str] = NUMBER if Real in kinds else NAMES
@@ -2110,7 +2110,7 @@ def _format(to: str, forms: type[Form]) -> Form:
 
 
 def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) -> Limits:
-    """Of a designed run, from what came."""
+    """Checks the limits of a designed run."""
     checked("duration_s", duration_s, Real, "a number of seconds")
     checked("floor_m", floor_m, (list, tuple), "two sides in m, as (2, 1.5)")
     checked("max_duty", max_duty, Real, "a share of full duty")
@@ -2133,9 +2133,9 @@ def _run_twin(place: Path, options: list[Any]) -> list[str]:
     )
     if done.returncode:
         said = done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed."
-        for option in filter(lambda word: str(word).startswith("--"), options):
-            said = said.replace(option, option[2:].replace("-", "_"))
-        raise ValueError(said)
+        for word in ("--plant", "--n", "--seed", "--duration-s", "--behavior", "--script"):
+            said = said.replace(word, word[2:].replace("-", "_"))
+        raise ValueError(said.replace(" (--help lists the options)", ""))
     return [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
 
 

@@ -143,7 +143,7 @@ class Inference(Shown):
 
 
 class RunComparison(Reported):
-    """What changed between two runs of one robot.
+    """Changes between two runs of one robot.
 
     Attributes:
         changed: whether anything did, beyond what varies from day to day.
@@ -231,7 +231,7 @@ class NextRun(Reported):
         return pd.read_csv(StringIO(csv_text(self._result.rows)))
 
     def effects(self) -> pd.DataFrame:
-        """What the run would do for each effect in question, surest first.
+        """Power of the run for each effect in question, surest first.
 
         Returns:
             effect, rival (that could imitate it best; None: the base), margin_before and margin

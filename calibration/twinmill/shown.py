@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all objects of the library share: how they are shown, and what they are made with."""
+"""Base classes of the library's objects: how they are shown, and what they are made with."""
 
 import html
 import shutil
@@ -21,7 +21,7 @@ A_PATH = "the path of a file"
 
 
 class Shown:
-    """What all results share: one line, a table for notebooks, text for terminals, JSON.
+    """A result: one line, a table for notebooks, text for terminals, JSON.
 
     Attributes:
         left_out: sentences on robots and logs that could not be judged, and on what else is odd.
@@ -33,7 +33,7 @@ class Shown:
     input: tuple[dict[str, Any], ...] | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """The same object as `--json` of the command, without how the command was called.
+        """All numbers and names, as the command's JSON without how it was called.
 
         Returns:
             As the page Files tells; an absent number is None, so that JSON can hold all of it.
@@ -76,7 +76,7 @@ class Reported(Shown):
     """A result with a page of its own."""
 
     def _page(self) -> tuple[report.Section, str]:
-        """What is on the page, and the call that made it."""
+        """Section of the page, and the call that made it."""
         raise NotImplementedError
 
     def report(self, folder: str | Path) -> Path:

@@ -99,7 +99,7 @@ def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
 
 
 def _findings(error: Exception) -> list[dict]:
-    """What is wrong with a log that cannot be judged; empty for other errors."""
+    """Findings on a log that cannot be judged; empty for other errors."""
     reading = sys.modules.get("twinmill.data.measurement")
     if reading and isinstance(error, reading.LogError):
         return [finding.to_json() for finding in reading.findings_of(error)]

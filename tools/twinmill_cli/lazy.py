@@ -30,7 +30,7 @@ _helps = "_TWINMILL_COMPLETE" in os.environ or bool(HELP & set(_options()))
 
 
 def working() -> bool:
-    """Whether commands are imported to work, and not for their help alone."""
+    """True if commands are imported to work, and not for their help alone."""
     return not _helps
 
 

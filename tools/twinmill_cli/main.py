@@ -251,7 +251,7 @@ GROUPS = {
 
 
 class Commands(TyperGroup):
-    """What `TOP` names, with what is below; each command under its own name alone, too."""
+    """Commands of `TOP` with those below them; each under its own name alone, too."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -276,7 +276,7 @@ class Commands(TyperGroup):
 
 
 def _completes() -> bool:
-    """Whether this is about the shell's completion, which takes long to import."""
+    """True for the shell's completion, which takes long to import."""
     words = {"--install-completion", "--show-completion"}
     return "_TWINMILL_COMPLETE" in os.environ or bool(words & set(sys.argv[1:]))
 

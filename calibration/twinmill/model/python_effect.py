@@ -153,7 +153,7 @@ class PythonEffect:
 
     @property
     def card(self) -> dict[str, Any]:
-        """What it is, in the fields of a card of the catalogue."""
+        """Description in the fields of a card of the catalogue."""
         about = (inspect.getdoc(self._function) or "").partition("\n")[0]
         return {
             "name": self.name,
@@ -169,7 +169,7 @@ class PythonEffect:
         return {place: number.prior for place, number in placed if number.prior is not None}
 
     def names(self, model: native.Model) -> dict[str, str]:
-        """What a model calls its numbers, by their own names.
+        """Names of its numbers in a model, by their own names.
 
         Raises:
             ValueError: the model does not have the effect.
@@ -181,7 +181,7 @@ class PythonEffect:
         raise ValueError(f"{self.name}: the model does not have this effect; add it first.")
 
     def __call__(self, *signals: Any, **named: Any) -> Any:
-        """What the function gives, as if it were no effect."""
+        """Value of the function itself."""
         return self._function(*signals, **named)
 
     def __repr__(self) -> str:
