@@ -44,6 +44,9 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.defaults import Verdict as Verdict
     from twinmill.fitting.settings import FitSettings as FitSettings
     from twinmill.model.model_file import ModelError as ModelError
+    from twinmill.model.python_effect import Number as Number
+    from twinmill.model.python_effect import PythonEffect as PythonEffect
+    from twinmill.model.python_effect import python_effect as python_effect
     from twinmill.results import Comparison as Comparison
     from twinmill.results import Effect as Effect
     from twinmill.results import Inference as Inference
@@ -58,6 +61,7 @@ _HOME = {
     "FitSettings": "twinmill.fitting.settings",
     "LogError": "twinmill.data.log",
     "ModelError": "twinmill.model.model_file",
+    **dict.fromkeys(("Number", "PythonEffect", "python_effect"), "twinmill.model.python_effect"),
     **dict.fromkeys(
         (
             *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `import twinmill as tm` gives: logs, models, and what one tells of the other.
+"""The library that `import twinmill as tm` gives: logs, models, and comparisons of the two.
 
 Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. The
 example of a method goes on where that of its class, or of the function that made it, ends. All
@@ -32,7 +32,7 @@ from rich.console import RenderableType
 from threadpoolctl import threadpool_limits
 
 from twinmill import report
-from twinmill.arguments import checked, in_python, known
+from twinmill.arguments import checked, known
 from twinmill.data.importers import import_log as _import
 from twinmill.data.importers.from_arrays import (
     MOST_ROBOTS,
@@ -69,15 +69,17 @@ from twinmill.experiment.design import check as check_limits
 from twinmill.export.carried import open_robot
 from twinmill.export.log_files import export_log
 from twinmill.export.model_files import export_model
-from twinmill.files import plain
+from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
 from twinmill.fitting import model_comparison as _models
+from twinmill.fitting.equations import EQUATION
 from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
+from twinmill.model.python_effect import PythonEffect
 from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
 from twinmill.report import detections, sections, show
@@ -100,8 +102,6 @@ from twinmill.shown import (
     Reported,
     Shown,
     path_of,
-    replacing_in_python,
-    said_in_python,
 )
 from twinmill.swarm.compare import compare_swarm
 from twinmill.swarm.metrics import swarm_metrics
@@ -326,10 +326,9 @@ class Log(Shown):
         model = None if model is None else _model(model)
         key = model.file.hash if model else ""
         if key not in self._measurements:
-            with said_in_python():
-                self._measurements[key] = load_measurements(
-                    [*self._logs, *self._tables], model.file.model if model else None
-                )
+            self._measurements[key] = load_measurements(
+                [*self._logs, *self._tables], model.file.model if model else None
+            )
         return self._measurements[key]
 
     @property
@@ -439,7 +438,7 @@ class Log(Shown):
         return dataset.swap_dims(row="t_s").drop_vars("row") if one else dataset
 
     def metrics(self, model: "Model | str | Path | None" = None) -> pd.DataFrame:
-        """What the swarm does over time.
+        """Measures of the swarm's behaviour over time.
 
         Args:
             model: whose range of sight and radius of the body scale the metrics.
@@ -504,7 +503,7 @@ class Log(Shown):
         if len(self.paths) > 1:
             raise ValueError(f"{path}: one file cannot hold {len(self.paths)} logs; save each.")
         (run,) = self._recorded("file of its own")
-        with replacing_in_python(path, force) as temporary:
+        with replacing(path_of("path", path, A_PATH), force) as temporary:
             temporary.write_bytes(run.read_bytes())
 
     def export(
@@ -542,14 +541,13 @@ class Log(Shown):
         logs, file = self._recorded("messages"), _model(model).file
         if len(logs) > 1:
             raise ValueError(f"{path}: one export cannot hold {len(logs)} logs; export each.")
-        with said_in_python():
-            done = export_log(
-                *(logs[0].path, form, path_of("path", path, A_PATH)),
-                model=file.model,
-                command="twinmill.Log.export",
-                force=force,
-                data=logs[0].data,
-            )
+        done = export_log(
+            *(logs[0].path, form, path_of("path", path, A_PATH)),
+            model=file.model,
+            command="twinmill.Log.export",
+            force=force,
+            data=logs[0].data,
+        )
         return done.files
 
     def compare_swarm(
@@ -591,12 +589,11 @@ class Log(Shown):
             raise LogError(f"compare_swarm: is of one log, and these are {len(logs)}.")
         series = swarm_metrics(logs[0], *_scale(twin))
         seeds = range(1, int(n_seeds) + 1)
-        with said_in_python():
-            result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
+        result = compare_swarm(logs[0], series, twin, seeds=seeds, behavior=behavior)
         return SwarmComparison(result)
 
     def to_json(self) -> dict[str, Any]:
-        """What the log holds, in numbers and names.
+        """Contents of the log, in numbers and names.
 
         Returns:
             paths, robots, duration_s, warnings.
@@ -673,7 +670,7 @@ class Model(Shown):
 
     @property
     def name(self) -> str:
-        """Of its file; of a model that was not saved, what it was made from.
+        """Name of its file; of a model that was not saved, of the one it was made from.
 
         Examples:
             >>> tm.Model.load("turbopi.toml").name
@@ -716,7 +713,7 @@ class Model(Shown):
         return pd.DataFrame(self.file.model.values())
 
     def to_json(self) -> dict[str, Any]:
-        """What the model holds.
+        """Contents of the model.
 
         Returns:
             name, sha256 of its text, effects, values by full name (units as of `table`).
@@ -750,7 +747,7 @@ class Model(Shown):
             Traceback (most recent call last):
             ValueError: fitted.toml: exists; choose another name, or replace it with force=True.
         """
-        with replacing_in_python(path, force) as temporary:
+        with replacing(path_of("path", path, A_PATH), force) as temporary:
             temporary.write_text(self.file.text)
 
     def compare(self, log: "Log | str | Path") -> "Comparison":
@@ -792,12 +789,17 @@ class Model(Shown):
 
     @_one_thread
     def add(
-        self, effect: str, log: "Log | str | Path", robot: int | None = None, **texts: str
+        self,
+        effect: str | PythonEffect,
+        log: "Log | str | Path",
+        robot: int | None = None,
+        **texts: str,
     ) -> "Addition":
         """Adds an effect, fits it with all the rest, and judges it on data it was not fitted to.
 
         Args:
-            effect: name from the catalogue; of one robot also `gains`.
+            effect: name from the catalogue, of one robot also `gains`; or what `python_effect`
+                made.
             log: what it is fitted to.
             robot: number of the robot that alone has it; by default all have.
             texts: of the effect `equation`: adds_to, formula, state_rate and second_rate.
@@ -818,6 +820,10 @@ class Model(Shown):
         """
         checked("robot", robot, (Integral, NoneType), "the number of a robot")
         own = () if robot is None else (_add.OWN_GAINS,)
+        name, priors = effect, None
+        if isinstance(effect, PythonEffect):
+            name, texts, priors = effect.name, effect.texts, effect.priors
+            effect = EQUATION
         known("effect", (effect,), {*catalogue(), *own})
         for key, text in texts.items():
             checked(key, text, str, "a text of the effect `equation`; numbers are fitted")
@@ -826,12 +832,29 @@ class Model(Shown):
             effect,
             measurements,
             self.file,
-            path=Path(f"{self.file.path.stem}+{effect}.toml"),
-            command=f"twinmill.add {effect}",
+            path=Path(f"{self.file.path.stem}+{name}.toml"),
+            command=f"twinmill.add {name}",
             texts=texts,
+            priors=priors,
             robot_id=None if robot is None else int(robot),
         )
         return _told(Addition(result), measurements)
+
+    def numbers(self, effect: PythonEffect) -> dict[str, float]:
+        """Values of an effect that is written in Python, by the names that it has for them.
+
+        Raises:
+            ValueError: the model does not have it.
+
+        Examples:
+            >>> @tm.python_effect("vx_mps", {"drag": tm.Number("s/m", low=0)})
+            ... def air(vx, drag):
+            ...     return -drag * vx * abs(vx)
+            >>> list(tm.Model.load("turbopi.toml").add(air, "run.lcmlog").model.numbers(air))
+            ['drag']
+        """
+        checked("effect", effect, PythonEffect, "an effect made by `python_effect`")
+        return {own: self[name] for own, name in effect.names(self.file.model).items()}
 
     def set(self, values: Mapping[str, float]) -> "Model":
         """Sets numbers by hand; what fits told of these is forgotten.
@@ -892,12 +915,11 @@ class Model(Shown):
         form = _format(to, ModelFormat)
         checked("robot", robot, (Integral, NoneType), "the number of a robot")
         out = path_of("path", path, A_PATH)
-        with said_in_python():
-            done = export_model(
-                *(open_robot(self.file, robot, None), form, out),
-                ranges_stem=out.with_suffix("") if ranges else None,
-                force=force,
-            )
+        done = export_model(
+            *(open_robot(self.file, robot, None), form, out),
+            ranges_stem=out.with_suffix("") if ranges else None,
+            force=force,
+        )
         return [*(left.sentence() for left in done.left), *done.warnings]
 
     def explain(
@@ -1235,7 +1257,7 @@ class Finding(Shown):
         self.parameters = {key_of(e.name): e.value for e in finding.parameters}
 
     def to_json(self) -> dict[str, Any]:
-        """What the diagnosis tells of this effect.
+        """All results of the diagnosis for this effect.
 
         Returns:
             An entry of findings[] of `twinmill diagnose --json`, and what ranking[] has beside.
@@ -1289,7 +1311,7 @@ class Finding(Shown):
 
 
 class Diagnosis(Reported):
-    """What a model lacks.
+    """Physical effects that a model lacks.
 
     Attributes:
         verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue
@@ -1570,13 +1592,12 @@ def compare_runs(
     if not 0 < rate < 1:
         raise ValueError(f"alarm_rate: is {rate:g}, and must be between 0 and 1.")
     given = [_log(log) for log in (first, second, *healthy)]
-    with said_in_python():
-        a, b, *others = (of_robot(g.measurements(model), g.paths[0].name, robot) for g in given)
-        known = (a.log_sha256, b.log_sha256)
-        others = [m for m in others if m.log_sha256 not in known]
-        found = _compare_runs(
-            *(a, b, model.file), healthy=others, rate=rate, tell=progress or (lambda _: None)
-        )
+    a, b, *others = (of_robot(g.measurements(model), g.paths[0].name, robot) for g in given)
+    known = (a.log_sha256, b.log_sha256)
+    others = [m for m in others if m.log_sha256 not in known]
+    found = _compare_runs(
+        *(a, b, model.file), healthy=others, rate=rate, tell=progress or (lambda _: None)
+    )
     return RunComparison(found)
 
 
@@ -2061,7 +2082,7 @@ def import_log(
     wanted = f"{A_PATH}; data frames go into tm.Log.from_frames"
     files = {k: None if path is None else path_of(k, path, wanted) for k, path in given.items()}
     several = checked("io_tsv", io_tsv, (list, tuple), "a list of paths")
-    with TemporaryDirectory(prefix="twinmill.") as folder, said_in_python():
+    with TemporaryDirectory(prefix="twinmill.") as folder:
         out = Path(folder) / "imported.lcmlog"
         told = _import.import_log(
             *(files["poses"], files["commands"], out),
@@ -2073,7 +2094,7 @@ def import_log(
             options=how,
         )
         made = log_of(out.read_bytes(), out.name)
-        said = [in_python(text) for text in told["warnings"] if text not in made.warnings]
+        said = [text for text in told["warnings"] if text not in made.warnings]
         return Log([made], said=said)
 
 
@@ -2106,7 +2127,7 @@ def _import_options(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _of_robots(name: str, given: Any, kinds: Any, wanted: str) -> Any:
-    """What is given for all robots, or by robot, once it is known to be of its kind."""
+    """Checks an option's value, which is one for all robots or a dictionary by robot."""
     checked(name, given, kinds, wanted)
     if isinstance(given, Mapping) and kinds is not Mapping:
         of_one: tuple[Any, str] = NUMBER if Real in kinds else NAMES
@@ -2124,7 +2145,7 @@ def _format(to: str, forms: type[Form]) -> Form:
 
 
 def _limits(duration_s: float, floor_m: tuple[float, float], max_duty: float) -> Limits:
-    """Of a designed run, from what came."""
+    """Checks the limits of a designed run."""
     checked("duration_s", duration_s, Real, "a number of seconds")
     checked("floor_m", floor_m, (list, tuple), "two sides in m, as (2, 1.5)")
     checked("max_duty", max_duty, Real, "a share of full duty")
@@ -2147,7 +2168,9 @@ def _run_twin(place: Path, options: list[Any]) -> list[str]:
     )
     if done.returncode:
         said = done.stderr.strip().removeprefix("twin_run: ") or "twin_run failed."
-        raise ValueError(in_python(said))
+        for word in ("--plant", "--n", "--seed", "--duration-s", "--behavior", "--script"):
+            said = said.replace(word, word[2:].replace("-", "_"))
+        raise ValueError(said.replace(" (--help lists the options)", ""))
     return [line.removeprefix("twin_run: ") for line in done.stderr.splitlines()]
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked of the library's arguments, and its sentences as Python says them."""
+"""Arguments of the library: checked, and written in sentences as the reader would give them."""
 
 import difflib
-import re
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -44,14 +44,46 @@ def known(what: str, names: Iterable[str], all_names: Collection[str]) -> tuple[
     return names
 
 
-def in_python(sentence: str) -> str:
-    """A sentence of a program, with its options as arguments of the library."""
-    sentence = sentence.replace(" (--help lists the options)", "").replace("--force", "force=True")
-    sentence = re.sub(
-        r"--(pose-\w+-\w+) R(\d+)=(-?\d+(?:\.\d+)?)",
-        lambda own: f"{own[1].replace('-', '_')}={{{int(own[2])}: {own[3]}}}",
-        sentence,
+def _in_python(given: Mapping[str, Any], robot_id: int | None) -> str:
+    """Options as arguments of the library, by robot where they are of one."""
+    return ", ".join(
+        name if value is None else f"{name}={value if robot_id is None else {robot_id: value}!r}"
+        for name, value in given.items()
     )
-    return re.sub(
-        r"(?<![\w-])--([a-z][a-z-]*)", lambda option: option[1].replace("-", "_"), sentence
-    )
+
+
+Spelling = Callable[[Mapping[str, Any], int | None], str]
+_spelling: Spelling = _in_python
+
+
+def spelling() -> Spelling:
+    """How options are written now; another process is told with it."""
+    return _spelling
+
+
+@contextmanager
+def spelled(way: Spelling) -> Iterator[None]:
+    """Sentences made meanwhile, in any thread, write options this way."""
+    global _spelling
+    before, _spelling = _spelling, way
+    try:
+        yield
+    finally:
+        _spelling = before
+
+
+def options(given: Mapping[str, Any], robot_id: int | None = None) -> str:
+    """Options in a sentence, as the reader writes them: here as arguments in Python.
+
+    A program with another way to give them says so with `spelled`.
+
+    Args:
+        given: value by name, as the library takes it; None leaves the value to the reader.
+        robot_id: whose the values are; None: of all.
+    """
+    return _spelling(given, robot_id)
+
+
+def option(name: str, value: Any = None, robot_id: int | None = None) -> str:
+    """One of `options`."""
+    return options({name: value}, robot_id)

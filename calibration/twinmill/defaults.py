@@ -34,7 +34,7 @@ Certainty = Literal["sure", "group", "doubtful"]
 
 
 class Question(StrEnum):
-    """What is asked of a design."""
+    """Design questions."""
 
     HOW_MANY = "how-many"
     HOW_FAST = "how-fast"
@@ -43,7 +43,7 @@ class Question(StrEnum):
 
 
 class LogFormat(StrEnum):
-    """What a log can be exported to."""
+    """File formats for a log."""
 
     MCAP = "mcap"
     CSV = "csv"
@@ -52,7 +52,7 @@ class LogFormat(StrEnum):
 
 
 class ModelFormat(StrEnum):
-    """What a model can be exported to."""
+    """File formats for a model."""
 
     MJCF = "mjcf"
     SDF = "sdf"

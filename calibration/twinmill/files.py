@@ -10,6 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from twinmill.arguments import option
+
 
 def plain(value: Any) -> Any:
     """A value of which JSON can hold all: numpy's numbers as Python's, NaN as null."""
@@ -53,7 +55,7 @@ def check_absent(path: Path, force: bool | None) -> None:
 
 
 def _taken(path: Path, force: bool | None) -> str:
-    remedy = "." if force is None else ", or replace it with --force."
+    remedy = "." if force is None else f", or replace it with {option('force', True)}."
     return f"{path}: exists; choose another name{remedy}"
 
 

@@ -13,7 +13,7 @@ from twinmill import report
 from twinmill.arguments import checked
 from twinmill.experiment.design import Plan
 from twinmill.experiment.played import csv_text
-from twinmill.files import plain
+from twinmill.files import plain, replacing
 from twinmill.fitting import compare as _compare
 from twinmill.inference import infer as _infer
 from twinmill.report import (
@@ -29,7 +29,7 @@ from twinmill.report import (
 )
 from twinmill.report import next_run as next_run_report
 from twinmill.runs import compare as _compare_runs
-from twinmill.shown import Reported, Shown, replacing_in_python
+from twinmill.shown import A_PATH, Reported, Shown, path_of
 from twinmill.swarm import compare as _compare_swarm
 
 NOT_SAVED = next_run_report.How("Not written yet: `run.save(path)` of this result does that.", [])
@@ -143,7 +143,7 @@ class Inference(Shown):
 
 
 class RunComparison(Reported):
-    """What changed between two runs of one robot.
+    """Changes between two runs of one robot.
 
     Attributes:
         changed: whether anything did, beyond what varies from day to day.
@@ -231,7 +231,7 @@ class NextRun(Reported):
         return pd.read_csv(StringIO(csv_text(self._result.rows)))
 
     def effects(self) -> pd.DataFrame:
-        """What the run would do for each effect in question, surest first.
+        """Power of the run for each effect in question, surest first.
 
         Returns:
             effect, rival (that could imitate it best; None: the base), margin_before and margin
@@ -270,7 +270,7 @@ class NextRun(Reported):
             >>> from tempfile import mkdtemp
             >>> run.save(Path(mkdtemp()) / "next.csv")
         """
-        with replacing_in_python(path, force) as temporary:
+        with replacing(path_of("path", path, A_PATH), force) as temporary:
             temporary.write_text(csv_text(self._result.rows))
 
     def _page(self) -> tuple[report.Section, str]:

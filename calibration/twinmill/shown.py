@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all objects of the library share: how they are shown, and what they are made with."""
+"""Base classes of the library's objects: how they are shown, and what they are made with."""
 
 import html
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
 from typing import Any, Self
@@ -13,8 +11,8 @@ import pandas as pd
 from rich.console import RenderableType
 
 from twinmill import report
-from twinmill.arguments import checked, in_python
-from twinmill.files import check_report, plain, replacing
+from twinmill.arguments import checked
+from twinmill.files import check_report, plain
 from twinmill.terminal import PlainConsole
 from twinmill.version import __version__
 
@@ -23,7 +21,7 @@ A_PATH = "the path of a file"
 
 
 class Shown:
-    """What all results share: one line, a table for notebooks, text for terminals, JSON.
+    """A result: one line, a table for notebooks, text for terminals, JSON.
 
     Attributes:
         left_out: sentences on robots and logs that could not be judged, and on what else is odd.
@@ -35,7 +33,7 @@ class Shown:
     input: tuple[dict[str, Any], ...] | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """The same object as `--json` of the command, without how the command was called.
+        """All numbers and names, as the command's JSON without how it was called.
 
         Returns:
             As the page Files tells; an absent number is None, so that JSON can hold all of it.
@@ -78,7 +76,7 @@ class Reported(Shown):
     """A result with a page of its own."""
 
     def _page(self) -> tuple[report.Section, str]:
-        """What is on the page, and the call that made it."""
+        """Section of the page, and the call that made it."""
         raise NotImplementedError
 
     def report(self, folder: str | Path) -> Path:
@@ -110,20 +108,3 @@ def path_of(name: str, path: Any, wanted: str) -> Path:
     if not str(checked(name, path, (str, Path), wanted)):
         raise ValueError(f"{name}: is empty, and must be {wanted}.")
     return Path(path)
-
-
-@contextmanager
-def replacing_in_python(path: str | Path, force: bool) -> Iterator[Path]:
-    """As `replacing`, in the words of the library."""
-    with said_in_python(), replacing(path_of("path", path, A_PATH), force) as temporary:
-        yield temporary
-
-
-@contextmanager
-def said_in_python() -> Iterator[None]:
-    """Errors of the library in the words of Python: options of commands as arguments."""
-    try:
-        yield
-    except ValueError as error:
-        error.args = (in_python(str(error)),)
-        raise

@@ -7,12 +7,14 @@ Each rule is one function: it yields one sentence per offence. Exit status 1 if 
 """
 
 import argparse
+import ast
 import json
 import re
 import shlex
 import subprocess
 import sys
 import tempfile
+import tomllib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from graphlib import CycleError, TopologicalSorter
@@ -37,6 +39,8 @@ CORE_HEADERS |= {"arm_neon.h", "tmmintrin.h"}  # names of the processor's instru
 # Built with the kernel's headers, and for the kernel alone.
 GPL_FILES = {"tests/hil/guest/hilboard.c"}
 CORE_SYMBOLS = {"memcmp", "memcpy", "memmove", "memset", "strcmp", "strcspn", "strlen"}
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+OPENING = re.compile(r"(Of|The same|What|Whether)\b")
 MACHINE_PATH = re.compile(r"(?<![\w.])/(work|root|home/(?!pi\b)\w+)/")
 
 
@@ -176,6 +180,18 @@ def licence_line(args: argparse.Namespace) -> Iterator[str]:
             yield f"{path}: the first line is not the SPDX line"
 
 
+def docstring_openings(args: argparse.Namespace) -> Iterator[str]:
+    """Docstrings of the commands and of what is typed strictly begin with what the thing is."""
+    project = tomllib.loads((args.root / "pyproject.toml").read_text(encoding="utf-8"))
+    strict = [args.root / file for file in project["tool"]["mypy"]["files"]]
+    for path in [*strict, *sorted((args.root / "tools").rglob("*.py"))]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            told = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
+            if opening := OPENING.match(told or ""):
+                line = getattr(node, "lineno", 1)
+                yield f"{path}:{line}: a docstring begins with '{opening[0]}'; name the thing"
+
+
 def machine_paths(args: argparse.Namespace) -> Iterator[str]:
     """No file names a folder of somebody's machine."""
     for path in [*ours(args.root), *sorted(args.root.glob("*.md")), args.root / "CMakeLists.txt"]:
@@ -194,6 +210,7 @@ RULES: dict[str, Callable[[argparse.Namespace], Iterator[str]]] = {
         core_source,
         core_state,
         core_symbols,
+        docstring_openings,
         headers_alone,
         lcm_comments,
         licence_line,

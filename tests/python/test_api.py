@@ -252,7 +252,7 @@ def test_what_is_wrong_is_said_in_a_sentence(here):
         tm.import_log()
     with pytest.raises(ValueError, match="option: there is no 'renames'; the nearest is 'rename'"):
         tm.import_log("poses.csv", "commands.csv", renames={})
-    with pytest.raises(tm.LogError, match="up q: must be x, y or z"):
+    with pytest.raises(tm.LogError, match="up='q': must be x, y or z"):
         tm.import_log("poses.csv", "commands.csv", up="q")
     with pytest.raises(ValueError, match="to: there is no 'xlsx'; choose one of mcap, csv"):
         tm.load("run.lcmlog").export("out", to="xlsx")

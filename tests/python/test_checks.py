@@ -118,8 +118,8 @@ def test_a_right_log_has_no_findings(robot):
     [
         ((1, 0, 3, 2), (1, 1, 1, 1), ("left and the right wheels are swapped",)),
         ((2, 3, 0, 1), (1, 1, 1, 1), ("front and the rear wheels are swapped",)),
-        ((1, 0, 2, 3), (1, 1, 1, 1), ("fl_pct and fr_pct are swapped", "--rename fl_pct=fr_pct")),
-        ((0, 1, 2, 3), (-1, 1, 1, 1), ("fl_pct has the wrong sign", "--flip fl_pct")),
+        ((1, 0, 2, 3), (1, 1, 1, 1), ("fl_pct and fr_pct are swapped", "'fl_pct': 'fr_pct'")),
+        ((0, 1, 2, 3), (-1, 1, 1, 1), ("fl_pct has the wrong sign", "flip=['fl_pct']")),
         ((0, 1, 2, 3), (-1, 1, -1, 1), ("left wheels have the wrong sign",)),
         ((0, 1, 2, 3), (-1, -1, -1, -1), ("all wheels have the wrong sign",)),
     ],
@@ -131,10 +131,10 @@ def test_wheels_that_are_swapped_or_turned_round_are_named(robot, order, signs, 
 
 def test_axes_that_are_swapped_or_mirrored_are_named(robot):
     x, y, theta = robot.pose.T
-    _one([_with_pose(robot, x=y, y=x)], "x and y are swapped", "--rename x_m=y_m")
-    _one([_with_pose(robot, y=-y)], "y has the wrong sign", "--flip y_m")
-    _one([_with_pose(robot, y=-y, theta=-theta)], "mirrored", "--flip y_m --flip theta_rad")
-    _one([_with_pose(robot, theta=-theta)], "counted clockwise", "--flip theta_rad")
+    _one([_with_pose(robot, x=y, y=x)], "x and y are swapped", "'x_m': 'y_m'")
+    _one([_with_pose(robot, y=-y)], "y has the wrong sign", "flip=['y_m']")
+    _one([_with_pose(robot, y=-y, theta=-theta)], "mirrored", "flip=['y_m', 'theta_rad']")
+    _one([_with_pose(robot, theta=-theta)], "counted clockwise", "flip=['theta_rad']")
 
 
 @pytest.mark.parametrize("off_deg", [-90, 40, 180])
@@ -142,7 +142,7 @@ def test_a_heading_that_is_off_by_a_constant_is_named_with_the_angle(robot, off_
     wrong = _with_pose(robot, theta=robot.pose[:, 2] - np.radians(off_deg))
     found = _findings([wrong])
     assert len(found) == 1
-    told_deg = float(found[0].remedy.split("--heading-offset-deg=")[1].split()[0].rstrip("."))
+    told_deg = float(found[0].remedy.split("heading_offset_deg=")[1].split()[0].rstrip("."))
     assert abs((told_deg - off_deg + 180) % 360 - 180) < 4
 
 
@@ -170,7 +170,7 @@ def test_units_are_told_from_speeds(robot):
 
 def test_a_height_in_the_place_of_y_is_named(robot):
     flat = 0.05 + 1e-4 * np.random.default_rng(1).normal(size=len(robot.pose))
-    _one([replace(_with_pose(robot, y=flat), z_m=robot.pose[:, 1])], "y is up", "the other --up")
+    _one([replace(_with_pose(robot, y=flat), z_m=robot.pose[:, 1])], "y is up", "the other up")
 
 
 def test_headings_that_are_none_are_named(robot):
@@ -191,7 +191,7 @@ def test_names_that_are_exchanged_are_told_for_both(robot):
     found = _findings([replace(robot, **theirs), replace(other, **pose)])
     assert [f.robot_id for f in found] == [3, 5]
     assert "exchanged with that of robot 5" in found[0].what
-    assert {f.remedy for f in found} == {"import anew with --exchange R03=R05"}
+    assert {f.remedy for f in found} == {"import anew with exchange=[(3, 5)]"}
 
 
 @pytest.mark.parametrize("ppm", [-1000, 1000])
@@ -222,7 +222,7 @@ def test_clocks_far_apart_are_told_with_the_shift(robot, late_s):
     """The shift is told to milliseconds: with one clock for both nothing searches the rest."""
     (f,) = _findings([replace(robot, pose_t_s=robot.pose_t_s + late_s)])
     assert f.fatal and ("late" if late_s > 0 else "early") in f.what
-    shift_s = float(re.search(r"--pose-shift-s R\d\d=(.+);", f.remedy)[1])
+    shift_s = float(re.search(r"pose_shift_s=(.+);", f.remedy)[1])
     clocks_s = 0.04  # of the robot as it is
     assert abs(clocks_s + late_s + shift_s) < 0.005
     moved = replace(robot, pose_t_s=robot.pose_t_s + late_s + shift_s)
@@ -257,7 +257,7 @@ def test_commands_that_act_later_from_a_moment_on_are_no_clock(robot, by_s, from
     done_s = np.where(t_s > from_s, t_s - by_s, t_s)
     late = _with_pose(robot, *(np.interp(done_s, t_s, column) for column in robot.pose.T))
     (f,) = _findings([late if drive == "duty" else _by_encoders(late)], drive)
-    assert not f.fatal and "--pose-clock-ppm" not in f.remedy
+    assert not f.fatal and "pose_clock_ppm" not in f.remedy
     than = "later" if by_s > 0 else "sooner"
     assert f.what.startswith(f"the robot follows its commands {than} from about ")
     assert not f.steady
@@ -293,7 +293,7 @@ def test_what_is_as_much_a_step_as_a_drift_is_neither_surely(robot):
     done_s = t_s - np.interp(t_s, [20, 40], [0, 0.1])
     (f,) = _findings([_with_pose(robot, *(np.interp(done_s, t_s, c) for c in robot.pose.T))])
     assert not f.fatal and "run apart, or the robot follows its commands later" in f.what
-    assert "--pose-clock-ppm" not in f.remedy
+    assert "pose_clock_ppm" not in f.remedy
 
 
 @pytest.mark.parametrize("ppm", [-2500, 4000])

@@ -397,6 +397,28 @@ def test_the_list_of_commands_says_what_each_says_of_itself(name, module, summar
     assert " ".join((command.short_help or command.help).split("\n\n")[0].split()) == summary
 
 
+def test_a_newcomer_sees_about_twelve_commands_and_reaches_all_from_them():
+    commands = cli.Commands().commands
+    shown = [name for name, command in commands.items() if not command.hidden]
+    assert shown == [*cli.TOP] and len(shown) <= 15
+    below = [old for names in cli.BELOW.values() for old in names.values()]
+    assert sorted([*below, *cli.TOP]) == sorted(
+        {name for name, _, _ in cli.COMMANDS} | {*cli.GROUPS}
+    )
+
+
+@pytest.mark.parametrize(
+    ("flat", "words"),
+    [("effects", "twin effects"), ("optitrack", "track optitrack"), ("metrics", "swarm metrics")],
+)
+def test_a_command_has_two_names(twinmill, flat, words):
+    """What its help says is the same under both, but for the name."""
+    (code, out, _), (also, told, _) = twinmill(flat, "--help"), twinmill(*words.split(), "--help")
+    assert (code, also) == (0, 0)
+    assert f"twinmill {words}" in told and f"twinmill {flat} " in out
+    assert told.partition("Options")[2] == out.partition("Options")[2]
+
+
 HEAVY = {"mujoco", "numpy", "pandas", "PIL", "matplotlib", "pyarrow", "pydantic", "ribs", "scipy"}
 HELPS = [[], *([name] for name, _, _ in cli.COMMANDS), ["swarm", "stop"], ["swarm", "status"]]
 

@@ -524,11 +524,11 @@ def test_json_has_every_number_with_unit_and_every_equation(folder, model_text):
 def test_what_cannot_be_written_is_one_sentence(folder, model_text):
     text = model_text("m").replace('"mecanum"', '"ackermann"').replace('"duty"', '"twist"')
     open_text(folder, text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", ""))
-    with pytest.raises(ValueError, match=r"a steered robot.*use --to"):
+    with pytest.raises(ValueError, match=r"a steered robot.*use --to urdf"):
         run(["export-model", "m.toml", "--to", "mjcf"])
     with pytest.raises(ValueError, match=r"--to: is missing"):
         run(["export-model", "m.toml"])
     (folder / "d.json").write_text("[]")
-    with pytest.raises(ValueError, match=r"--diagnosis d.json: is not what"):
+    with pytest.raises(ValueError, match=r"--diagnosis d.json: is not the JSON"):
         run(["export-model", "m.toml", "--to", "json", "--diagnosis", "d.json"])
     assert sorted(p.name for p in folder.iterdir()) == ["d.json", "m.toml"]

@@ -57,7 +57,7 @@ def test_what_another_command_wrote_meanwhile_stays(made, tmp_path, force):
                     other.mkdir()
                     other /= "one"
                 other.write_text(USERS)
-    assert ("--force" in str(told.value)) == (force is False)
+    assert ("force=True" in str(told.value)) == (force is False)
     (kept,) = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert kept.read_text() == USERS
 

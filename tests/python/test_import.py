@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 import turbopi
 import twinmill_native as native
-import typer
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -20,7 +19,7 @@ import twinmill as tm
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import LogError, read_log
 from twinmill.model.mixing import duties_from_inputs, duties_from_vendor_move
-from twinmill_cli.import_log import register
+from twinmill_cli.main import app
 
 POSES = "t_s,robot_id,x_m,y_m,theta_rad\n0,4,0,0,3\n0.5,4,0.1,0.2,-3\n1.0,4,0.3,0.2,-2.5\n"
 COMMANDS = "t_s,robot_id,fl_pct,fr_pct,rl_pct,rr_pct\n0,4,0,0,0,0\n0.1,4,10,-20,30,-100\n"
@@ -175,12 +174,12 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
 @pytest.mark.parametrize(
     ("poses", "commands", "sentence"),
     [
-        (POSES.replace("theta_rad", "theta"), COMMANDS, r"'theta' has no unit.*--rename theta="),
+        (POSES.replace("theta_rad", "theta"), COMMANDS, r"'theta' has no unit.*rename={'theta': "),
         (POSES.replace("0.3", "x"), COMMANDS, r"p\.csv: row 4: x_m is 'x', not a number"),
         (POSES.replace("1.0,4", "1.0,123"), COMMANDS, r"row 4: robot_id is 123, .*0\.\.99"),
         (POSES + "1,4,0\n", COMMANDS, r"row 5: has 3 cells"),
         ("", COMMANDS, r"p\.csv: has no rows"),
-        (POSES.replace("robot_id", "number"), COMMANDS, r"robot_id is missing.*--robot-id"),
+        (POSES.replace("robot_id", "number"), COMMANDS, r"robot_id is missing.*robot_id"),
         (POSES, COMMANDS.replace("-100", "-101"), r"row 3: rr_pct is -101, .*-100\.\.100"),
         (POSES, COMMANDS.replace("-100", "?"), r"row 3: rr_pct is '\?', not a number"),
         (POSES, COMMANDS.replace("-100", "inf"), r"row 3: rr_pct is inf, .*finite"),
@@ -202,7 +201,7 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
         (
             POSES,
             COMMANDS.replace("\n0,4", "\n50,4").replace("0.1,4", "51,4"),
-            r"do not overlap.*--pose-shift-s 50\.000",
+            r"do not overlap.*pose_shift_s=50\.0",
         ),
         (
             "\n".join(POSES.split("\n")[:2]) + "\n",
@@ -219,7 +218,7 @@ def test_heading_offset_and_shift_move_the_poses_alone(imported):
         (
             _in_unit(POSES + "1.5,4,0,0,0\n2,4,0,0,0\n", 1e3),
             _in_unit(COMMANDS + "1.9,4,0,0,0,0\n", 1e3),
-            r"poses are 500 s apart.* times are in ms,.* --rename t_s=t_ms",
+            r"poses are 500 s apart.* times are in ms,.* rename={'t_s': 't_ms'}",
         ),
         (
             POSES.replace("\n", "\n1772366400000000", 1),
@@ -268,7 +267,7 @@ def test_one_robot_of_no_run_is_left_out_with_the_reason(
 
 def test_existing_and_unwritable_outputs_are_refused(put, tmp_path):
     poses, commands = put("p.csv", POSES), put("c.csv", COMMANDS)
-    with pytest.raises(ValueError, match=r"exists; .* --force"):
+    with pytest.raises(ValueError, match=r"exists; .* force=True"):
         import_log(poses, commands, put("o.csv", "mine"))
     with pytest.raises(ValueError, match=r"o\.lcmlog: cannot be written"):
         import_log(poses, commands, tmp_path / "none" / "o.lcmlog")
@@ -440,7 +439,7 @@ def test_motive_z_up_is_left_as_it_is(put, tmp_path):
         ("Millimeters", "Inches", "Length Units is 'Inches'"),
         ("Format", "Farmat", "no Motive export"),
         ("Rigid Body", "Bone", "has no rigid body"),
-        ("turbopi-04", "robot", r"--robot 'robot=ID'"),
+        ("turbopi-04", "robot", r"robot={'robot': 'ID'}"),
         ("Rotation,Position", "Speed,Position", "lacks Rotation W"),
         ("0.010", "0.000", "frame 1 is not later"),
         ("1,100,50,200", "1,100,fifty,200", "row 8: holds no number"),
@@ -533,9 +532,6 @@ def test_recorded_mecanum_poses_import_with_a_renamed_column(data_dir, put, tmp_
 
 
 def run_command(*arguments):
-    app = typer.Typer()
-    app.callback()(lambda: None)
-    register(app)
     return CliRunner().invoke(app, ["import", *map(str, arguments)])
 
 

@@ -83,7 +83,7 @@ def test_a_compass_is_told_at_import(tmp_path):
     compass = np.column_stack([t_s, pose[:, :2], np.pi / 2 - pose[:, 2]])
     commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
     said = _said(tmp_path, POSES, compass, BODY, commands)
-    assert "counted clockwise" in said and "--flip theta_rad --heading-offset-deg=90" in said
+    assert "counted clockwise" in said and "flip=['theta_rad'], heading_offset_deg=90" in said
 
 
 def test_velocities_of_the_room_under_the_names_of_the_bodys_are_told(tmp_path):
@@ -107,7 +107,7 @@ def test_poses_before_their_commands_belie_one_clock_and_those_after_are_a_delay
         told_s = float(re.search(r"(\d+\.\d+) s (before|after)", said)[1])
         assert told_s == pytest.approx(abs(late_s), abs=0.02)
     if late_s < 0:
-        shift_s = float(re.search(r"--pose-shift-s=(\d+\.\d+)", said)[1])
+        shift_s = float(re.search(r"pose_shift_s=(\d+\.\d+)", said)[1])
         (tmp_path / "o.lcmlog").unlink()
         mended = np.column_stack([t_s + late_s + shift_s, pose])
         assert not _said(tmp_path, POSES, mended, BODY, commands)
@@ -123,7 +123,7 @@ def test_a_heading_that_nobody_measured_is_taken_from_the_path_instead(tmp_path)
         np.savetxt(tmp_path / name, rows, "%.7f", ",", header=f"t_s,{header}", comments="")
     options = ImportOptions(robot_id=1)
     done = import_log(*(tmp_path / n for n in tables), tmp_path / "o.lcmlog", options=options)
-    assert "not measured" in done["warnings"][0] and "--heading-from-path" in done["warnings"][0]
+    assert "not measured" in done["warnings"][0] and "heading_from_path=True" in done["warnings"][0]
     options = ImportOptions(robot_id=1, path_heading=True, force=True)
     done = import_log(*(tmp_path / n for n in tables), tmp_path / "o.lcmlog", options=options)
     (robot,) = read_log(tmp_path / "o.lcmlog").robots.values()
@@ -144,9 +144,7 @@ def test_clocks_that_run_apart_by_a_thousandth_are_told_at_import(tmp_path):
         tmp_path / "o.lcmlog",
         options=ImportOptions(robot_id=1),
     )
-    assert any(
-        "the two clocks run apart" in w and "--pose-clock-ppm" in w for w in done["warnings"]
-    )
+    assert any("the two clocks run apart" in w and "pose_clock_ppm=" in w for w in done["warnings"])
 
 
 def test_headings_in_degrees_are_told_and_nothing_that_follows_from_them(tmp_path):

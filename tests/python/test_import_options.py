@@ -253,7 +253,7 @@ def test_what_is_printed_of_times_that_do_not_meet_works_for_every_source(tmp_pa
         options, log = [], None
         for _ in range(3):  # of a bag receipt first, and then a shift
             done, log = run(tmp_path, made(tmp_path, late), *options)
-            printed = re.findall(r"--(?:pose-shift-s \S+\d|receive-stamps)", said(done))
+            printed = re.findall(r"--(?:pose-shift-s[ =]\S+\d|receive-stamps)", said(done))
             options += [word for option in printed for word in option.split()] if not log else []
         assert log is not None, (made.__name__, said(done))
         assert log.pose_t_s[0] == pytest.approx(log.command_t_s[0], abs=0.01)

@@ -11,11 +11,10 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-import typer
 from typer.testing import CliRunner
 
 from twinmill.data.log import read_log
-from twinmill_cli.import_log import register
+from twinmill_cli.main import app
 
 STEP_S, HELD_S, DURATION_S = 0.02, 1.2, 40.0
 POSE_NAMES, TOLD_NAMES = ["x_m", "y_m", "theta_rad"], ["vx_mps", "vy_mps", "omega_radps"]
@@ -46,8 +45,6 @@ def _drive(robot_id):
 @pytest.fixture
 def imports(tmp_path):
     """Imports tables of the robots 1 and 2 by the command line; of the log, and what was said."""
-    app = typer.Typer()
-    register(app)
 
     def run(poses, commands, *options):
         for name, table in (("p.csv", poses), ("c.csv", commands)):
@@ -55,7 +52,7 @@ def imports(tmp_path):
         out = tmp_path / "o.lcmlog"
         words = ["--poses", tmp_path / "p.csv", "--commands", tmp_path / "c.csv", "--force"]
         result = CliRunner(env={"COLUMNS": "5000"}).invoke(
-            app, [*map(str, [*words, "-o", out]), *options]
+            app, ["import", *map(str, [*words, "-o", out]), *options]
         )
         assert result.exit_code == 0, result.output
         return read_log(out).robots, result.output

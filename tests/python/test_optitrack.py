@@ -97,7 +97,7 @@ def test_what_is_not_tracked_or_not_numbered_is_said():
     assert "wand, a7, b7" in said["numbers"] and "r3 is tracked in 0%" in said["tracked"]
 
 
-@pytest.mark.parametrize(("about", "up", "word"), [("y", "z", "say --up y"), ("z", "y", "--up z")])
+@pytest.mark.parametrize(("about", "up", "word"), [("y", "z", "say up='y'"), ("z", "y", "up='z'")])
 def test_the_axis_that_is_up_is_found(about, up, word):
     with Motive([Body(3, "r3")], turn=turned(about)) as motive:
         robots, _ = listen(motive, View(up))
@@ -153,7 +153,7 @@ def test_others_on_the_port_are_not_heard_but_named():
         for _ in robots.stream.frames(0.5):
             pass
         robots.stream.close()
-    assert "give --server 127.0.0.1" in wrong(robots)["frames"]
+    assert "give server='127.0.0.1'" in wrong(robots)["frames"]
 
 
 def test_why_nothing_arrives(monkeypatch):
@@ -168,7 +168,7 @@ def test_why_nothing_arrives(monkeypatch):
     assert "make one for each robot" in wrong(robots)["rigid bodies"]
     with pytest.raises(StreamError, match="nothing listens on its port"):
         find_server("127.0.0.1", port=motive.port)
-    with pytest.raises(StreamError, match=r"--local 203.0.113.9: .*ip address"):
+    with pytest.raises(StreamError, match=r"local='203.0.113.9': .*ip address"):
         find_server("127.0.0.1", "203.0.113.9", motive.port)
     monkeypatch.setattr(natnet_stream, "ANSWER_S", 0.2)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every command that a page, a help text or a result prints can be typed as it stands."""
 
+import ast
 import html
 import io
 import json
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import typer
 from typer.core import TyperGroup
 
 from twinmill.challenge.script import write_rich_script
@@ -22,7 +24,9 @@ from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_command
+from twinmill_cli import twin_sweep
 from twinmill_cli.options import ScriptForm
+from twinmill_cli.spelling import typed
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = (
@@ -128,6 +132,32 @@ def check_named(line: str) -> None:
 def test_commands_named_on_a_page_exist_with_their_options(page):
     for line in QUOTED.findall(page.read_text()):
         check_named(line)
+
+
+def test_options_that_the_library_names_exist():
+    """It names them as arguments; the commands write them with dashes."""
+    named = {
+        part.value
+        for path in SOURCES
+        if path.suffix == ".py"
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ("option", "options")
+        for given in call.args[:1]
+        for part in (given.keys if isinstance(given, ast.Dict) else [given])
+        if isinstance(part, ast.Constant)
+    }
+    commands = [command.command() for command in COMMANDS.values()]
+    commands += [
+        c for group in commands if isinstance(group, TyperGroup) for c in group.commands.values()
+    ]
+    known = {
+        word
+        for command in [*commands, typer.main.get_command(twin_sweep.app)]
+        for p in command.params
+        for word in (*p.opts, *p.secondary_opts)
+    }
+    assert len(named) > 50
+    assert {typed({name: None}, None) for name in named} <= known
 
 
 def test_commands_named_in_messages_exist_with_their_options():

@@ -84,8 +84,8 @@ def test_names_are_numbered_by_the_option(imported):
 @pytest.mark.parametrize(
     ("poses", "commands", "why"),
     [
-        (["a.csv", "b.csv"], ["x.csv", "y.csv"], r"a.csv: .*--robot 'a=1' --robot 'b=2'"),
-        (["p1.csv", "p01.csv"], ["c1.csv", "c2.csv"], r"p1.csv: .*--robot 'p1=1' --robot 'p01=2'"),
+        (["a.csv", "b.csv"], ["x.csv", "y.csv"], r"a.csv: .*robot={'a': 1, 'b': 2}"),
+        (["p1.csv", "p01.csv"], ["c1.csv", "c2.csv"], r"p1.csv: .*robot={'p1': 1, 'p01': 2}"),
         (["p1.csv", "p2.csv"], ["c5.csv", "c6.csv"], r"robots \[1, 2\], commands of \[5, 6\]"),
         # All robots may have been told the same, or one of them.
         (["p1.csv", "p2.csv"], ["c.csv"], "c.csv: column robot_id is missing"),
@@ -141,4 +141,4 @@ def test_a_quoted_pattern_stands_for_the_files_and_an_unquoted_one_is_explained(
     assert code == 1
     assert "poses_R1.csv: stands alone; write the option before each file" in said
     _, _, said = twinmill("import", "--poses", "no*.csv", "-o", "p.lcmlog")
-    assert "--poses no*.csv: no file has such a name" in said
+    assert "--poses 'no*.csv': no file has such a name" in said

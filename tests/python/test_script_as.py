@@ -114,6 +114,6 @@ def test_what_cannot_be_written_is_one_sentence(folder, model_text):
     (folder / "m.toml").write_text(
         twist.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")
     )
-    with pytest.raises(ValueError, match=r"the script holds duties.*--model"):
+    with pytest.raises(ValueError, match=r"the script holds duties.*model"):
         convert("publisher", "p.py")
     assert not (folder / "p.py").exists()

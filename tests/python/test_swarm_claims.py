@@ -231,7 +231,7 @@ def test_spread_of_measured_robots_is_told_at_each_input(tmp_path):
     alone = actuation([])
     for told in (claim, alone):
         assert told.agrees and any(row.value == pytest.approx(0.037, abs=5e-4) for row in told.rows)
-    assert len(alone.rows) < len(claim.rows) and "--actuation" in alone.finding
+    assert len(alone.rows) < len(claim.rows) and "(actuation)" in alone.finding
 
 
 def test_maps_in_mujoco_are_kept_and_no_two_of_their_runs_share_a_seed(tmp_path, monkeypatch):

@@ -87,7 +87,7 @@ def test_two_columns_of_one_quantity_are_refused(imported, more, why):
 @pytest.mark.parametrize(
     ("rename", "why"),
     [
-        ({"nope": "x_m"}, r"--rename nope=x_m: no table has a column 'nope' \(p\.csv has t_s"),
+        ({"nope": "x_m"}, r"rename={'nope': 'x_m'}: no table has a column 'nope' \(p\.csv has t_s"),
         ({"x_m": "foo"}, "foo is not one of our columns"),
         ({"x_m": "theta_deg"}, "m is no unit of what theta_deg holds"),
     ],
@@ -107,7 +107,7 @@ def test_a_unit_in_the_old_name_is_converted_and_said(imported, new):
 
 def test_the_advice_for_a_strange_name_works_as_printed(imported):
     poses = POSES.drop(columns="theta_rad").assign(rot_deg=np.degrees(POSES.theta_rad))
-    with pytest.raises(LogError, match=r"--rename 'rot_deg=theta_deg'"):
+    with pytest.raises(LogError, match=r"rename={'rot_deg': 'theta_deg'}"):
         imported(poses)
     _same_poses(imported(poses, options={"rename": {"rot_deg": "theta_deg"}})[0][4])
 
@@ -115,7 +115,7 @@ def test_the_advice_for_a_strange_name_works_as_printed(imported):
 @pytest.mark.parametrize(("top", "new"), [(255, "left_pwm"), (80, "left_pct"), (0.5, "left_unit")])
 def test_the_advice_for_a_name_without_a_unit_is_the_unit_that_it_looks_like(imported, top, new):
     rows = pd.DataFrame({"t_s": [0.0, 1, 2], "robot_id": 4, "left": top, "right_pct": 50})
-    with pytest.raises(LogError, match=f"--rename left={new} "):
+    with pytest.raises(LogError, match=f"rename={{'left': '{new}'}} "):
         imported(commands=rows)
     robot = imported(commands=rows, options={"rename": {"left": new}})[0][4]
     assert robot.command[-1, 0] == pytest.approx({255: 1, 80: 0.8, 0.5: 0.5}[top], abs=1e-6)
@@ -136,7 +136,7 @@ def test_wrong_units_are_named_before_any_advice_on_the_heading(imported):
 def test_degrees_that_pass_the_half_turn_are_refused_under_any_command(imported):
     turning = np.degrees(np.angle(np.exp(1j * 0.5 * T_S)))
     duties = pd.DataFrame({"t_s": [0.0, 1], "robot_id": 4, "left_pct": 50, "right_pct": 60})
-    with pytest.raises(LogError, match=r"jumps by 360 .*--rename theta_rad=theta_deg"):
+    with pytest.raises(LogError, match=r"jumps by 360 .*rename={'theta_rad': 'theta_deg'}"):
         imported(POSES.assign(theta_rad=turning), duties)
     # Radians that go on and on are no degrees.
     imported(POSES.assign(theta_rad=10 * T_S), duties)
@@ -287,12 +287,12 @@ def test_robots_with_names_are_numbered_by_a_mapping(imported):
         pd.concat([t.assign(robot_id=n) for n in names]).sort_values("t_s", kind="stable")
         for t in (POSES, COMMANDS)
     ]
-    with pytest.raises(LogError, match=r"--robot 'alice=1' --robot 'bob=2'"):
+    with pytest.raises(LogError, match=r"robot={'alice': 1, 'bob': 2}"):
         imported(*both)
     robots, _ = imported(*both, options={"robots": {"alice": 1, "bob": 12}})
     assert sorted(robots) == [1, 12]
     _same_poses(robots[12])
-    with pytest.raises(LogError, match="--robot carl=3: no robot"):
+    with pytest.raises(LogError, match=r"robot=\{'carl': 3\}: no robot"):
         imported(*both, options={"robots": {"alice": 1, "bob": 2, "carl": 3}})
 
 

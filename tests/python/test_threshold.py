@@ -175,7 +175,7 @@ def test_raw_and_png_give_the_same_limits(tmp_path):
 
 
 def test_raw_of_another_size_is_refused():
-    with pytest.raises(ValueError, match="--size"):
+    with pytest.raises(ValueError, match="give size"):
         split_frames("a.yuyv", b"1" * 100, (8, 8))
 
 

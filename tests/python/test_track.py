@@ -86,8 +86,8 @@ def test_a_heading_opposite_to_the_motion_is_told_of_a_robot_that_drives_in_arcs
     said = [note for note in track.notes if "of its heading" in note]
     assert abs(track.astray_rad) == pytest.approx(np.pi * (turned_deg == 180), abs=0.01)
     assert len(said) == (turned_deg == 180)
-    assert all("--heading-offset-deg R03=" in note and "180" in note for note in said)
-    assert all("--family tag36h11" in note for note in said)
+    assert all("heading_offset_deg={3: " in note and "180" in note for note in said)
+    assert all("family='tag36h11'" in note for note in said)
 
 
 def test_a_pose_that_is_left_out_leaves_no_trace(driven):

@@ -264,7 +264,7 @@ def _all(
 
 
 def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
-    """What functions with their arguments return, as each is done; shows progress and time left.
+    """Yields results of functions as each is done; shows progress and time left.
 
     Ctrl-C reaches all processes of a terminal. Workers do not hear it, from their start on: they
     are ended here, and what they had done before is kept.

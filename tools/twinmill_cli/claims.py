@@ -205,7 +205,7 @@ def _write(out: Path, source: Provenance, found: list[Claim], data: dict) -> Pat
 
 
 def _paper(found: list[Claim]) -> Section:
-    """What the paper shows, part by part."""
+    """Parts of the paper, and which claim checks each."""
     told = answers(found)
     rows = [
         [

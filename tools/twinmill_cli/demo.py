@@ -161,7 +161,7 @@ def _digest() -> str:
 
 
 def _unsealed() -> list[Hidden]:
-    """What is hidden in the file."""
+    """Effects hidden in the file."""
     known = len(tomlkit.parse(ModelFile.load(GIVEN).text).get("effect", []))
     tables = tomlkit.parse(Path(SEALED).read_text())["effect"][known:]
     return [
@@ -238,7 +238,7 @@ def _section(hidden: list[Hidden], result: Explanation, words: str, grade: str) 
 
 
 def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
-    """What was found over what was hidden; 1 is the sealed size."""
+    """Ratio of the found size to the sealed one."""
 
     def paint(axes) -> None:
         axes.axvline(1, color=FLOOR, lw=6, alpha=0.35, label="hidden")

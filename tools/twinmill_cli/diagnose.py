@@ -129,7 +129,7 @@ def _hint(measurements: Measurements, model_file: ModelFile) -> None:
 
 
 def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
-    """What takes what was found into the model: why, and the command."""
+    """Reason and command for adding the findings to the model."""
     stem, told = Path(model).stem, []
     why = {
         "robots": "To give each robot its own numbers",
@@ -150,7 +150,7 @@ def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str,
 def _adding(
     result: Diagnosis, logs: list[Path], *, given: str, explained: str
 ) -> list[tuple[str, str]]:
-    """What adds the formula that was proven; nothing if none was.
+    """Command that adds the validated formula; empty without one.
 
     Args:
         result: the diagnosis.
@@ -170,7 +170,7 @@ def _adding(
 
 
 def _settling(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str, str]]:
-    """What designs the run that settles what is open; nothing if nothing is."""
+    """Command that designs a run for the open questions; empty without any."""
     command = command_line("next", logs, model, Path("next.csv"))
     return [("To design that run", command)] if result.next_experiment else []
 
@@ -183,7 +183,7 @@ def robots_recorded(path: Path, measurements: Measurements) -> int:
 
 
 def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
-    """What no single robot shows: the whole log against swarms of the model that was found.
+    """Compares the whole log with swarms of the model that was found.
 
     Returns:
         A sentence, and the comparison where there is one.

@@ -73,7 +73,7 @@ def _effects(
 def _write(
     name: str | None, model: Path | None, equation: str | None, into: Path, *, as_json: bool
 ) -> None:
-    """Of `effects new`."""
+    """Writes the files of `effects new`."""
     if name is None or model is None:
         raise ValueError("effects new: needs a name and --from MODEL, the model with its equation.")
     files = write_effect(name, ModelFile.load(str(model)), equation, into)

@@ -93,13 +93,13 @@ def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
     """The object of a command that failed before it had printed one."""
     if "--json" not in words or has_told():
         return
-    findings = [] if words[0] in OF_TABLES else _findings(error)
+    findings = [] if {*words[:2]} & {*OF_TABLES} else _findings(error)
     with suppress(OSError):  # stdout itself may be what failed
         print_object({"verdict": "bad_input", "sentence": sentence, "input": findings})
 
 
 def _findings(error: Exception) -> list[dict]:
-    """What is wrong with a log that cannot be judged; empty for other errors."""
+    """Findings on a log that cannot be judged; empty for other errors."""
     reading = sys.modules.get("twinmill.data.measurement")
     if reading and isinstance(error, reading.LogError):
         return [finding.to_json() for finding in reading.findings_of(error)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What commands on logs and a model have in common: open the model, read the logs, report."""
+"""Steps that commands on logs and a model share: open the model, read the logs, report."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def command_line(verb: str, logs: list[Path], model: str, output: Path | None = 
 
 
 def option(name: str) -> str:
-    """Of the command line, for a text of an effect."""
+    """Option of the command line for a text of an effect."""
     return f"--{name.replace('_', '-')}"
 
 
@@ -55,7 +55,7 @@ def open_model(model: str, out: Path | None) -> ModelFile:
 
 
 def provenance(command: str, model: ModelFile) -> Provenance:
-    """What every output carries."""
+    """Provenance that every output carries."""
     return Provenance(command, f"twinmill {__version__}", model.hash)
 
 
@@ -73,7 +73,7 @@ def load(logs: list[Path], model_file: ModelFile) -> Measurements:
 
 
 def told(measurements: Measurements) -> dict:
-    """What JSON output carries of it."""
+    """Provenance as JSON output carries it."""
     return {"input": [finding.to_json() for finding in measurements.findings]}
 
 

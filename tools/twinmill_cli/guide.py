@@ -43,7 +43,7 @@ class Poses(StrEnum):
 
 
 class Robot(StrEnum):
-    """What drives it."""
+    """Programs that may drive the robot."""
 
     TURBOPI = "turbopi"
     ROS = "ros"
@@ -52,7 +52,7 @@ class Robot(StrEnum):
 
 
 class Drive(StrEnum):
-    """What it is told."""
+    """Inputs of the drive."""
 
     DUTY = "duty"
     WHEEL_SPEED = "wheel_speed"
@@ -60,7 +60,7 @@ class Drive(StrEnum):
 
 
 class Wheels(StrEnum):
-    """What it rolls on."""
+    """Wheels of the robot."""
 
     MECANUM = "mecanum"
     DIFFERENTIAL = "differential"
@@ -128,7 +128,7 @@ FULL_MPS, FULL_RADPS = 0.3, 2.0  # of robots that are told velocities, in the fi
 
 @dataclass(frozen=True)
 class Have:
-    """What there is."""
+    """Equipment at hand."""
 
     poses: str
     robot: str
@@ -178,7 +178,7 @@ def _guide(
 
 
 def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
-    """What was said, what follows from it, and what is asked.
+    """Collects the equipment from options, from what follows from them, and from questions.
 
     Raises:
         ValueError: something is not said and nobody can be asked, or does not go together.
@@ -206,7 +206,7 @@ def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
 
 
 def _following(known: dict[str, StrEnum]) -> dict[str, StrEnum]:
-    """What follows from what is known."""
+    """Equipment that follows from what is known."""
     robot, poses, wheels = (known.get(name) for name in ("robot", "poses", "wheels"))
     found: dict[str, StrEnum] = {}
     if robot in (Robot.TWIN, Robot.TURBOPI):

@@ -13,6 +13,7 @@ import typer
 
 from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
+from twinmill_cli.spelling import typed
 
 if working():  # not for --help
     from twinmill.data.importers.columns import Guess, is_usual, to_toml
@@ -55,7 +56,7 @@ def _of_robots(option: str, given: list[str] | None) -> dict[int | None, float]:
 
 
 def _number_of(robot: str) -> int | None:
-    """Of a robot as R02 or 2; None of other words."""
+    """Number of a robot written as R02 or 2; None for other words."""
     digits = robot.removeprefix("R")
     return int(digits) if digits.isdecimal() else None
 
@@ -289,8 +290,8 @@ def _command(
     if explain_columns_to:
         _refuse_others(context, "--explain-columns", EXPLAINED, "it only says what columns are")
         asked = {
-            "poses": files_of(poses, "--poses"),
-            "commands": files_of(commands, "--commands"),
+            "poses": files_of(poses, "poses"),
+            "commands": files_of(commands, "commands"),
         }
         explained = explain_columns(
             *(paths[0] if paths else None for paths in asked.values()),
@@ -359,12 +360,14 @@ def _refuse_others(context: typer.Context, mode: str, used: set[str], why: str) 
 
 
 def _list(bag: Path, topics: list[Topic], log: str, as_json: bool) -> None:
-    """What a bag holds, and the command that imports what seems to belong together."""
+    """Lists a bag, and prints the command that imports what seems to belong together."""
     words, pairs = ["twinmill", "import", "--bag", str(bag)], guess_pairs(topics)
     for pose, command in pairs:
         words += ["--pose", pose, *(["--command", command] if command else [])]
     steered = {t.name for t in topics if t.kind in STEERED} & {command for _, command in pairs}
-    words += numbering(pairs) + (["--wheelbase-m", "METRES"] if steered else [])
+    words += shlex.split(typed(numbering(pairs), None)) + (
+        ["--wheelbase-m", "METRES"] if steered else []
+    )
     line = shlex.join([*words, "-o", log]) if pairs else None
     if as_json:
         print_object({"topics": [vars(t) for t in topics], "command": line})
@@ -389,7 +392,7 @@ def _could_be(topic: Topic) -> str:
 
 
 def _unpaired(topics: list[Topic]) -> str:
-    """What a bag lacks from which no pair can be guessed."""
+    """Reason why no pair of poses and commands can be guessed in a bag."""
     roles = {topic.role for topic in topics}
     lacking = [
         word for role, word in (("pose", "poses"), ("command", "commands")) if role not in roles
@@ -408,7 +411,7 @@ def _explain(
     log: str,
     force: bool,
 ) -> None:
-    """What each column was taken for, here and as a mapping file, and what to type then."""
+    """Prints the meaning of each column, writes it as a mapping file, and says what to type."""
     if not explained:
         raise LogError("--explain-columns: give the tables with --poses and --commands.")
     guesses = {kind: columns for kind, (_, columns) in explained.items()}
@@ -439,7 +442,7 @@ def _explain(
 
 
 def _lacking(kind: str, table: TableFile, columns: list[Guess]) -> list[str]:
-    """What a person must write down of a table in which nothing was known."""
+    """Entries that a person must write for a table in which no column was known."""
     known = {target for guess in columns for target in guess.targets} - {
         "t_s",
         "robot_id",

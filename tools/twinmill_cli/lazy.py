@@ -30,7 +30,7 @@ _helps = "_TWINMILL_COMPLETE" in os.environ or bool(HELP & set(_options()))
 
 
 def working() -> bool:
-    """Whether commands are imported to work, and not for their help alone."""
+    """True if commands are imported to work, and not for their help alone."""
     return not _helps
 
 
@@ -41,11 +41,16 @@ class LazyCommand(TyperCommand):
         name: as the user types it.
         module: whose function `register` adds it to an application.
         summary: first sentence of its help.
+        registered: its name there, if another.
+        hidden: the list of commands leaves it out.
     """
 
-    def __init__(self, name: str, module: str, summary: str) -> None:
-        super().__init__(name, help=summary)
-        self.module = module
+    def __init__(
+        self, name: str, module: str, summary: str, *, registered: str = "", hidden: bool = False
+    ) -> None:
+        super().__init__(name, help=summary, hidden=hidden)
+        self.module, self.registered = module, registered or name
+        self.below: dict[str, LazyCommand] = {}  # commands whose first word is this one's name
 
     def command(self) -> TyperCommand | TyperGroup:
         """The subcommand itself."""
@@ -58,7 +63,13 @@ class LazyCommand(TyperCommand):
         for command in app.registered_commands:
             # Typer reads all annotations; what a command returns is a type of the library.
             command.callback.__annotations__.pop("return", None)
-        return typer.main.get_group(app).commands[self.name]
+        command = typer.main.get_group(app).commands[self.registered]
+        if isinstance(command, TyperGroup):
+            command.commands.update(self.below)
+        elif self.below:
+            names = ", ".join(f"`{self.name} {name}`" for name in self.below)
+            command.epilog = f"Other commands: {names}."
+        return command
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **options: Any
@@ -69,7 +80,11 @@ class LazyCommand(TyperCommand):
             typer.Exit: it showed its help.
         """
         words = list(args)
-        context = self.command().make_context(info_name, args, *rest, **options)
+        command = self.command()
+        if words and words[0] in self.below and not isinstance(command, TyperGroup):
+            below = self.below[words[0]]
+            return below.make_context(f"{info_name} {words[0]}", words[1:], *rest, **options)
+        context = command.make_context(info_name, args, *rest, **options)
         ends = options.get("resilient_parsing") or isinstance(context.command, TyperGroup)
         if not (working() or ends):
             word = next(word for word in words if word in HELP)

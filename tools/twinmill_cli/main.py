@@ -8,10 +8,12 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from twinmill.arguments import spelled
 from twinmill_cli.ending import leave
 from twinmill_cli.lazy import LazyCommand
+from twinmill_cli.spelling import typed
 
-# Name, module and what it does, in the order of the help. The modules are imported when called.
+# Name, module and what it does. The modules are imported when called.
 COMMANDS = (
     (
         "demo",
@@ -202,17 +204,79 @@ COMMANDS = (
 )
 
 
+TOP = (
+    *("demo", "guide", "import", "compare", "fit", "diagnose", "explain", "next", "open", "export"),
+    *("twin", "swarm", "robot", "track", "lab"),
+)
+# The others by the first word of their names, and what they are called there.
+BELOW = {
+    "twin": {"effects": "effects", "add": "add", "set": "set", "export": "export-model"},
+    "swarm": {
+        "metrics": "metrics",
+        "plot": "plot",
+        "watch": "watch",
+        "compare": "compare-swarm",
+        "phase": "phase",
+        "matters": "matters",
+        "ask": "ask",
+    },
+    "robot": {
+        "flash": "flash",
+        "threshold": "threshold",
+        "wheels": "wheels",
+        "characterise": "characterise",
+        "compare": "compare-runs",
+        "drift": "drift",
+    },
+    "track": {
+        "tags": "tags",
+        "calibrate": "track-calibrate",
+        "check": "track-check",
+        "optitrack": "optitrack",
+    },
+    "lab": {
+        "infer": "infer",
+        "challenge": "challenge",
+        "claims": "claims",
+        "discover": "discover",
+        "predict": "predict-floor",
+        "score": "score-floor",
+    },
+}
+GROUPS = {
+    "twin": "Change a model by hand, list effects, write files for other simulators.",
+    "robot": "Set up a robot, drive it, and see whether it changed since.",
+    "lab": "Probabilities, sealed tests and predictions, published claims, new behaviours.",
+}
+
+
 class Commands(TyperGroup):
-    """All of them."""
+    """Commands of `TOP` with those below them; each under its own name alone, too."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        for name, module, summary in COMMANDS:
-            self.add_command(LazyCommand(name, f"twinmill_cli.{module}", summary))
+        told = {name: (f"twinmill_cli.{module}", summary) for name, module, summary in COMMANDS}
+        for name in TOP:
+            below = {
+                new: LazyCommand(new, *told[old], registered=old)
+                for new, old in BELOW.get(name, {}).items()
+            }
+            if name in GROUPS:
+                summary = GROUPS[name]
+                self.add_command(
+                    TyperGroup(name=name, help=summary, commands=below, no_args_is_help=True)
+                )
+            else:
+                command = LazyCommand(name, *told[name])
+                command.below = below
+                self.add_command(command)
+        for name, said in told.items():
+            if name not in self.commands:
+                self.add_command(LazyCommand(name, *said, hidden=True))
 
 
 def _completes() -> bool:
-    """Whether this is about the shell's completion, which takes long to import."""
+    """True for the shell's completion, which takes long to import."""
     words = {"--install-completion", "--show-completion"}
     return "_TWINMILL_COMPLETE" in os.environ or bool(words & set(sys.argv[1:]))
 
@@ -235,6 +299,7 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     show_version: Annotated[
         bool,
         typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
@@ -249,6 +314,7 @@ def _options(
     Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line, 3 something
     changed (compare-runs, drift), 130 stopped.
     """
+    context.with_resource(spelled(typed))
 
 
 def run(arguments: list[str]) -> Any:

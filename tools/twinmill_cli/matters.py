@@ -168,7 +168,7 @@ def _stoppable(out: Path | None) -> Iterator[None]:
 
 
 def _hidden(logs: list[Path], model_file: ModelFile, folder: Path) -> list[Hidden]:
-    """What the logs do not exclude, kept in the folder: the diagnosis takes a minute."""
+    """Effects that the logs do not exclude, kept in the folder: the diagnosis takes a minute."""
     if not logs:
         return unseen_effects(model_file.model)
     kept = folder / "hidden.json"

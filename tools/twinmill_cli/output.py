@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all subcommands share: JSON or text, and the spinner."""
+"""Output of all subcommands: JSON or text, and the spinner."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def begin_telling() -> None:
 
 
 def has_told() -> bool:
-    """Whether an object was printed where objects go now."""
+    """True if an object was printed where objects go now."""
     return any(stream is sys.stdout for stream in _told_on)
 
 
@@ -86,7 +86,7 @@ def busy(what: str) -> Iterator[None]:
 
 @contextmanager
 def telling(what: str) -> Iterator[Callable[[str], None]]:
-    """The same, with a function that tells in words where the work has got to."""
+    """A spinner with a function that says where the work has got to."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return

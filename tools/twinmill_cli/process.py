@@ -80,7 +80,7 @@ def process(_seeds: int) -> Claim:
 
 
 def _drive(folder: Path) -> None:
-    """What a laboratory has measured: poses and commands of one robot, as CSV."""
+    """Measurements of a laboratory: poses and commands of one robot, as CSV."""
     (folder / TRUTH).write_text(ModelFile.load(GIVEN).text + COASTING)
     write_rich_script(folder / "drive.csv", DRIVE_S, 1)
     words = ["twin_run", "--plant", "planar", "--model", TRUTH, "--n", "1", "--script", "drive.csv"]
@@ -110,7 +110,7 @@ def _laboratory(folder: Path) -> int:
 
 
 def _typed(line: str, folder: Path) -> str:
-    """What a command prints that is typed in the folder."""
+    """Output of a command that is typed in the folder."""
     program, *words = shlex.split(line)
     own = [sys.executable, "-m", "twinmill_cli.main"]
     ended = subprocess.run(
@@ -132,7 +132,7 @@ def _words(found: Row) -> str:
 
 
 def _found(model: Path) -> Row:
-    """What the model that was made says of the coasting, beside what the robots have."""
+    """Coasting by the model that was made, and that of the robots."""
     effects = tomlkit.parse(model.read_text()).unwrap().get("effect", [])
     what, true = "deceleration of coasting robots", (DECELERATION_MPS2,) * 2
     for effect in effects:

@@ -344,7 +344,7 @@ def _tell_fault(fault: str) -> None:
 
 
 def _waiting_words(left: set[int], unheard: list[str], timeout_s: float) -> str:
-    """What a stop waits for."""
+    """Reason why a stop still waits."""
     names = _names(left)
     where = f" from {', '.join(unheard)}" if unheard else ""
     whom = f"{names} to sign that they stand" if names else f"a robot to be heard{where}"

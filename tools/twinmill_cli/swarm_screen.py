@@ -62,7 +62,7 @@ def status_table(robots: list[Robot]) -> Fitting | Text:
 
 
 def _link(robot: Robot) -> Text:
-    """What it has signed of how it may be commanded."""
+    """Signed statement of how the robot may be commanded."""
     if not robot.link:
         return Text("not signed", "red")
     if not robot.is_armed:

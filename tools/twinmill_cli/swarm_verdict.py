@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What came of a command to a swarm, once: sentence, exit code and `ok` follow from one value."""
+"""Outcome of a command to a swarm: sentence, exit code and `ok` follow from one value."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Verdict:
         return 0 if self.ok else 1
 
     def beside(self, driving: list[str]) -> Verdict:
-        """The same, said beside robots that nobody asked, and that drive."""
+        """This outcome with a word on robots that were not asked, and that drive."""
         if not driving:
             return self
         verb = "drives" if len(driving) == 1 else "drive"
@@ -154,7 +154,7 @@ def _of_nobody(begun: Start, at: str) -> str:
 
 
 def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | None) -> Verdict:
-    """What came of robots that were held.
+    """Outcome for robots that were held.
 
     Args:
         begun: what came of their start; None: nobody knows, it was ended before.

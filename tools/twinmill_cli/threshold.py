@@ -166,7 +166,7 @@ def _fit(
 
 
 def _problem(found: dict[str, Fitted]) -> str:
-    """What keeps the limits from being used; empty if nothing does."""
+    """Reason why the limits cannot be used; empty if they can."""
     problems = [fitted.problem for fitted in found.values() if fitted.problem]
     problems += [
         f"{a} and {b} overlap: a robot would take one for the other" for a, b in _overlaps(found)

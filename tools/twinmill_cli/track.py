@@ -206,7 +206,7 @@ def _track(
 
 @dataclass(frozen=True)
 class _Found:
-    """What was found in films, in their order.
+    """Tags found in films, in their order.
 
     Attributes:
         films: which.

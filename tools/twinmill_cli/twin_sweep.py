@@ -8,10 +8,12 @@ from typing import Annotated
 import typer
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
+from twinmill.arguments import spelled
 from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill_cli.ending import leave
 from twinmill_cli.options import SpreadM, Start
 from twinmill_cli.output import AsJson, busy, deliver
+from twinmill_cli.spelling import typed
 
 AXIS_HELP = "name=from:to:count or name=value,value,..."
 app = typer.Typer(
@@ -118,7 +120,8 @@ def main() -> None:
 
 
 def _run(words: list[str]) -> int:
-    return app(words, prog_name="twin_sweep", standalone_mode=False)
+    with spelled(typed):
+        return app(words, prog_name="twin_sweep", standalone_mode=False)
 
 
 if __name__ == "__main__":

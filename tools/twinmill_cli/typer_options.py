@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Typer's options do otherwise in all programs here, once this module is imported."""
+"""Changes to Typer's options in all programs here, made when this module is imported."""
 
 import math
 import re
@@ -26,12 +26,12 @@ def _of_argument(argument: TyperArgument, ctx: typer.Context) -> str | None:
 
 
 def _plain(shown: str | None) -> str | None:
-    """What one value is: Typer's `<list[Path]>` and `<int range>` as `<path>` and `<int>`."""
+    """Kind of one value: Typer's `<list[Path]>` and `<int range>` as `<path>` and `<int>`."""
     return shown and re.sub(r"<list\[(.*)\]>|<(\w+) range>", r"<\1\2>", shown).lower()
 
 
 class _Word:
-    """What a word of the command line is where any word will do, as a text or path; or a flag.
+    """Type of a word of the command line where any word will do, as a text or path; or a flag.
 
     Typer asks pydantic, which takes twice as long to import as NumPy.
     """

@@ -8,6 +8,7 @@ theta_a of all runs here. A steady-state table has more robots and operating poi
 import numpy as np
 from scipy.stats import chi2
 
+from twinmill.arguments import option
 from twinmill.claims.rows import Claim, Row
 from twinmill.data.steady_table import SteadyTable
 
@@ -55,7 +56,10 @@ def actuation(sheets: list[SteadyTable]) -> Claim:
 
 def _told(sheets: list[SteadyTable], measured: list[Row]) -> str:
     if not sheets:
-        return "Without a table of measured robots (--actuation) nothing stands beside them."
+        return (
+            f"Without a table of measured robots ({option('actuation')}) nothing stands beside "
+            "them."
+        )
     straight, turning = (
         [row.value for row in measured if row.by["turns"] is turns] for turns in (False, True)
     )

@@ -7,6 +7,7 @@ Vega, Zhu, Mattson, Brown and Nowzari 2024 (arXiv 2410.16444).
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from twinmill.arguments import option
 from twinmill.claims.rows import Claim, Row
 
 
@@ -87,7 +88,7 @@ PARTS = (
         ("actuation",),
         open="Whether N(1, 0.04) is a standard deviation or a variance, and at which inputs.",
         elsewhere="A table of yours, or the authors' public one, which is no part of this "
-        "project, stands beside it with --actuation TABLE.",
+        f"project, stands beside it with {option('actuation')} TABLE.",
     ),
 )
 

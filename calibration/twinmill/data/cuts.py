@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.log import RobotLog
 
 GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
@@ -270,7 +271,7 @@ def _of_cut(robot: RobotLog, ends: np.ndarray, *, gap: bool, lost: bool, moves: 
             f"cut at {begin_s:.3f} s: the heading steps by {turn_deg:.0f} degrees from one pose to "
             "the next, and the place does not: the tracker's body was turned or made anew, so "
             "import what lies before and after as logs of their own, each with its "
-            "--heading-offset-deg."
+            f"{option('heading_offset_deg')}."
         )
     moved_m = np.hypot(*(robot.pose[ends[1], :2] - robot.pose[ends[0], :2]))
     what = "not tracked" if lost else "no poses" if gap else "the robot jumps"

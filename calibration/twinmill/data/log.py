@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.data.lcm_log import (
     Events,
     LogError,
@@ -93,7 +94,7 @@ class RobotLog:
 
     @property
     def has_heading(self) -> bool:
-        """Whether the heading was recorded; of a robot that was never seen nothing is missing."""
+        """True if the heading was recorded, or the robot was never seen."""
         return not self.valid.any() or bool(np.isfinite(self.pose[self.valid, 2]).any())
 
 
@@ -119,7 +120,7 @@ class Log:
     data: bytes | None = field(default=None, repr=False)
 
     def read_bytes(self) -> bytes:
-        """What its file holds, or would hold.
+        """Bytes of its file, or of the file that `save` would write.
 
         Raises:
             LogError: the file cannot be read.
@@ -164,7 +165,7 @@ def _decoded(data: bytes, path: Path, channel_prefix: str) -> Log:
 
 
 def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = "") -> Log:
-    """What read_log does, of events that were cut out of a file or heard on a bus."""
+    """Decodes events as `read_log` does, but from part of a file or from a bus."""
     warnings = list(events.warnings)
     channels = _robot_channels(events.by_channel, channel_prefix, warnings)
     if not channels:
@@ -174,7 +175,7 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
             raise LogError(
                 f"{path.name}: tells what cameras saw ({names}), and nothing of where the robots "
                 "were or what they were told; import the poses and commands of the same time with "
-                "it: twinmill import --poses P --commands C --detections D."
+                f"it ({option('poses')}, {option('commands')}, {option('detections')})."
             )
         raise LogError(
             f"{path.name}: no channel {channel_prefix}R<nn>_TELEMETRY, _DRIVE or _POSE "
@@ -367,7 +368,7 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
 
 
 def _last_run(payloads: list[bytes], robot_id: int, warnings: list[str]) -> turbopi.run_t:
-    """What the robot said of itself last, of what can be read; empty if it said nothing."""
+    """Last readable message in which the robot describes itself; empty if there is none."""
     if not payloads:
         return turbopi.run_t()
     for count, payload in enumerate(reversed(payloads)):
@@ -386,7 +387,7 @@ def _last_run(payloads: list[bytes], robot_id: int, warnings: list[str]) -> turb
 
 
 def _says_same_clock(config_toml: str) -> bool:
-    """What `twinmill import --same-clock` noted; robots write other things, or no TOML at all."""
+    """True if the import noted one clock; robots write other things, or no TOML at all."""
     try:
         table = tomllib.loads(config_toml).get("import")
     except (tomllib.TOMLDecodeError, RecursionError):

@@ -17,6 +17,7 @@ from typing import TextIO
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.log import LogError
 from twinmill.data.nameless import messages, trajectory, whole
 from twinmill.data.other_files import GZIP, other_file
@@ -282,7 +283,7 @@ class Table:
             return LogError(
                 f"{self.name}: its first line holds numbers and no names, so its columns are "
                 f"called {self.header[0]} to {self.header[-1]}; write a line of names above, or "
-                f"say what each is, as with --rename {self.header[0]}={column}."
+                f"say what each is, as with {option('rename', {self.header[0]: column})}."
             )
         own = _quantity(column)
         same = [name for name in self.strange if own and _quantity(name) == own]
@@ -290,13 +291,16 @@ class Table:
         near = difflib.get_close_matches(column, same, n=1, cutoff=0.0)
         near = near or difflib.get_close_matches(column, open_names, n=1, cutoff=NEAR)
         if not near:
-            which = f", or say which of {', '.join(self.strange)} holds it: --rename NAME={column}"
+            which = (
+                f", or say which of {', '.join(self.strange)} holds it: "
+                f"{option('rename', {'NAME': column})}"
+            )
             return LogError(
                 f"{self.name}: column {column} is missing; add it{which if self.strange else ''}."
             )
         return LogError(
             f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
-            f"it in the file or with --rename '{near[0]}={_in_unit_of(near[0], column)}'."
+            f"it in the file or with {option('rename', {near[0]: _in_unit_of(near[0], column)})}."
         )
 
 

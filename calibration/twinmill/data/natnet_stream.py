@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from natnet import DataDescriptions, DataFrame, NatNetError, Version
 from natnet.packet_buffer import PacketBuffer
 
+from twinmill.arguments import option
+
 COMMAND_PORT, DATA_PORT, GROUP = 1510, 1511, "239.255.42.99"
 CONNECT, SERVER_INFO, REQUEST_MODELS, MODELS, FRAME, KEEP_ALIVE = 0, 1, 4, 5, 7, 10
 HEADER = struct.Struct("<HH")
@@ -83,7 +85,7 @@ def find_server(address: str, local: str = "", port: int = COMMAND_PORT) -> Serv
                 f"{port} and {DATA_PORT})."
             ) from error
         except OSError as error:
-            which = f"--local {local}" if local else f"--server {address}"
+            which = f"{option('local', local)}" if local else f"{option('server', address)}"
             raise StreamError(
                 f"{which}: {error.strerror or error}; give addresses of one network "
                 "(`ip address` shows those of this machine)."

@@ -9,6 +9,7 @@ import numpy as np
 import turbopi
 from natnet import DataFrame
 
+from twinmill.arguments import option
 from twinmill.data.importers.motive import number_of
 from twinmill.data.importers.series import multiply, with_z_up
 from twinmill.data.natnet_stream import Stream
@@ -144,16 +145,17 @@ class Robots:
         if self.frames:
             return Check("frames", True, f"{self.frames} frames")
         if others := sorted(self.stream.strangers):
-            mend = f"give --server {others[0]}: that is who streams here"
+            mend = f"give {option('server', others[0])}: that is who streams here"
         elif not self.stream.multicast:
             mend = (
                 f"let UDP from {server.address} through this machine's firewall; or Motive streams "
-                "by multicast, which --multicast hears"
+                f"by multicast, which {option('multicast', True)} hears"
             )
         else:
             mend = (
                 f"see that Motive's Local Interface is the network of {server.local} (else give "
-                f"--local), let UDP {server.data_port} through this machine's firewall, and know "
+                f"{option('local')}), let UDP {server.data_port} through this machine's firewall, "
+                "and know "
                 "that wireless networks and managed switches often carry no multicast: set Motive "
                 "to unicast"
             )
@@ -177,7 +179,10 @@ class Robots:
         strange = [names[body] for body, number in numbers.items() if number < 0]
         found = [Check("rigid bodies", bool(taken), taken or "none is a robot's")]
         if strange:
-            words = f"{', '.join(strange)}: no number of its own in 0..99; give --robot NAME=ID"
+            words = (
+                f"{', '.join(strange)}: no number of its own in 0..99; give "
+                f"{option('robot', {'NAME': 'ID'})}"
+            )
             found.append(Check("numbers", False, words))
         for body, count in self.seen.items():
             share = self.tracked[body] / count
@@ -198,6 +203,10 @@ class Robots:
             return Check("up axis", True, f"{axis}: bodies turn about it")
         words = (
             f"bodies turn about {axis} ({count} frames), but {self.view.up} is taken to be up: "
-            + (f"say --up {axis}" if axis in "yz" else "make the rigid bodies anew, lying level")
+            + (
+                f"say {option('up', axis)}"
+                if axis in "yz"
+                else "make the rigid bodies anew, lying level"
+            )
         )
         return Check("up axis", False, words)

@@ -11,7 +11,7 @@ RAW = "get the file itself, as by the button for raw contents or a download"
 TO_CSV = "save it as CSV"
 OF_PANDAS = "write its table as CSV, as with pandas: to_csv; or give frames to tm.Log.from_frames"
 LCM_LOG = "an LCM log"
-OF_BAG = "give it to `twinmill import --bag`"
+OF_BAG = "import it as a bag"
 # What it begins with, what it is, and what to do. From the formats' own specifications.
 BEGINNINGS = (
     (
@@ -64,7 +64,7 @@ def other_file(beginning: bytes) -> tuple[str, str] | None:
         return (
             "the output of `ros2 topic echo`, or other YAML, whose messages have no times of their "
             "own",
-            "record a bag, or write a table with echo --csv",
+            "record a bag, or write a table as echo can, with commas",
         )
     return None
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from itertools import groupby
 from pathlib import Path
 
+from twinmill.arguments import option
 from twinmill.data.bus import Senders, open_bus
 from twinmill.data.lcm_log import Events, split_events
 from twinmill.data.log import read_bytes
@@ -83,7 +84,8 @@ def from_bus(
         bus.subscribe(CHANNELS, hear)
     except RuntimeError as error:
         raise ValueError(
-            f"--lcm-url {url}: cannot be joined; is there a network with a route for multicast "
+            f"{option('lcm_url', url)}: cannot be joined; is there a network with a route for "
+            "multicast "
             "(ip route add 224.0.0.0/4 dev DEVICE)?"
         ) from error
     end_s = time.monotonic() + duration_s

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.cuts import USUAL_MPS, USUAL_RADPS, find_segments
 from twinmill.data.log import CommandKind, LogError, RobotLog
 from twinmill.data.lost_commands import lost_commands, words
@@ -115,7 +116,7 @@ def make_track(
         remedy = "record telemetry and motion capture together"
         if not len(robot.command_t_s):
             why = "the log has no commands of it"
-            remedy += ", or import anew with what it was told (`twinmill import --commands`)"
+            remedy += f", or import anew with what it was told ({option('commands')})"
         raise LogError(f"robot {robot.robot_id}: {why}, so nothing can be predicted; {remedy}.")
     notes: list[str] = []
     lost_s = np.empty((0, 2)) if len(robot.mode) else lost_commands(robot)
@@ -130,13 +131,15 @@ def make_track(
         if astray_rad:
             back = abs(astray_rad) > np.pi - ASTRAY_RAD
             unless = (
-                ", unless all its commands have the wrong sign (--flip); tags drawn by AprilTag "
-                "stand on their head against OpenCV's (`twinmill track --family tag36h11`)"
+                f", unless all its commands have the wrong sign ({option('flip')}); tags drawn by "
+                "AprilTag "
+                "stand on their head against OpenCV's (`twinmill track` with "
+                f"{option('family', 'tag36h11')})"
             )
             notes.append(
                 f"driven ahead, the robot moves {np.degrees(astray_rad):.0f} degrees to the "
-                "left of its heading; turn the poses by that (`twinmill import "
-                f"--heading-offset-deg R{robot.robot_id:02d}={np.degrees(astray_rad):.0f}`)"
+                "left of its heading; turn the poses by that (import with "
+                f"{option('heading_offset_deg', round(np.degrees(astray_rad)), robot.robot_id)})"
                 f"{unless if back else ''}."
             )
     else:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis import moments
@@ -117,11 +118,6 @@ LACKS = {
     "history": "a steady table does not say how long the robot had been driving",
     "wheel_angle": "a steady table gives means over many turns of the wheels",
 }
-TWO_CLOCKS = (
-    "commands and poses use different clocks, so a delay cannot be told from the offset; if both "
-    "use one clock, say so (twinmill import "
-    "--same-clock), or fit a calibration log on the same clocks first"
-)
 CHANGING = (
     "how late the robot follows its commands changes within the log, so that no lag and no delay "
     "holds for all of it; look at what sent the commands, and log again"
@@ -342,7 +338,12 @@ def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
     if not tables:
         shared = any(not o.same_clock for o in opened if o.floor)
         if shared:
-            found |= dict.fromkeys(making_late("delay"), TWO_CLOCKS)
+            why = (
+                "commands and poses use different clocks, so a delay cannot be told from the "
+                f"offset; if both use one clock, say so ({option('same_clock', True)}), or fit a "
+                "calibration log on the same clocks first"
+            )
+            found |= dict.fromkeys(making_late("delay"), why)
         if all(o.heading_held for o in opened if o.floor):
             found |= dict.fromkeys(needing("heading"), NO_HEADING)
         if sum(o.floor is not None for o in opened) > 1:

@@ -10,6 +10,7 @@ from typing import Any
 import tomlkit
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue_name, catalogue_of, effect_names
 
@@ -174,10 +175,10 @@ def _shares(path: Path) -> dict[str, float]:
         found = data["findings"]
         return {str(f["effect"]): float(f["share"]) for f in found if f["share"] is not None}
     except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"--diagnosis {path}: cannot be read.") from error
+        raise ValueError(f"{option('diagnosis', str(path))}: cannot be read.") from error
     except (ValueError, TypeError, KeyError) as error:
         raise ValueError(
-            f"--diagnosis {path}: is not what `twinmill diagnose --json` prints; save that there."
+            f"{option('diagnosis', str(path))}: is not the JSON of a diagnosis; save that there."
         ) from error
 
 

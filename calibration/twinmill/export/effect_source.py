@@ -12,6 +12,7 @@ from textwrap import wrap
 import twinmill_native as native
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from twinmill.arguments import option
 from twinmill.diagnosis.trials import REFIT
 from twinmill.export.formula_cpp import in_cpp
 from twinmill.fitting.add import OWN_GAINS
@@ -161,7 +162,7 @@ def _chosen(model_file: ModelFile, instance: str | None) -> str:
         raise ModelError(f"{model_file.path.name}: has no equation; `add equation` takes one in.")
     if instance is None and len(has) > 1:
         raise ModelError(
-            f"{model_file.path.name}: has several equations; say which by --equation: "
+            f"{model_file.path.name}: has several equations; say which by {option('equation')}: "
             f"{', '.join(has)}."
         )
     if instance is not None and instance not in has:
@@ -204,7 +205,7 @@ def _check(name: str, model: native.Model, root: Path, files: Sequence[Path]) ->
     if missing := next((place for place in needed if not (root / place).exists()), None):
         raise ModelError(
             f"{root}: holds no {missing}, so it is not the project's source; run this there, or "
-            "name it with --into."
+            f"name it with {option('into')}."
         )
     if there := next((f for f in files if f.exists()), None):
         raise ValueError(f"{there}: exists already; take another name, or remove it.")

@@ -22,6 +22,7 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
 from twinmill.export.drive import wheel_gains
 
@@ -67,7 +68,7 @@ def mjcf(robot: RobotModel) -> tuple[str, list[Left]]:
     if model.wheel_kind == "ackermann":
         raise ValueError(
             f"{robot.file.path}: a steered robot's wheels have no MJCF here; "
-            "use --to urdf, sdf or json."
+            f"use {option('to', 'urdf')}, sdf or json."
         )
     left = _left(robot)
     lags_s = _lags_s(robot)

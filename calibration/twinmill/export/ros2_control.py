@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A model as parameters for the controllers of ros2_control; joints as in the URDF."""
 
+from twinmill.arguments import option
 from twinmill.export.carried import Left, RobotModel
 from twinmill.export.drive import drive_of, wheel_gains
 from twinmill.extras import needing
@@ -20,7 +21,7 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     if kind not in CONTROLLERS:
         raise ValueError(
             f"{robot.file.path}: ros2_control drives {' and '.join(CONTROLLERS)} wheels here, not "
-            f"'{kind}'; use --to json."
+            f"'{kind}'; use {option('to', 'json')}."
         )
     plugin, parameters = CONTROLLERS[kind]
     name = plugin.split("/")[0]

@@ -13,6 +13,7 @@ from string import Template
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.experiment.played import Rows
 from twinmill.extras import needing
 from twinmill.files import check_new_file, replacing_folder
@@ -50,8 +51,8 @@ class TwistScript:
             return cls(rows.t_s, rows.command[:, :3], rows.end_s)
         if model.drive != "duty":
             raise ValueError(
-                f"--script-as: the script holds duties, and the model's robot is told by "
-                f"'{model.drive}'; give the model of a duty robot with --model."
+                f"{option('script_as')}: the script holds duties, and the model's robot is told by "
+                f"'{model.drive}'; give the model of a duty robot with {option('model')}."
             )
         duty = np.ascontiguousarray(rows.command)
         steady = native.steady(model, duty, [], np.zeros((0, 0)))[0]

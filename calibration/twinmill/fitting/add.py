@@ -5,7 +5,7 @@ An effect on motion is fitted together with the base; one of the camera to detec
 the model's other effects of the camera.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
@@ -194,6 +195,7 @@ def add_to_model(
     path: Path,
     command: str,
     texts: dict[str, str] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
 ) -> AddResult:
@@ -206,6 +208,7 @@ def add_to_model(
         path: where the new model may be written.
         command: recorded in it.
         texts: the effect's formula and the like, by name.
+        priors: mean and standard deviation of its parameters, by name, where they are known.
         held: names of quantities that keep their values; beside an effect of the camera all of the
             motion do.
         robot_id: of the robot that alone has it; by default all have.
@@ -236,8 +239,11 @@ def add_to_model(
         for own in judged(enlarged):
             check_states(own.data, _begun(own.model, fresh))
         fresh = sized(fresh, enlarged)
+    known = {f"{name}.{own}": prior for own, prior in (priors or {}).items()}
+    fresh = Choice(priors=known).of(fresh, richer)
     if robot_id is None:
-        moved, found = fitted(enlarged, [*old, *fresh], fresh)
+        unknown = [p for p in fresh if p.name not in known]
+        moved, found = fitted(enlarged, [*old, *fresh], unknown, informed=known)
     else:
         moved, found = fitted(with_own(enlarged, robot_id, fresh), old, fresh)
     _check_acts(found, fresh, texts or {})
@@ -388,7 +394,7 @@ def _check_not_new(held: Collection[str], fresh: Sequence[Parameter]) -> None:
     if name := next((p.name for p in fresh if p.name in held), None):
         raise ModelError(
             f"{name}: is of what is added, and has no value yet that could be held; add it, put a "
-            "value in with `twinmill set`, and hold that with `twinmill fit --hold`."
+            f"value in with `twinmill set`, and hold that in a fit ({option('hold')})."
         )
 
 

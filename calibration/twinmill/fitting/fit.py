@@ -74,7 +74,7 @@ class Statistics:
 
     @classmethod
     def of(cls, fit: ScoreFit) -> "Statistics":
-        """Of a finished fit."""
+        """Statistics of a finished fit."""
         return cls(
             fit.whole_covariance,
             max(fit.blocks - 1, 1),
@@ -92,7 +92,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class FitResult:
-    """What a fit did.
+    """Result of a fit.
 
     Attributes:
         before, after: comparisons over the same floors.
@@ -115,7 +115,7 @@ class FitResult:
 
     @property
     def path(self) -> Path:
-        """Of the new model."""
+        """Path of the new model."""
         return self.child.path
 
     def to_json(self) -> dict[str, Any]:
@@ -133,7 +133,7 @@ class FitResult:
 
 @dataclass(frozen=True)
 class Choice:
-    """What a fit moves, and what is known before.
+    """Free parameters of a fit, and their priors.
 
     Attributes:
         hold: names that keep their values: quantities, or effects and tables as a whole.
@@ -146,7 +146,7 @@ class Choice:
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def of(self, usual: Sequence[Parameter], model: native.Model) -> list[Parameter]:
-        """What is fitted, of what usually is.
+        """Parameters to fit, chosen from the usual ones.
 
         Raises:
             ModelError: a name is of nothing that a fit of the motion can move.
@@ -182,7 +182,7 @@ MOTION = ("base.", "robot.")  # sections whose numbers say how a robot moves
 
 
 def _among(name: str, given: Collection[str]) -> bool:
-    """Whether a quantity is named, or what it is a part of."""
+    """True if the names have a quantity, or the effect or table that it is part of."""
     return any(name == g or name.startswith(f"{g}.") for g in given)
 
 
@@ -237,7 +237,7 @@ def _gains(own: Opened, model: native.Model) -> list[str]:
 
 
 def _of_wheels(own: Opened) -> bool:
-    """Whether it is a bench test, which tells speeds of wheels and no motion."""
+    """True for a bench test, which has speeds of wheels and no motion."""
     return isinstance(own.data, SteadyStates) and own.data.measurement.of_wheels
 
 
@@ -372,7 +372,7 @@ def _told(
 
 
 def noise_of(after: Comparison) -> Noise | None:
-    """Of the first log that has a score; None of tables."""
+    """Noise of the first log with a score; None if there are tables alone."""
     logs = [r for r in after.robots if isinstance(r, RobotComparison) and np.isfinite(r.score)]
     return next((r.modelled.noise_at_speed for r in logs if r.modelled.noise), None)
 

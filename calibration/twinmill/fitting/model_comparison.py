@@ -29,7 +29,7 @@ SEED = 1  # of the integration of a distribution
 
 @dataclass(frozen=True)
 class Predicted:
-    """What one model makes of left-out parts.
+    """Predictions of one model for left-out parts.
 
     Attributes:
         score: held-out, of all data sets.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a fitted model leaves of each prediction, in its own unit."""
+"""Residuals of each prediction, in its own unit."""
 
 from dataclasses import dataclass
 
@@ -50,7 +50,7 @@ class Residuals:
 
 
 def residuals_of(fit: ScoreFit) -> list[Residuals]:
-    """Of each data set of a finished fit."""
+    """Residuals of each data set of a finished fit."""
     found: list[Residuals] = []
     for data, model, rows in zip(fit.datasets, fit.models, fit.state[0], strict=True):
         if isinstance(data, Trajectory):

@@ -7,6 +7,7 @@ import numpy as np
 import tomlkit
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.inference.moments import Rate
 from twinmill.inference.prior import Always
 from twinmill.model.model_file import ModelError, ModelFile
@@ -43,7 +44,7 @@ def kept(model_file: ModelFile) -> Always | None:
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(
             f"{model_file.path}: [fit.always] cannot be read ({error}); take the table out, and "
-            "give the model's own log with --own."
+            f"give the model's own log with {option('own')}."
         ) from error
 
 

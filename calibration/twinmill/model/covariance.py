@@ -12,7 +12,7 @@ SYMMETRIC = 1e-4  # relative: entries are written with six digits
 
 @dataclass(frozen=True)
 class Covariance:
-    """Of fitted quantities.
+    """Covariance of fitted quantities.
 
     Attributes:
         names: in the model, P of them.
@@ -47,7 +47,7 @@ class Covariance:
         return cls(names, values)
 
     def of(self, names: Collection[str]) -> "Covariance":
-        """Of those of its quantities that are among the names."""
+        """Covariance of the named quantities alone."""
         kept = [i for i, name in enumerate(self.names) if name in names]
         return Covariance(tuple(self.names[i] for i in kept), self.values[np.ix_(kept, kept)])
 

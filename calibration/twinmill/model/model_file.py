@@ -79,7 +79,7 @@ class ModelFile:
 
     @cached_property
     def _document(self) -> dict[str, Any]:
-        """What the text says, without how it says it, which takes tomlkit long to read."""
+        """Parsed text without its layout, which takes tomlkit long to read."""
         return tomllib.loads(self.text)
 
     @property
@@ -139,7 +139,7 @@ class ModelFile:
         return {f"{e['name']}.{k}": float(v) for e in effects for k, v in e.get("std", {}).items()}
 
     def fitted_on(self, log_sha256: Collection[str]) -> bool:
-        """Whether the base was fitted to one of these very logs."""
+        """True if the base was fitted to one of these very logs."""
         base = self._document.get("base", {})
         return bool(set(base.get("fitted_on", [])) & set(log_sha256))
 
@@ -154,7 +154,7 @@ class ModelFile:
         return max(1.0, float(score))
 
     def left_over(self, log_sha256: Collection[str]) -> dict[str, float]:
-        """What the model left in other logs: fall of chi2 per step by what it depends on."""
+        """Residual structure in other logs: fall of chi2 per step by what it depends on."""
         table = self.fit.get("left_over", {})
         if set(table.get("fitted_on", [])) & set(log_sha256):
             return {}
@@ -172,12 +172,12 @@ class ModelFile:
 
     @property
     def fit(self) -> dict[str, Any]:
-        """What the last fit told: `logs`, scores, and tables that others keep there."""
+        """Record of the last fit: `logs`, scores, and tables that others keep there."""
         return dict(self._document.get("fit", {}))
 
     @property
     def covariance(self) -> Covariance:
-        """Of what fits told; empty if there was none, or an older version wrote the file.
+        """Covariance of the estimates; empty without a fit, or in a file of an older version.
 
         Raises:
             ModelError: what stands there is none, or is of quantities that the model has not.
@@ -199,12 +199,12 @@ class ModelFile:
 
     @property
     def hash(self) -> str:
-        """Of the text, as a child names its parent."""
+        """Hash of the text, by which a child names its parent."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 
 def quantity_names(model: native.Model) -> set[str]:
-    """Of all quantities; effects' as `wheel_gain.fl`."""
+    """Names of all quantities; those of effects as `wheel_gain.fl`."""
     return {v["name"] for v in model.values()}
 
 

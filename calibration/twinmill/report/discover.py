@@ -7,6 +7,7 @@ import numpy as np
 import twinmill_native as native
 from matplotlib.axes import Axes
 
+from twinmill.arguments import option
 from twinmill.report import Figure, Section
 from twinmill.report.canvas import draw
 from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, paint_paths
@@ -39,7 +40,9 @@ def section(
     twins += " and in MuJoCo" if shown[0].mujoco is not None else ""
     waiting = sum(entry.holds and not entry.name for entry in found)
     untried = (
-        f"; {waiting} were not run in MuJoCo, more of which --show asks for" if waiting else ""
+        f"; {waiting} were not run in MuJoCo, more of which {option('show')} asks for"
+        if waiting
+        else ""
     )
     return Section(
         title="Behaviours that were found",
@@ -149,9 +152,11 @@ def _table(shown: list[Entry]) -> Table:
             *(UNITS.get(name, name) for name in MEASURES),
         ],
         rows,
-        "The first column goes after --behavior. So called: the share that is what its name says, "
+        f"The first column goes after {option('behavior')}. So called: the share that is what "
+        "its name says, "
         f"of {runs} runs with fresh seeds; in twins: of as many drawn from the model's errors, if "
-        "it knows them; in MuJoCo: of the fewer runs there (--mujoco). Alike: 1 is the same "
+        f"it knows them; in MuJoCo: of the fewer runs there ({option('mujoco')}). Alike: 1 is "
+        "the same "
         "whatever the seed. Odd ones: how far from the middle they are, over the ring's radius, "
         "and 2 if farther.",
     )

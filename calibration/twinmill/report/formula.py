@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.diagnosis.forms import ANGLES
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import Rest
@@ -62,7 +63,7 @@ def taken(beyond: Taken | None) -> list[str]:
         f"The model has a formula{place}, fitted together with the rest: {beyond.added.equals}. It "
         f"takes {100 * beyond.share:.0f} % of the squared error above the floor that was left "
         f"(held-out score {scores}). {_numbers(beyond.added)}"
-        " --no-formula leaves it out.",
+        f" {option('formula', False)} leaves it out.",
         *([beyond.note] if beyond.note else []),
     ]
 

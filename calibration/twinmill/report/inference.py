@@ -4,6 +4,7 @@
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from twinmill.arguments import option
 from twinmill.inference.answer import Answer, Named
 from twinmill.inference.infer import Inference
 from twinmill.model.parameters import catalogue
@@ -68,7 +69,8 @@ def _of_one(result: Inference) -> RenderableType:
         parts.append(
             Text(
                 "What the model misses in the log that it was fitted to is not known, so it may be "
-                "told as news: give that log with --own, and keep what it tells with --keep."
+                f"told as news: give that log with {option('own')}, and keep what it tells with "
+                f"{option('keep')}."
             )
         )
     elif result.always.kernels or result.always.effects:

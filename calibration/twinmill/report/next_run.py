@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from twinmill.arguments import option
 from twinmill.experiment.design import Chance, Plan
 from twinmill.experiment.power import percent
 from twinmill.model.parameters import catalogue
@@ -168,8 +169,9 @@ def _narrowed(found: Narrowing) -> list[str]:
     if found.spread.foretold <= 0:
         said.append(
             f"Which number moves it is not known: what {len(shares)} models tell of another is no "
-            "better than their mean, so these points and this drive may be chance. More --draws "
-            "and --seeds tell, or nothing here matters (twinmill matters)."
+            "better than their mean, so these points and this drive may be chance. More "
+            f"{option('draws')} "
+            f"and {option('seeds')} tell, or nothing here matters (twinmill matters)."
         )
     if found.untold > SMALL_SHARE:
         said.append(

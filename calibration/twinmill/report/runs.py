@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from twinmill.arguments import option
 from twinmill.charts.arrays import measured_speed
 from twinmill.data.track import Track
 from twinmill.fitting.opening import Opened
@@ -134,7 +135,8 @@ def calibration(result: RunComparison) -> str:
         return (
             f"By the standard errors alone, so large a difference has a chance of {chance} without "
             "a change. That is not calibrated on this robot: what else varies between its days is "
-            f"not known. Give healthy runs with --healthy; {needed}, the first one included, "
+            f"not known. Give healthy runs with {option('healthy')}; {needed}, the first one "
+            "included, "
             f"promise false alarms in {wanted} of comparisons."
         )
     count = len(found.healthy)

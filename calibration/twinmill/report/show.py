@@ -79,7 +79,7 @@ def added(result: AddResult, not_written: str = "") -> RenderableType:
         score_line("", result.after, number_too=False),
         Text(),
         table(tables.parameters(own)),
-        Text(f"  and {rest} more refitted (--json has all).", "dim"),
+        Text(f"  and {rest} more refitted (the JSON has all).", "dim"),
         *(table(t) for t in tables.robots(result.after, result.before)),
         *(table(t) for t in tables.held_out(result)),
         *warned(result.after.warnings),
@@ -190,7 +190,7 @@ def warned(warnings: list[str]) -> list[RenderableType]:
     """What was left out or cut, line by line, but for what would be too much."""
     lines: list[RenderableType] = [Text(f"! {text}", "yellow") for text in warnings[:WARNINGS]]
     if len(warnings) > WARNINGS:
-        lines.append(Text(f"! and {len(warnings) - WARNINGS} more (--json has all).", "yellow"))
+        lines.append(Text(f"! and {len(warnings) - WARNINGS} more (the JSON has all).", "yellow"))
     return lines
 
 

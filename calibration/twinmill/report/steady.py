@@ -135,7 +135,7 @@ def cells(robots: list[SteadyComparison]) -> Table:
         rows,
         ("Duties of the wheels." if sheet.of_wheels else BY_VENDOR)
         + " Robots: how much they differ. Worst first"
-        + (f"; {rest} more in --json." if rest else "."),
+        + (f"; {rest} more in the JSON." if rest else "."),
         (len(sheet.input_names) + 3 * len(shown),),
     )
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.data.bus import Senders, open_bus
 from twinmill.defaults import URL
 from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
@@ -276,7 +277,8 @@ class Fleet:
             self.bus.subscribe(channels, self._on_message)
         except RuntimeError as error:
             raise ValueError(
-                f"--lcm-url {url}: cannot be joined ({error}); is there a network with a route for "
+                f"{option('lcm_url', url)}: cannot be joined ({error}); is there a network with a "
+                "route for "
                 "multicast (ip route add 224.0.0.0/4 dev DEVICE)?"
             ) from error
 

@@ -8,6 +8,8 @@ from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
 
+from twinmill.arguments import option
+
 KEY_BYTES, TAG_BYTES = 32, 16
 
 
@@ -40,19 +42,21 @@ def load(path: Path | None = None) -> bytes:
     file = path or default_path()
     if not file.exists():
         raise ValueError(
-            f"--key {file}: there is no key here, so no robot's answer is believed; copy the "
+            f"{option('key', str(file))}: there is no key here, so no robot's answer is believed; "
+            "copy the "
             "operator's, or make one: `twinmill flash`."
         )
     if not file.is_file():
-        raise ValueError(f"--key {file}: is no file; name the file of a key.")
+        raise ValueError(f"{option('key', str(file))}: is no file; name the file of a key.")
     if file.stat().st_mode & 0o077:
         raise ValueError(
-            f"--key {file}: others may read it; make a new one (remove it, and flash the robots "
+            f"{option('key', str(file))}: others may read it; make a new one (remove it, and flash "
+            "the robots "
             "again), or chmod 600 if nobody has."
         )
     text = file.read_text().strip()
     if len(text) != 2 * KEY_BYTES or set(text) - set("0123456789abcdef"):
-        raise ValueError(f"--key {file}: is not {2 * KEY_BYTES} hexadecimal digits.")
+        raise ValueError(f"{option('key', str(file))}: is not {2 * KEY_BYTES} hexadecimal digits.")
     return bytes.fromhex(text)
 
 

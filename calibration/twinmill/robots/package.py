@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
+from twinmill.arguments import option
+
 ROOT = Path(__file__).resolve().parents[3]
 # Debian's releases, and so Raspberry Pi OS's, that a package is built for.
 RELEASES = {"12": "bookworm", "13": "trixie"}
@@ -49,17 +51,17 @@ def read_package(path: Path) -> Package:
         ValueError: it is none, or not of the robot's program.
     """
     if not path.is_file():
-        raise ValueError(f"--package {path}: no such file.")
+        raise ValueError(f"{option('package', str(path))}: no such file.")
     fields = {}
     for name in ("Package", "Architecture", "Version", "Installed-Size"):
         done = subprocess.run(
             ["dpkg-deb", "--field", str(path), name], capture_output=True, text=True
         )
         if done.returncode != 0:
-            raise ValueError(f"--package {path}: is no Debian package.")
+            raise ValueError(f"{option('package', str(path))}: is no Debian package.")
         fields[name] = done.stdout.strip()
     if fields["Package"] != "turbopi":
-        raise ValueError(f"--package {path}: is '{fields['Package']}', not turbopi.")
+        raise ValueError(f"{option('package', str(path))}: is '{fields['Package']}', not turbopi.")
     size_kb = int(fields["Installed-Size"] or 0)
     release = re.search(r"~deb(\d+)$", fields["Version"])
     version = fields["Version"]
@@ -112,7 +114,8 @@ def build_package(suite: str, progress: Callable[[str], None]) -> Package:
     missing = [package for program, package in NEEDED.items() if not shutil.which(program)]
     if missing:
         raise ValueError(
-            f"the package cannot be built: install {' '.join(missing)}, or give --package FILE."
+            f"the package cannot be built: install {' '.join(missing)}, or give "
+            f"{option('package')} FILE."
         )
     sysroot, build = ROOT / ".deps" / f"sysroot-{suite}", ROOT / "build" / f"arm64-{suite}"
     if not sysroot.is_dir():

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
+from twinmill.arguments import option
 from twinmill.robots.fleet import Fleet
 from twinmill.robots.key import of_robot
 from twinmill.robots.package import Package, Packages
@@ -165,13 +166,14 @@ def _choose(
     if found.get("others") and not request.take_over:
         raise RemoteError(
             "in use",
-            f"these services of it drive the robot: {found['others']}. Give --take-over to stop "
-            "and disable them; --hand-back undoes that.",
+            f"these services of it drive the robot: {found['others']}. Give "
+            f"{option('take_over', True)} to stop "
+            f"and disable them; {option('hand_back', True)} undoes that.",
         )
     if request.packages is None:
         if "previous" not in found:
             raise RemoteError(
-                "no previous", "no package before is kept on it: give --package FILE."
+                "no previous", f"no package before is kept on it: give {option('package')} FILE."
             )
         return None
     try:

@@ -16,6 +16,7 @@ from typing import Any
 
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.robots.fleet import Fleet, Robot
 
 REPEAT_S = 0.03
@@ -33,7 +34,7 @@ SIGNED_VERBS = turbopi.signed_command_t
 NEVER_HEARD = "was never heard"
 NO_SIGNATURE = (
     "signs nothing with this operator's key: `twinmill flash` brings robots theirs; has it another "
-    "--key?"
+    "key?"
 )
 
 
@@ -104,8 +105,9 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     if not fleet.here():
         raise ValueError(
             f"no robot was heard in {FIND_S:g} s; are they switched on and on this network, is "
-            "--lcm-url that of their configuration, and does the network carry multicast? Where it "
-            "does not, `twinmill swarm stop --host ROBOT` stops a robot by its address."
+            f"{option('lcm_url')} that of their configuration, and does the network carry "
+            "multicast? Where it "
+            f"does not, `twinmill swarm stop` with {option('host')} stops a robot by its address."
         )
     return fleet.here()
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.chance import f_above, t_quantile
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement, of_one_robot
@@ -231,7 +232,7 @@ def of_robot(
     Raises:
         LogError: it is not there.
     """
-    remedy = "give commands and poses of one robot, or its number with --robot"
+    remedy = f"give commands and poses of one robot, or its number with {option('robot')}"
     return of_one_robot(measurements, f"{name}: holds", remedy, robot)[0]
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.chance import t_quantile
 from twinmill.defaults import ALARM_RATE
 from twinmill.model.parameters import CLOCK, CLOCK_RATE, catalogue_name
@@ -121,7 +122,7 @@ def drift(calibrations: Sequence[Calibration], rate: float = ALARM_RATE) -> Drif
         raise ValueError(
             f"the history has {len(calibrations)} calibration"
             f"{'s' * (len(calibrations) != 1)}, and drift shows from two on; add one with "
-            "`twinmill fit LOG --history`."
+            f"`twinmill fit` with {option('history')}."
         )
     names = [n.name for n in calibrations[-1].numbers]
     tested = max(1, sum(not _is_natural(name) for name in names))

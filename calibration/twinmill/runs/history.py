@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The history of one robot: a JSON line for each calibration, appended by `fit --history`."""
+"""The history of one robot: a JSON line for each calibration, appended by a fit."""
 
 import fcntl
 import json
@@ -11,6 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from twinmill.arguments import option
 from twinmill.data.measurement import Measurement
 from twinmill.files import plain
 from twinmill.fitting.fit import FitResult
@@ -110,8 +111,8 @@ def read_history(path: Path) -> list[Calibration]:
             one = Calibration.from_json(json.loads(line))
         except (KeyError, TypeError, ValueError) as error:
             raise ValueError(
-                f"{path}: line {number} is damaged, or was not written by `twinmill fit "
-                "--history`; delete that line and fit its log again."
+                f"{path}: line {number} is damaged, or was not written by a fit "
+                f"({option('history')}); delete that line and fit its log again."
             ) from error
         found[tuple(digest for _, digest in one.logs)] = one
     return sorted(found.values(), key=lambda c: c.recorded_utime_us)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
+
 Set = Callable[[native.Model, float], None]
 
 
@@ -137,7 +139,7 @@ def set_speeds(
         raise ValueError(
             f"v_mps and omega_degps need a model with base.drive = 'twist', and this one has "
             f"'{model.drive}', where speed and turn rate cannot be chosen freely; vary "
-            "base.forward_gain and base.yaw_gain, or take --model paper.toml."
+            f"base.forward_gain and base.yaw_gain, or take {option('model', 'paper.toml')}."
         )
     for name, value, inputs, scale in (
         ("speed", v_mps, table[::2], 1),

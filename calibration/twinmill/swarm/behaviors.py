@@ -6,6 +6,8 @@ import os
 import tomllib
 from pathlib import Path
 
+from twinmill.arguments import option
+
 NAME = "behaviors.toml"
 TABLE_SIZES = (4, 8, 16, 32)  # speed and turn of 2, 4, 8 or 16 rows
 
@@ -30,7 +32,8 @@ def parse_table(text: str) -> tuple[str, list[int]]:
             raise ValueError
     except ValueError:
         raise ValueError(
-            f"--table '{text}': write name=speed,turn,speed,turn, for nothing seen and for seen, "
+            f"{option('table', text)}: write name=speed,turn,speed,turn, for nothing seen and for "
+            "seen, "
             "as in spin=0,-1.5,100,0.5 (speed -100 to 100, turn -2 to 2), or 4, 8 or 16 such pairs."
         ) from None
     scales = itertools.cycle((1, 1000))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.log import Log
 from twinmill.defaults import FALSE_ALARMS
 from twinmill.programs import available_cores
@@ -267,5 +268,7 @@ def _table(name: str, robot: int) -> list[int]:
     if own:
         return parse_table(f"{name}={own}")[1]
     if not name:
-        raise ValueError(f"the log does not say what robot {robot} plays; give --behavior NAME.")
+        raise ValueError(
+            f"the log does not say what robot {robot} plays; give {option('behavior')}."
+        )
     return native.species(name, 1)[0][1]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.swarm.axes import ALIASES, Axis
 from twinmill.swarm.classes import check_goal, interval
 from twinmill.swarm.phase import CLASSES, Phase
@@ -157,7 +158,8 @@ def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict]:
         ours, theirs = varied(phase), varied(rival)
         if ours != theirs:
             raise ValueError(
-                f"--rival: that sweep varies {words(theirs)}, this one {words(ours)}; run it over "
+                f"{option('rival')}: that sweep varies {words(theirs)}, this one {words(ours)}; "
+                "run it over "
                 "the same values, with what is to differ in its model or in an axis of one value."
             )
         worth = divergence_bits(phase.outcomes, rival.outcomes)

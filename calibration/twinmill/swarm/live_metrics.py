@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.lcm_log import Events, LogError
 from twinmill.data.log import Log, decode_log
 from twinmill.data.stream import BATCH_S, Window, from_bus
@@ -139,7 +140,7 @@ def _nobody(url: str, silent_s: float, prefix: str | None) -> str:
         return f"{who} was heard on {url} yet"
     return (
         f"{who} was heard on {url} for {silent_s:.0f} s: are robots or twin_run on this network, "
-        "and is --lcm-url theirs?"
+        f"and is {option('lcm_url')} theirs?"
     )
 
 

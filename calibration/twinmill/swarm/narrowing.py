@@ -20,6 +20,7 @@ import numpy as np
 import pyarrow as pa
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.experiment.design import CENTRE, Floor, Limits, check, choose, log_of
@@ -136,9 +137,10 @@ def spread_of(
     found = Spread.of(known, shares)
     if found.std(found.covariance) < LEAST_STD:
         raise ValueError(
-            f"--for {request.behavior}: models drawn from what the fits leave open end alike "
+            f"{option('for', request.behavior)}: models drawn from what the fits leave open end "
+            "alike "
             f"({shares.min():.0%} to {shares.max():.0%} reach the goal), so no run of a robot can "
-            "narrow that; design for what is missing, without --for."
+            f"narrow that; design for what is missing, without {option('for')}."
         )
     return found
 
@@ -215,8 +217,9 @@ def narrow(
     check(measurements, file, limits)
     if file.model.drive != "duty":
         raise ValueError(
-            f"--for: the model is driven by {file.model.drive}, and what narrows a swarm's "
-            "prediction is a script of wheel duties; leave --for out."
+            f"{option('for')}: the model is driven by {file.model.drive}, and what narrows a "
+            "swarm's "
+            f"prediction is a script of wheel duties; leave {option('for')} out."
         )
     goal = goal_of(swarm)
     spread = spread_of(swarm, goal, draws=draws, seed=1, tell=tell)

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.swarm.axes import QUANTITIES, Axis, set_speeds
 from twinmill.swarm.model_text import with_values
 
@@ -246,7 +247,7 @@ def without_axes(request: Request) -> Request:
         quantity = QUANTITIES.get(axis.name)
         if len(axis.values) > 1 or (quantity and not quantity.set):
             raise ValueError(
-                f"--set {axis.name}: takes one value of a quantity of the model, as in "
+                f"{option('set', axis.name)}: takes one value of a quantity of the model, as in "
                 "sensor.range_m=0.8."
             )
         _apply(model, axis.name, axis.values[0])

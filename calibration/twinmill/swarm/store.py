@@ -9,6 +9,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from twinmill.arguments import option
 from twinmill.files import replacing
 from twinmill.swarm.request import Request
 
@@ -41,7 +42,7 @@ class Store:
             if self.read_manifest()["sha256"] != request.sha256:
                 raise ValueError(
                     f"{self.folder}: holds a sweep with other parameters, another model, "
-                    "version or physics; choose another --out, or remove it."
+                    f"version or physics; choose another {option('out')}, or remove it."
                 )
         elif self.folder.exists() and any(self.folder.iterdir()):
             raise ValueError(f"{self.folder}: is not empty and holds no sweep; choose another.")
@@ -91,7 +92,7 @@ def read_sweep(folder: Path) -> tuple[Request, pa.Table]:
     store = Store(folder)
     if not store.result.exists():
         state = "a sweep that is not finished" if store._manifest.exists() else "no sweep"
-        raise ValueError(f"{folder}: holds {state}; run twin_sweep --out {folder} to its end.")
+        raise ValueError(f"{folder}: holds {state}; run that sweep to its end.")
     try:
         table = pq.read_table(store.result)
         asked = table.schema.metadata[b"twinmill_request"]

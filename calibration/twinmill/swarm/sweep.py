@@ -8,6 +8,7 @@ from pathlib import Path
 
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, words
@@ -38,7 +39,9 @@ def make_request(
         raise ValueError(f"the axes {', '.join(names)}: each must be another quantity.")
     own = [parse_table(text) for text in tables or []]
     if twice := next((n for n, c in Counter(name for name, _ in own).items() if c > 1), None):
-        raise ValueError(f"--table {twice}: is given twice; give each behaviour one table.")
+        raise ValueError(
+            f"{option('table', twice)}: is given twice; give each behaviour one table."
+        )
     request = Request(
         behavior=behavior,
         model_name=model_file.path.name,
@@ -49,7 +52,7 @@ def make_request(
         **rest,
     )
     if request.plant not in PLANTS:
-        raise ValueError(f"--plant {request.plant}: must be {' or '.join(PLANTS)}.")
+        raise ValueError(f"{option('plant', request.plant)}: must be {' or '.join(PLANTS)}.")
     _check_size(request)
     unnamed = _unnamed(request.model)
     for point in request.points:
@@ -77,11 +80,12 @@ def _check_size(request: Request) -> None:
         raise ValueError(
             f"{request.world_count // request.seeds} cells of {request.seeds} seeds are "
             f"{request.world_count} worlds, and a sweep holds at most {MOST_WORLDS}; take fewer "
-            "values or --seeds."
+            f"values or {option('seeds')}."
         )
     if request.first_seed + request.world_count > MOST_SEEDS:
         raise ValueError(
-            f"--first-seed {request.first_seed}: seeds end at {MOST_SEEDS}; take a smaller one."
+            f"{option('first_seed', request.first_seed)}: seeds end at {MOST_SEEDS}; take a "
+            "smaller one."
         )
 
 

@@ -6,6 +6,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.programs import available_cores
 from twinmill.swarm.request import Request, run_part
 from twinmill.version import __version__
@@ -62,7 +63,9 @@ def run_on_dask(request: Request, parts: dict[int, range], address: str) -> Iter
     try:
         client = Client(address, timeout=CONNECT_S)
     except (OSError, ValueError) as error:
-        raise ValueError(f"--dask {address}: no scheduler answers there ({error}).") from error
+        raise ValueError(
+            f"{option('dask', address)}: no scheduler answers there ({error})."
+        ) from error
     with client:
         text = client.scatter(request.to_json(), broadcast=True, hash=False)
         number_of = {

@@ -7,6 +7,7 @@ import numpy as np
 import twinmill_native as native
 from scipy import ndimage
 
+from twinmill.arguments import option
 from twinmill.threshold.pictures import BT601, Picture
 
 KEYS = ("y_min", "y_max", "u_min", "u_max", "v_min", "v_max")
@@ -95,13 +96,13 @@ def find_ball(picture: Picture, colour: str = "green") -> Ball:
         )
         raise ValueError(
             f"{picture.name}: {largest or 'nothing in it is ' + colour}; say where the ball is: "
-            "--ball X,Y,R."
+            f"{option('ball')} X,Y,R."
         )
     sizes = [np.count_nonzero(blob[2]) for blob in found]
     if len(found) > 1 and sizes[1] > 0.5 * sizes[0]:
         raise ValueError(
             f"{picture.name}: round and {colour} are the things at {_where(found[0])} and at "
-            f"{_where(found[1])}; say which is the ball: --ball X,Y,R."
+            f"{_where(found[1])}; say which is the ball: {option('ball')} X,Y,R."
         )
     rows, columns, _ = found[0]
     middle = ((columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2)
@@ -224,12 +225,13 @@ def _other_colour(pictures: list[Picture], balls: list[Ball]) -> str:
     if len(hues) == 2:
         return (
             f"what was taken for the ball in {pictures[0].name} has another colour than in "
-            f"{pictures[1].name}; say where it is in each: --ball X,Y,R"
+            f"{pictures[1].name}; say where it is in each: {option('ball')} X,Y,R"
         )
     name, ball = pictures[int(off.argmax())].name, balls[int(off.argmax())]
     return (
         f"{name}: what was taken for the ball, at {ball.x_px:.0f},{ball.y_px:.0f}, has another "
-        "colour than in the other pictures; say where it is, once per picture: --ball X,Y,R"
+        "colour than in the other pictures; say where it is, once per picture: "
+        f"{option('ball')} X,Y,R"
     )
 
 

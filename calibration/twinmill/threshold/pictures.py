@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
+from twinmill.arguments import option
 from twinmill.robots.remote import Remote
 
 RAW = {".yuyv", ".yuv", ".raw"}
@@ -104,7 +105,7 @@ def split_frames(name: str, raw: bytes, size_px: tuple[int, int]) -> list[Pictur
     if not raw or len(raw) % frame_bytes:
         raise ValueError(
             f"{name}: {len(raw)} bytes are no whole number of frames of {width}x{height} YUYV; "
-            "give --size."
+            f"give {option('size')}."
         )
     frames = np.frombuffer(raw, np.uint8).reshape(-1, height, 2 * width)
     return [Picture(f"{name} #{k}", frame) for k, frame in enumerate(frames)]
@@ -133,7 +134,7 @@ def from_camera(device: str, count: int, size_px: tuple[int, int]) -> list[Pictu
         )
         if done.returncode != 0 or not target.exists():
             last = (done.stderr or done.stdout).strip().splitlines()[-1:] or ["no frames"]
-            raise ValueError(f"--camera {device}: {last[0]}.")
+            raise ValueError(f"{option('camera', device)}: {last[0]}.")
         return split_frames(device, target.read_bytes(), size_px)
 
 

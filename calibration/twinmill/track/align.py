@@ -7,6 +7,7 @@ A start value for the estimate of the clocks' offset, which needs it within some
 import numpy as np
 from scipy.signal import correlate
 
+from twinmill.arguments import option
 from twinmill.data.importers.series import CommandSeries
 from twinmill.track.paths import RobotPath
 
@@ -28,7 +29,7 @@ def align(paths: list[RobotPath], commands: list[CommandSeries]) -> float:
     pairs = [(path, by_robot[path.robot_id]) for path in paths if path.robot_id in by_robot]
     if not pairs:
         raise ValueError(
-            "--commands: are of robots "
+            f"{option('commands')}: are of robots "
             f"{', '.join(map(str, sorted(by_robot)))}, the film shows "
             f"{', '.join(str(path.robot_id) for path in paths)}; none is in both."
         )
@@ -40,8 +41,9 @@ def align(paths: list[RobotPath], commands: list[CommandSeries]) -> float:
     second = likeness[far].max(initial=-1.0)
     if likeness[best] < LIKE or second > SECOND * likeness[best]:
         raise ValueError(
-            "--commands: where the film begins in them cannot be found (likeness "
-            f"{likeness[best]:.2f}, elsewhere {second:.2f}); give --start-s, or drive with stops "
+            f"{option('commands')}: where the film begins in them cannot be found (likeness "
+            f"{likeness[best]:.2f}, elsewhere {second:.2f}); give {option('start_s')}, or drive "
+            "with stops "
             "of different lengths."
         )
     return float(shifts[best] + table_s - film_s)

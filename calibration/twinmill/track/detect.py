@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from twinmill.arguments import option
+
 
 @dataclass(frozen=True)
 class Family:
@@ -66,7 +68,9 @@ class Detector:
 
     def __init__(self, family: str = FAMILY):
         if family not in FAMILIES:
-            raise ValueError(f"--family {family}: is none of {', '.join(sorted(FAMILIES))}.")
+            raise ValueError(
+                f"{option('family', family)}: is none of {', '.join(sorted(FAMILIES))}."
+            )
         settings = cv2.aruco.DetectorParameters()
         settings.adaptiveThreshWinSizeMin = settings.adaptiveThreshWinSizeMax = THRESHOLD_PX
         settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX

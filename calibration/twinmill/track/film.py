@@ -8,6 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from twinmill.arguments import option
+
 NEAR_S = 5.0  # a driver's stamp this near to the monotonic clock is one of it
 
 
@@ -63,7 +65,7 @@ class Film:
             if stamp_s <= before_s:
                 raise ValueError(
                     f"{self.path}: frame {k} is stamped {stamp_s:.3f} s, not later than the one "
-                    "before; give the camera's rate with --rate-hz."
+                    f"before; give the camera's rate with {option('rate_hz')}."
                 )
             yield stamp_s, picture
             k, before_s = k + 1, stamp_s
@@ -89,7 +91,8 @@ class LiveCamera:
         self._capture = _open(int(name) if name.isdigit() else name)
         if not self._capture.isOpened():
             raise ValueError(
-                f"--camera {name}: cannot be opened; see that it is plugged in and that no other "
+                f"{option('camera', name)}: cannot be opened; see that it is plugged in and that "
+                "no other "
                 "program has it."
             )
         self._capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter_fourcc(*"MJPG"))

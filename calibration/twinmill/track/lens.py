@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.track.boards import Board
 from twinmill.track.camera import Camera
 
@@ -93,7 +94,8 @@ def calibrate(
     if len(views) < VIEWS_MIN:
         raise ValueError(
             f"the board was found in {len(views)} different places, and {VIEWS_MIN} are needed; "
-            "move it about slowly, tilted too, and give --board, --squares and --square as it is."
+            f"move it about slowly, tilted too, and give {option('board')}, {option('squares')} "
+            f"and {option('square')} as it is."
         )
     found = _solve(views, size_px)
     errors = found[-1].ravel()

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.track.camera import Camera
 from twinmill.track.detect import ROBOTS, Detector, Sightings, check_single, gather
 from twinmill.track.floor import Floor, View, look
@@ -87,7 +88,7 @@ def find_view(frames: Frames, camera: Camera, floor: Floor, family: str) -> View
     detector = Detector(family)
     found = [detector.find(picture) for _, picture in islice(frames, FLOOR_FRAMES)]
     if not found:
-        raise ValueError("--camera: gave no frames; see whether another program has it.")
+        raise ValueError(f"{option('camera')}: gave no frames; see whether another program has it.")
     return look(camera, floor, gather(found))
 
 

@@ -19,6 +19,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, StreamingResponse
 from starlette.routing import Mount, Route
 
+from twinmill.arguments import option
 from twinmill.track.detect import ROBOTS
 from twinmill.track.live import FrameDetections
 
@@ -216,6 +217,7 @@ def _listener(port: int) -> socket.socket:
     except OSError as error:
         listener.close()
         raise ValueError(
-            f"--port {port}: cannot be used ({error.strerror}); choose another, or leave it out."
+            f"{option('port', port)}: cannot be used ({error.strerror}); choose another, or "
+            "leave it out."
         ) from error
     return listener

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.files import replacing
 from twinmill.track.detect import FAMILY, ROBOTS, Sightings, check_single
 from twinmill.track.floor import View
@@ -103,7 +104,8 @@ def _choose(counts: dict[int, int], frames: int, wanted: frozenset[int] | None) 
     if missing := sorted(wanted - set(seen)):
         names = ", ".join(map(str, sorted(seen)))
         raise ValueError(
-            f"--robots: tag {missing[0]} was in none of {frames} frames, those of {names} were; "
+            f"{option('robots')}: tag {missing[0]} was in none of {frames} frames, those of "
+            f"{names} were; "
             "see which tag is on which robot."
         )
     return sorted(wanted)
@@ -113,7 +115,7 @@ def _check_size(squares: Squares, tags: Tags) -> None:
     side_m = float(np.nanmedian(squares.side_m))
     if not abs(side_m / tags.size_m - 1) < SIZE_OFF:
         raise ValueError(
-            f"--size {tags.size_m:g}: the tags look {side_m:.3f} m wide at a height of "
+            f"{option('size', tags.size_m)}: the tags look {side_m:.3f} m wide at a height of "
             f"{tags.height_m:g} m; measure the black square's side, its height, and the floor."
         )
 

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.track.detect import other_drawing
 from twinmill.track.floor import View
 from twinmill.track.paths import RobotPath, Tags
@@ -94,11 +95,13 @@ class Quality:
         other = other_drawing(self.family)
         drawn = other and (
             f"if its tag is drawn as {'AprilTag' if other.startswith('tag') else 'OpenCV'} draws "
-            f"it, which is upside down against {self.family}, track it with --family {other}; "
+            f"it, which is upside down against {self.family}, track it with "
+            f"{option('family', other)}; "
         )
         return (
             f"robot {robot_id} moves opposite to its heading: {drawn or ''}if its front is the "
-            f"tag's lower edge, import with --heading-offset-deg R{robot_id:02d}=180; else it was "
+            f"tag's lower edge, import with {option('heading_offset_deg', 180, robot_id)}; else it "
+            "was "
             "driven backwards."
         )
 

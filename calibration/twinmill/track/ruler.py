@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.importers.series import PoseSeries
 from twinmill.data.log import heading_rad
 
@@ -86,7 +87,7 @@ class Ruler:
             longer = "long" if self.scale > 1 else "short"
             return (
                 f"{bad}lengths come out {100 * abs(self.scale - 1):.1f} % too {longer}: see "
-                "--height (0 for a sheet on the floor), the floor's points and the tape."
+                f"{option('height')} (0 for a sheet on the floor), the floor's points and the tape."
             )
         if self.miss_m <= GOOD_M:
             return f"{bad}the sheet turned: push it along the ruler by its edge, and film again."

@@ -10,6 +10,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from twinmill.arguments import option
 from twinmill.track.boards import Board
 from twinmill.track.detect import FAMILIES, FAMILY
 
@@ -79,7 +80,7 @@ def board_sheet(board: Board, paper: str) -> Figure:
     if width_m > long_m - 2 * MARGIN_M or y_m + height_m / 2 > short_m - MARGIN_M / 4:
         raise ValueError(
             f"the board is {1e3 * width_m:.0f} by {1e3 * height_m:.0f} mm and does not fit on "
-            f"{paper}; choose a larger --paper."
+            f"{paper}; choose a larger {option('paper')}."
         )
     page.picture(board.drawn(8 * DOTS), x_m, y_m, w_m=width_m, h_m=height_m)
     across, down = board.squares
@@ -128,8 +129,9 @@ def _draw_tag(page: _Page, number: int, size_m: float, paper: str) -> float:
     room_m = min(page.size_m) - 2 * MARGIN_M
     if CUT * size_m > room_m:
         raise ValueError(
-            f"--size {size_m:g}: does not fit on {paper}, the largest is {room_m / CUT:.3f} m; "
-            "choose a larger --paper."
+            f"{option('size', size_m)}: does not fit on {paper}, the largest is {room_m / CUT:.3f} "
+            "m; "
+            f"choose a larger {option('paper')}."
         )
     book = cv2.aruco.getPredefinedDictionary(FAMILIES[FAMILY].dictionary)
     tag = book.generateImageMarker(number, MODULES, borderBits=1)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from twinmill.arguments import option
 from twinmill.track.paths import RobotPath
 
 STEP_S = 0.05  # of the search; a robot moves little meanwhile
@@ -51,7 +52,8 @@ def clocks(films: list[Paths], names: list[str]) -> list[Pair | None]:
         if k is None:
             raise ValueError(
                 f"{names[next(iter(pairs))]}: when it began cannot be found from the other films: "
-                "no robot moves where two cameras see it at once; give --start-s for each film."
+                f"no robot moves where two cameras see it at once; give {option('start_s')} for "
+                "each film."
             )
         found[k] = pairs[k]
         placed += on_clock(films[k], pairs[k].shift_s)

@@ -19,6 +19,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import ClientDisconnect
 from starlette.responses import PlainTextResponse, Response
 
+from twinmill.arguments import option
 from twinmill.charts.stage import STATIC as CHARTS
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.model.model_file import ModelError
@@ -132,7 +133,8 @@ def _free_port(port: int) -> int:
             tried.bind((HOST, port))
         except OSError as error:
             raise ValueError(
-                f"--port {port}: cannot be used ({error.strerror}); choose another, or leave it "
+                f"{option('port', port)}: cannot be used ({error.strerror}); choose another, or "
+                "leave it "
                 "out."
             ) from error
         return tried.getsockname()[1]

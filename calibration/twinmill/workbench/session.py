@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.charts.arrays import Arrays, RobotView
 from twinmill.data.checks import InputFinding
 from twinmill.data.log import Log, RobotLog, read_log
@@ -580,7 +581,7 @@ class Session:
         if data.get("key") != self.key:
             raise ModelError(
                 "The session that is kept there is of other logs or another model; name another "
-                "file with --state."
+                f"file with {option('state')}."
             )
         self.tree.restore(data["tree"])
         self.held = set(data["held"])

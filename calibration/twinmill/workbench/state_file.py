@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Any, TextIO
 
+from twinmill.arguments import option
 from twinmill.files import replacing
 
 MARK = {"session_of": "twinmill open"}  # in every file that we wrote
@@ -36,7 +37,8 @@ class StateFile:
             kept = path.read_bytes() if path.exists() else None
         except OSError as error:
             raise ValueError(
-                f"{path}: cannot be used ({error.strerror}); name another file with --state."
+                f"{path}: cannot be used ({error.strerror}); name another file with "
+                f"{option('state')}."
             ) from error
         self._data = {} if kept is None else _session(path, kept)
         self.write(json.dumps(self._data))
@@ -68,7 +70,7 @@ def _session(path: Path, kept: bytes) -> dict[str, Any]:
     if not isinstance(data, dict) or not MARK.items() <= data.items():
         raise ValueError(
             f"{path}: holds no session of the workbench, and is left as it is; name another file "
-            "with --state."
+            f"with {option('state')}."
         )
     return data
 
@@ -82,6 +84,6 @@ def _locked(path: Path) -> TextIO:
         lock.close()
         raise ValueError(
             f"{path}: another workbench has this session open; go on in its page, end it with "
-            "Ctrl-C, or name another file with --state."
+            f"Ctrl-C, or name another file with {option('state')}."
         ) from error
     return lock

@@ -12,6 +12,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from twinmill.arguments import Spelling, spelled, spelling
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 
 PATH_S = 0.1  # between points of a path that is drawn
@@ -91,7 +92,9 @@ class Worker:
         if self._process is None or not self._process.is_alive():
             context = multiprocessing.get_context("spawn")
             self._pipe, other = context.Pipe()
-            self._process = context.Process(target=_serve, args=(other, self._logs), daemon=True)
+            self._process = context.Process(
+                target=_serve, args=(other, self._logs, spelling()), daemon=True
+            )
             self._process.start()
             other.close()
         self.work, self.words, self._since_s = work, "reading the logs", monotonic()
@@ -123,7 +126,7 @@ class Worker:
             self._process = None
 
 
-def _serve(pipe: Connection, logs: list[Path]) -> None:
+def _serve(pipe: Connection, logs: list[Path], way: Spelling) -> None:
     """Until the other end is closed."""
     import os
     import signal
@@ -137,7 +140,8 @@ def _serve(pipe: Connection, logs: list[Path]) -> None:
         except EOFError:
             return
         try:
-            pipe.send(perform(work, logs, measurements, pipe.send))
+            with spelled(way):
+                pipe.send(perform(work, logs, measurements, pipe.send))
         except BrokenPipeError:  # the server was killed
             return
         except (ValueError, OSError) as error:

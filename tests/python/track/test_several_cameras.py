@@ -75,7 +75,7 @@ def test_films_that_cannot_be_placed_are_refused(why):
     else:
         stands = still(0.1, 0.2, 0.3)
         films = [film(LEFT, 0.0, k, path=stands) for k in (1, 2)]
-    with pytest.raises(ValueError, match=r"b\.mp4: when it began cannot be found.*--start-s"):
+    with pytest.raises(ValueError, match=r"b\.mp4: when it began cannot be found.*start_s"):
         clocks(films, ["a.mp4", "b.mp4"])
 
 
@@ -157,7 +157,7 @@ def test_a_page_shows_each_cameras_picture_with_what_was_found():
 def test_a_port_that_is_taken_is_one_sentence():
     page = Page(1)
     try:
-        with pytest.raises(ValueError, match=r"--port \d+: cannot be used"):
+        with pytest.raises(ValueError, match=r"port=\d+: cannot be used"):
             Page(1, urlsplit(page.url).port)
     finally:
         page.close()

@@ -34,7 +34,7 @@ def holder(tmp_path):
 def test_a_second_workbench_is_refused_and_changes_nothing(holder):
     _, path = holder
     before = path.read_bytes()
-    with pytest.raises(ValueError, match=r"another workbench .*--state"):
+    with pytest.raises(ValueError, match=r"another workbench .*state"):
         StateFile(path)
     assert path.read_bytes() == before
 

@@ -31,7 +31,6 @@ from twinmill.data.checks.series import (
     check_poses,
     check_track,
 )
-from twinmill.data.checks.words import of_all
 from twinmill.data.track import Track
 
 __all__ = [
@@ -121,9 +120,9 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
     return of_all_robots(found, robots)
 
 
-def own_option(robot_id: int, robots: int) -> str:
-    """Before what an option says of one robot alone; empty where its log has no other."""
-    return f"R{robot_id:02d}=" if robots > 1 else ""
+def own_option(robot_id: int, robots: int) -> int | None:
+    """The robot that options are to name; None where its log has no other."""
+    return robot_id if robots > 1 else None
 
 
 def of_all_robots(found: list[InputFinding], robots: Mapping[str, int]) -> list[InputFinding]:
@@ -133,7 +132,7 @@ def of_all_robots(found: list[InputFinding], robots: Mapping[str, int]) -> list[
         found: of robots.
         robots: how many each log has, by its name.
     """
-    plain = [of_all(f.remedy, f"R{f.robot_id:02d}=") for f in found]
+    plain = [f.remedy_of_all or f.remedy for f in found]
     alike = Counter((f.log_name, remedy) for f, remedy in zip(found, plain, strict=True))
     return [
         replace(f, remedy=remedy) if alike[f.log_name, remedy] == robots[f.log_name] > 1 else f

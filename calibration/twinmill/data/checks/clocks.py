@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.checks.alternatives import Explained, Jump, Search, far_better, surely_better
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.lateness import Lateness, lateness_of
 from twinmill.data.checks.motion import BLOCK_S
 from twinmill.data.checks.settings import CHECKS
-from twinmill.data.checks.words import of_robot
 from twinmill.data.clock import place_of_least
 from twinmill.data.lost_commands import beat_s, keeps_beat
 
@@ -169,14 +169,17 @@ def check_one_clock(
         return []
     if not _is_shifted(search, late_s):
         return []
-    without = "import anew without --same-clock"
+    without = f"import anew without {option('same_clock', True)}"
     if late_s < 0:
+        shift_by_s = round(float(-late_s), 3)
         told = checked.finding(
             f"the poses come {-late_s:.2f} s before the commands that they follow, so that one "
-            "clock did not stamp both, as it is declared (--same-clock)",
+            f"clock did not stamp both, as it is declared ({option('same_clock', True)})",
             f"the commands explain {1 - own.left:.1%} of the motion with that shift",
-            f"{without}, which estimates the offset, or with "
-            f"{of_robot(f'--pose-shift-s={-late_s:.3f}', checked.own)}; until then it is estimated",
+            lambda own: (
+                f"{without}, which estimates the offset, or with "
+                f"{option('pose_shift_s', shift_by_s, own)}; until then it is estimated"
+            ),
             fatal=False,
         )
         return [replace(told, two_clocks=True)]
@@ -273,15 +276,23 @@ def _is_step(search: Search, own: Explained, jump: Jump) -> bool:
 def _of_drift(checked: CheckedTrack, drift: str, rate: float) -> InputFinding:
     """A rate that crystals have; at others several steps may be behind it, which look alike."""
     apart = "the two clocks run apart"
-    anew = f"import anew with {checked.option('--pose-clock-ppm')}{1e6 * rate:.0f}"
+    ppm = round(1e6 * rate)
+
+    def anew(own: int | None) -> str:
+        return f"import anew with {option('pose_clock_ppm', ppm, own)}"
+
     if abs(rate) <= 1e-6 * CHECKS.most_ppm:
-        return checked.finding(apart, drift, f"{OWN_CLOCKS}, or {anew}", fatal=False)
+        return checked.finding(
+            apart, drift, lambda own: f"{OWN_CLOCKS}, or {anew(own)}", fatal=False
+        )
     later = "later and later" if rate > 0 else "sooner and sooner"
     return checked.finding(
         f"{apart}, or the robot follows its commands {later} by steps",
         f"{drift}, which is more than clocks do",
-        f"{OWN_CLOCKS} and log again, which rules the first out; or {LOOK}; or, if the clock that "
-        f"stamps the poses counts so, {anew}",
+        lambda own: (
+            f"{OWN_CLOCKS} and log again, which rules the first out; or {LOOK}; or, if "
+            f"the clock that stamps the poses counts so, {anew(own)}"
+        ),
         fatal=False,
         steady=False,
     )

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option, options
 from twinmill.data.checks.alternatives import (
     OWN,
     Alternative,
@@ -18,12 +19,12 @@ from twinmill.data.checks.alternatives import (
 )
 from twinmill.data.checks.axle import at_axle
 from twinmill.data.checks.clocks import FAR_S, shift_s, stepped
-from twinmill.data.checks.finding import CheckedTrack, InputFinding
+from twinmill.data.checks.finding import CheckedTrack, InputFinding, Remedy
 from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.rolling import factor_words
 from twinmill.data.checks.settings import CHECKS
-from twinmill.data.checks.words import described, of_robot
+from twinmill.data.checks.words import described
 from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
@@ -178,18 +179,18 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     alike.sort(key=lambda e: (e.alternative.steps, e.left))
     most = alike[0].alternative.steps + CHECKS.steps
     simplest = [e for e in alike if e.alternative.steps < most][:3]
-    words = [
-        described(e.alternative, track.command_kind, e.turned_rad, checked.own) for e in simplest
-    ]
+    words = [described(e.alternative, track.command_kind, e.turned_rad) for e in simplest]
     of_columns = not all(e.alternative.of_poses for e in simplest)
     return [
         checked.finding(
             ", or ".join(dict.fromkeys(what for what, _ in words)),
             f"the commands explain {1 - own.left:.0%} of the motion as it is, and "
             f"{1 - simplest[0].left:.0%} without that mistake",
-            "correct it where the log is made, or import anew with "
-            + ", or ".join(dict.fromkeys(options for _, options in words))
-            + (OTHER_WHEELS if of_columns and track.command_kind != "twist" else ""),
+            lambda robot: (
+                "correct it where the log is made, or import anew with "
+                + ", or ".join(dict.fromkeys(options(mend, robot) for _, mend in words))
+                + (OTHER_WHEELS if of_columns and track.command_kind != "twist" else "")
+            ),
         ),
         *_units(checked, simplest[0]),
     ]
@@ -208,7 +209,7 @@ def _in_room(
         "the velocities are along the room's axes, not the body's",
         f"the commands explain {1 - own.left:.0%} of the motion as the body's, and "
         f"{1 - room.left:.0%} as the room's",
-        _anew_with(IN_ROOM, checked),
+        _anew_with(IN_ROOM),
     )
 
 
@@ -239,17 +240,17 @@ def _shifted(
         return None
     late_s = shift_s(far.without(simplest, far.lates_s), simplest.late_s)
     late = "late" if late_s > 0 else "early"
-    what, options = described(
-        simplest.alternative, checked.track.command_kind, simplest.turned_rad, checked.own
-    )
+    what, mend = described(simplest.alternative, checked.track.command_kind, simplest.turned_rad)
+    mend = {"pose_shift_s": round(float(-late_s), 3), **mend}
     return checked.finding(
         f"the poses come {abs(late_s):.2f} s {late} against the commands"
         + (f", and {what}" if what else ""),
         f"the commands explain {max(1 - own.left, 0.0):.0%} of the motion as it is stamped, and "
         f"{1 - simplest.left:.0%} with that shift" + (" and without that mistake" if what else ""),
-        "stamp both with one clock, or import anew with "
-        f"{checked.option('--pose-shift-s')}{-late_s:.3f}{f' {options}' if options else ''}; a "
-        "constant delay of the robot is in that shift",
+        lambda robot: (
+            "stamp both with one clock, or import anew with "
+            f"{options(mend, robot)}; a constant delay of the robot is in that shift"
+        ),
     )
 
 
@@ -270,7 +271,7 @@ def _unrelated(checked: CheckedTrack, left: float) -> InputFinding:
         f"under no order and sign of the columns and no turn of the axes more than "
         f"{max(0.0, 1 - left):.0%}",
         "check that commands and poses are of the same robot and run, and shifted by less than "
-        "twelve seconds against each other (--pose-shift-s)",
+        f"twelve seconds against each other ({option('pose_shift_s')})",
     )
 
 
@@ -289,7 +290,8 @@ def _no_heading(checked: CheckedTrack, share: float) -> InputFinding:
         "the heading is not recorded, and the commands turn the robot",
         f"in {share:.0%} of the time",
         "positions alone tell only of a robot that holds it: record the heading, or import with "
-        "--heading-from-path, which takes it from the path while the robot drives ahead",
+        f"{option('heading_from_path', True)}, which takes it from the path while the robot "
+        "drives ahead",
     )
 
 
@@ -301,9 +303,9 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     turn = turn if checked.track.has_heading else 0.0
     (window, what, names), *_ = HEADINGS_IN
     if window[0] < turn < window[1]:  # speeds along axes of a wrong heading tell nothing
-        return [checked.finding(what, _pace(turn), _anew_with(names, checked))]
+        return [checked.finding(what, _pace(turn), _anew_with(names))]
     found = [
-        checked.finding(what, _pace(ratio), _anew_with(names, checked))
+        checked.finding(what, _pace(ratio), _anew_with(names))
         for ratio, units in _ratios(checked.track.command_kind, speed, turn)
         for (low, high), what, names in units
         if low < ratio < high
@@ -341,12 +343,13 @@ def _no_gain(checked: CheckedTrack, speed: float) -> list[InputFinding]:
     ]
 
 
-def _anew_with(names: dict[str, str], checked: CheckedTrack) -> str:
+def _anew_with(names: dict[str, str]) -> Remedy:
     """What to do about columns that have other units or meanings than their names say."""
     if not names:
         return "correct it where the log is made, or the unit in the names of its columns"
-    options = " ".join(f"--rename {old}={new}" for old, new in names.items())
-    return f"correct it where the log is made, or import anew with {of_robot(options, checked.own)}"
+    return lambda robot: (
+        f"correct it where the log is made, or import anew with {option('rename', names, robot)}"
+    )
 
 
 def _pace(ratio: float) -> str:
@@ -436,7 +439,7 @@ def _exchanging(ids: list[int], commands: list[int], one: int) -> str:
         around.append(following)
     begin = around.index(min(around))
     first, *others = (ids[k] for k in around[begin:] + around[:begin])
-    return " ".join(f"--exchange R{first:02d}=R{other:02d}" for other in others)
+    return option("exchange", [(first, other) for other in others])
 
 
 def _explained(

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with an input, in three sentences."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ class InputFinding:
         what: the mistake, a clause without a full stop.
         evidence: the numbers that show it.
         remedy: what to do.
+        remedy_of_all: what to do where all robots of the log need it; empty: that is `remedy`.
         fatal: the log cannot be judged as it is; false where only something about it is lost.
         log_name, robot_id: whose; -1 where it is about all robots.
         cut_s: stretches of capture's clock that are not to be judged.
@@ -39,15 +41,24 @@ class InputFinding:
     lateness: Lateness | None = None
     two_clocks: bool = False
     lever_m: tuple[float, float] | None = None
+    remedy_of_all: str = ""
 
     def to_json(self) -> dict:
         """Fields of the interface."""
-        return asdict(self)
+        return {name: value for name, value in asdict(self).items() if name != "remedy_of_all"}
 
     def __str__(self) -> str:
         robot = f" R{self.robot_id:02d}" if self.robot_id >= 0 else ""
         where = f"{self.log_name}{robot}: " if self.log_name or robot else ""
         return f"{where}{self.what}: {self.evidence}; {self.remedy}."
+
+
+Remedy = str | Callable[[int | None], str]  # by the robot that its options name, None for all
+
+
+def in_words(remedy: Remedy, own: int | None) -> tuple[str, str]:
+    """A remedy with the options of one robot, and with those of all."""
+    return (remedy, remedy) if isinstance(remedy, str) else (remedy(own), remedy(None))
 
 
 @dataclass(frozen=True)
@@ -56,21 +67,20 @@ class CheckedTrack:
 
     Attributes:
         label: name of its log.
-        own: before what an option says of this robot alone; empty where it is the only one.
+        own: robot_id that options are to name; None where the log has no other robot.
     """
 
     label: str
     track: Track
     body: np.ndarray
-    own: str = ""
-
-    def option(self, name: str) -> str:
-        """An option of `twinmill import` up to its number: of this robot, not of all."""
-        return f"{name} R{self.track.robot_id:02d}="
+    own: int | None = None
 
     def finding(
-        self, what: str, evidence: str, remedy: str, *, fatal: bool = True, steady: bool = True
+        self, what: str, evidence: str, remedy: Remedy, *, fatal: bool = True, steady: bool = True
     ) -> InputFinding:
         """An `InputFinding` with the name of this log and the number of this robot."""
-        own = self.label, self.track.robot_id
-        return InputFinding(what, evidence, remedy, fatal, *own, steady=steady)
+        mend, of_all = in_words(remedy, self.own)
+        whose = self.label, self.track.robot_id
+        return InputFinding(
+            what, evidence, mend, fatal, *whose, steady=steady, remedy_of_all=of_all
+        )

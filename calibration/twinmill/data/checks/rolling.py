@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.checks.finding import InputFinding
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.track import Track, command_at, local_line
@@ -25,14 +26,15 @@ def check_rolling(track: Track, label: str) -> list[InputFinding]:
     if rolled_m is None or CHECKS.least_wheel_m <= rolled_m <= CHECKS.most_wheel_m:
         return []
     units = [
-        f"{unit}, on wheels of {1e3 * rolled_m / factor:.0f} mm (--wheel-factor {factor:.5g})"
+        f"{unit}, on wheels of {1e3 * rolled_m / factor:.0f} mm ({_option(factor)})"
         for unit, factor in UNITS
         if CHECKS.least_wheel_m <= rolled_m / factor <= CHECKS.most_wheel_m
     ]
     if rolled_m < CHECKS.least_wheel_m:
         least, most = (m / rolled_m for m in (CHECKS.least_wheel_m, CHECKS.most_wheel_m))
         units.append(
-            f"those of motors before a gear of 1:{least:.0f} to 1:{most:.0f} (--wheel-factor with "
+            f"those of motors before a gear of 1:{least:.0f} to 1:{most:.0f} "
+            f"({option('wheel_factor')} with "
             "1 over the gear's ratio, times that of the unit)"
         )
     return [
@@ -48,18 +50,23 @@ def check_rolling(track: Track, label: str) -> list[InputFinding]:
     ]
 
 
+def _option(factor: float) -> str:
+    return option("wheel_factor", float(f"{factor:.5g}"))
+
+
 def factor_words(ratio: float) -> tuple[str, str] | None:
     """What wheel speeds are by whose ratio the robot is slower or faster than told; the remedy."""
     near = [(unit, f) for unit, f in UNITS if 1 / CHECKS.unit_off < ratio / f < CHECKS.unit_off]
     if near:
         names = " or ".join(unit for unit, _ in near)
-        options = " or ".join(f"--wheel-factor {factor:.5g}" for _, factor in near)
-        return f"the wheel speeds are in {names}", f"import anew with {options}"
+        mend = " or ".join(_option(factor) for _, factor in near)
+        return f"the wheel speeds are in {names}", f"import anew with {mend}"
     if ratio < CHECKS.geared:
         return (
             f"the wheel speeds are of motors before a gear of about 1:{1 / ratio:.0f}, or in "
             "another unit",
-            f"import anew with --wheel-factor {ratio:.3g}, or with the gear's own ratio",
+            f"import anew with {option('wheel_factor', float(f'{ratio:.3g}'))}, or with the gear's "
+            "own ratio",
         )
     return None
 

@@ -3,9 +3,9 @@
 
 import numpy as np
 
-from twinmill.data.checks.finding import InputFinding
+from twinmill.arguments import option
+from twinmill.data.checks.finding import InputFinding, Remedy, in_words
 from twinmill.data.checks.settings import CHECKS
-from twinmill.data.checks.words import of_robot
 from twinmill.data.log import RobotLog
 from twinmill.data.track import Track, command_at
 
@@ -14,7 +14,6 @@ STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0
 # Commands beyond these no robot on wheels follows: twenty times the fastest there are.
 ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
 NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
-LAID_DOWN = {"x": "--up x", "y": "the other --up (y or z)"}  # y: as of Motive read with z up
 UNDER_ONE = "give each robot its own robot_id, in its poses and in its commands"
 MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
 ARM_M = 0.1  # of headings, which part robots that meet
@@ -102,20 +101,22 @@ def _absurd(robot: RobotLog, label: str) -> list[InputFinding]:
     ]
 
 
-def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding]:
+def check_poses(robot: RobotLog, label: str, own: int | None = None) -> list[InputFinding]:
     """Findings of a robot's poses as they were recorded.
 
     Args:
         robot: as it was read.
         label: name of its log.
-        own: before what an option says of this robot alone; empty where it is the only one.
+        own: robot_id that options are to name; None where the log has no other robot.
     """
     t_s, pose, z_m = (a[robot.valid] for a in (robot.pose_t_s, robot.pose, robot.z_m))
     if len(t_s) < CHECKS.fewest_poses:
         return []
 
-    def finding(what: str, evidence: str, remedy: str) -> InputFinding:
-        return InputFinding(what, evidence, remedy, True, label, robot.robot_id)
+    def finding(what: str, evidence: str, remedy: Remedy) -> InputFinding:
+        mend, of_all = in_words(remedy, own)
+        whose = label, robot.robot_id
+        return InputFinding(what, evidence, mend, True, *whose, remedy_of_all=of_all)
 
     if stands := _stands(robot, t_s, pose):
         return [
@@ -154,7 +155,9 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             finding(
                 f"{axis} is up in these poses, not z",
                 f"z goes over {height_m:.2f} m and {axis} over {min(x_m, y_m) * 1000:.0f} mm",
-                f"import anew with {LAID_DOWN[axis]}",
+                f"import anew with {option('up', 'x')}"
+                if axis == "x"  # y is up in what Motive writes and in nothing else
+                else f"import anew with the other {option('up')} (y or z)",
             )
         ]
     if fast_mps > 1000 * CHECKS.fastest_mps:  # in mm, too
@@ -167,12 +170,15 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
         ]
     if fast_mps > CHECKS.fastest_mps:
         units = ("mm",) if fast_mps > CHECKS.mm_mps else ("cm", "mm")
-        named = [of_robot(f"--rename x_m=x_{u} --rename y_m=y_{u}", own) for u in units]
+        named = [{"x_m": f"x_{u}", "y_m": f"y_{u}"} for u in units]
         return [
             finding(
                 f"the positions are in {' or '.join(units)}, not in m",
                 f"the robot drives at {fast_mps:.0f} m/s by them, over {max(x_m, y_m):.0f} m",
-                f"choose metres in the export, or import anew with {', or with '.join(named)}",
+                lambda own: (
+                    "choose metres in the export, or import anew with "
+                    + ", or with ".join(option("rename", names, own) for names in named)
+                ),
             )
         ]
     if robot.has_heading and _heading_is_constant(robot, pose):
@@ -180,19 +186,22 @@ def check_poses(robot: RobotLog, label: str, own: str = "") -> list[InputFinding
             finding(
                 "the heading was not measured",
                 f"it is {np.degrees(pose[0, 2]):.1f} degrees in all {len(pose)} poses, to the bit",
-                "record it, or import anew with --heading-from-path, which takes it from the path "
+                f"record it, or import anew with {option('heading_from_path', True)}, which takes "
+                "it from the path "
                 "while the robot drives ahead",
             )
         ]
     return []
 
 
-def check_track(track: Track, label: str, own: str = "") -> list[InputFinding]:
+def check_track(track: Track, label: str, own: int | None = None) -> list[InputFinding]:
     """What about a log can be used, and yet is worth a sentence; args as of `check_poses`."""
     found = []
 
-    def add(what: str, evidence: str, remedy: str, fatal: bool = False) -> None:
-        found.append(InputFinding(what, evidence, remedy, fatal, label, track.robot_id))
+    def add(what: str, evidence: str, remedy: Remedy, fatal: bool = False) -> None:
+        mend, of_all = in_words(remedy, own)
+        whose = label, track.robot_id
+        found.append(InputFinding(what, evidence, mend, fatal, *whose, remedy_of_all=of_all))
 
     timing = track.timing
     if timing.pose_lost_share > CHECKS.lost:
@@ -220,8 +229,10 @@ def check_track(track: Track, label: str, own: str = "") -> list[InputFinding]:
         add(
             "the headings make no sense",
             f"they jump by {np.degrees(noise_rad):.0f} degrees from pose to pose",
-            "check the column; of degrees import anew with "
-            f"{of_robot('--rename theta_rad=theta_deg', own)}",
+            lambda own: (
+                "check the column; of degrees import anew with "
+                f"{option('rename', {'theta_rad': 'theta_deg'}, own)}"
+            ),
             fatal=True,
         )
     elif noise_rad > CHECKS.noisy_rad:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An alternative in words: what is wrong, and the options of `twinmill import` that mend it."""
+"""An alternative in words: what is wrong, and the options of an import that mend it."""
 
-import re
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +9,6 @@ from twinmill.data.checks.alternatives import Alternative
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.log import CommandKind
 
-OF_A_ROBOT = re.compile(r"(--flip|--rename|--heading-offset-deg|--pose-shift-s)[ =]")
 COLUMNS: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
     "wheel_speed": ("w1_radps", "w2_radps", "w3_radps", "w4_radps"),
@@ -26,22 +25,21 @@ FLIPS = {
 }
 
 
-def described(
-    a: Alternative, kind: CommandKind, turned_rad: float, own: str = ""
-) -> tuple[str, str]:
+Mend = dict[str, Any]  # options of an import
+
+
+def described(a: Alternative, kind: CommandKind, turned_rad: float) -> tuple[str, Mend]:
     """What is wrong, a clause; and options that put it right.
 
     Args:
         a: what is wrong.
         kind: of the commands.
         turned_rad: angle that goes with it.
-        own: before what an option says of one robot; empty: of all.
     """
     if a.of_poses:
-        what, options = _of_poses(a, float(np.degrees(turned_rad)))
-        return what, of_robot(options, own)
+        return _of_poses(a, float(np.degrees(turned_rad)))
     names = COLUMNS[kind]
-    what, options = [], []
+    what: list[str] = []
     if a.place in SIDES and kind != "twist":
         what.append(SIDES[a.place])
     else:
@@ -51,60 +49,44 @@ def described(
         elif moved:
             order = ", ".join(f"{names[a.place[k]]} is {names[k]}" for k in moved)
             what.append(f"the columns are in another order ({order})")
-    options += [f"--rename {names[p]}={names[k]}" for k, p in enumerate(a.place) if p != k]
+    renames = {names[p]: names[k] for k, p in enumerate(a.place) if p != k}
+    flips = [names[k] for k, s in enumerate(a.sign) if s < 0]
     if a.sign in FLIPS and kind != "twist":
         what.append(FLIPS[a.sign])
     else:
-        wrong = [names[k] for k, s in enumerate(a.sign) if s < 0]
-        what += [f"{name} has the wrong sign" for name in wrong]
-    options += [f"--flip {names[k]}" for k, s in enumerate(a.sign) if s < 0]
-    return " and ".join(what), of_robot(" ".join(options), own)
+        what += [f"{name} has the wrong sign" for name in flips]
+    mend = {"rename": renames, "flip": flips}
+    return " and ".join(what), {name: value for name, value in mend.items() if value}
 
 
-def of_robot(options: str, own: str) -> str:
-    """Options that hold for one robot alone, where there are others: `R02=`; else empty."""
-    return OF_A_ROBOT.sub(rf"\g<1> {own}", options) if own else options
-
-
-def of_all(remedy: str, own: str) -> str:
-    """A remedy of one robot, as it is told where it is that of all."""
-    for option, before in (("--heading-offset-deg", "="), ("--pose-shift-s", "="), ("", " ")):
-        remedy = remedy.replace(f"{option} {own}", f"{option}{before}")
-    return remedy
-
-
-def _of_poses(a: Alternative, turned_deg: float) -> tuple[str, str]:
-    turn = f"--heading-offset-deg={turned_deg:.0f}"
+def _of_poses(a: Alternative, turned_deg: float) -> tuple[str, Mend]:
+    turn = {"heading_offset_deg": round(turned_deg)}
     side = "left" if turned_deg > 0 else "right"
     turned = f"the robot's front is {abs(turned_deg):.0f} degrees to the {side} of its heading"
     if a.heading_sign < 0 and a.mirrored:
-        what, options = (
-            "the poses are mirrored (y points to the right)",
-            "--flip y_m --flip theta_rad",
-        )
+        what = "the poses are mirrored (y points to the right)"
+        mend: Mend = {"flip": ["y_m", "theta_rad"]}
     elif a.heading_sign < 0:
-        what, options = "the heading is counted clockwise", "--flip theta_rad"
+        what, mend = "the heading is counted clockwise", {"flip": ["theta_rad"]}
     elif a.mirrored:
         return _mirrored_positions(turned_deg if a.turned else 0.0, turned, turn)
     else:
         return turned, turn
     if a.turned and abs(turned_deg) > CHECKS.right_angle_deg:
-        return f"{what}, and {turned}", f"{options} {turn}"
-    return what, options
+        return f"{what}, and {turned}", {**mend, **turn}
+    return what, mend
 
 
-def _mirrored_positions(turned_deg: float, turned: str, turn: str) -> tuple[str, str]:
+def _mirrored_positions(turned_deg: float, turned: str, turn: Mend) -> tuple[str, Mend]:
     """The mirror axis follows from the angle that is left over."""
-    axes = {
-        0: ("y has the wrong sign", "--flip y_m"),
-        180: ("x has the wrong sign", "--flip x_m"),
-        -90: ("x and y are swapped", "--rename x_m=y_m --rename y_m=x_m"),
-        90: (
-            "x and y are swapped and have the wrong sign",
-            "--rename x_m=y_m --rename y_m=x_m --flip x_m --flip y_m",
-        ),
+    swap = {"rename": {"x_m": "y_m", "y_m": "x_m"}}
+    axes: dict[int, tuple[str, Mend]] = {
+        0: ("y has the wrong sign", {"flip": ["y_m"]}),
+        180: ("x has the wrong sign", {"flip": ["x_m"]}),
+        -90: ("x and y are swapped", swap),
+        90: ("x and y are swapped and have the wrong sign", {**swap, "flip": ["x_m", "y_m"]}),
     }
     for angle_deg, words in axes.items():
         if abs((turned_deg - angle_deg + 180) % 360 - 180) < CHECKS.right_angle_deg:
             return words
-    return f"the positions are mirrored, and {turned}", f"--flip y_m {turn}"
+    return f"the positions are mirrored, and {turned}", {"flip": ["y_m"], **turn}

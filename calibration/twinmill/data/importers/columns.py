@@ -15,6 +15,7 @@ import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
+from twinmill.arguments import option
 from twinmill.data.importers.ros_messages import STAND_IN
 from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.log import LogError
@@ -411,11 +412,11 @@ def _of_other_topics(
         asked = [name for name in telling if not WANTED["poses"] <= targets[name]]
         telling = telling if "x_m" in known else asked or telling
         if len(telling) > 1:
-            option = "--pose" if "x_m" in known else "--command"
+            of_pose = "pose" if "x_m" in known else "command"
             raise LogError(
                 f"{table.name}: several topics tell what is looked for "
-                f"({', '.join(f'/{name}' for name in telling)}); name one, as in {option} "
-                f"/{telling[0]}."
+                f"({', '.join(f'/{name}' for name in telling)}); name one, as in "
+                f"{option(of_pose, [f'/{telling[0]}'])}."
             )
         chosen = telling[0] if telling else None
     if not chosen:
@@ -468,8 +469,9 @@ def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, s
     (ours, old_factor), (new_ours, _) = UNITS[old_unit], UNITS[new_unit]
     if ours != new_ours:
         raise LogError(
-            f"--rename {column}={new}: {old_unit} is no unit of what {new} holds; name the right "
-            "column, or say what it is in a --mapping file."
+            f"{option('rename', {column: new})}: {old_unit} is no unit of what {new} holds; name "
+            "the right "
+            f"column, or say what it is in a {option('mapping')} file."
         )
     if new_unit == new_ours:
         return old_factor, f"{table}: {column} is in {old_unit} by its name: converted to {new}."
@@ -498,7 +500,9 @@ def mapping_of(guesses: list[Guess]) -> Mapping:
 def to_toml(mappings: dict[str, list[Guess]]) -> str:
     """A mapping file: a table for each kind of file (`poses`, `commands`)."""
     document = tomlkit.document()
-    document.add(tomlkit.comment("Which column is what: check it, and import with --mapping."))
+    document.add(
+        tomlkit.comment(f"Which column is what: check it, and import with {option('mapping')}.")
+    )
     for kind, guesses in mappings.items():
         section = tomlkit.table()
         for guess in guesses:

@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.importers.columns import by_name, read_mapping
 from twinmill.data.importers.mapped import names_in
 from twinmill.data.importers.options import ImportOptions, Sources
@@ -41,12 +42,12 @@ def corrected(
             {*own, *(mapped if paths else ())}
             for own, mapped, paths in zip(done, read, tables, strict=True)
         ]
-    _check_held("--rename", _by_robot(options), [*poses, *commands], {*done[0], *done[1]})
+    _check_held("rename", _by_robot(options), [*poses, *commands], {*done[0], *done[1]})
     named = [
         [renamed(s, {k: v for k, v in _of_robot(s, options).items() if k not in own}) for s in kind]
         for kind, own in zip((poses, commands), done, strict=True)
     ]
-    _check_held("--flip", options.flips, [*named[0], *named[1]], set())
+    _check_held("flip", options.flips, [*named[0], *named[1]], set())
     poses, commands = (
         [
             flipped(s, {*options.flips.get(None, ()), *options.flips.get(s.robot_id, ())})
@@ -67,7 +68,7 @@ def _of_robot(series: PoseSeries | CommandSeries, options: ImportOptions) -> dic
 
 
 def _check_held(
-    option: str,
+    name: str,
     names: Mapping[int | None, Collection[str]],
     every: list[PoseSeries | CommandSeries],
     done: Collection[str],
@@ -77,9 +78,9 @@ def _check_held(
         of_robot = [s for s in every if number in (None, s.robot_id)]
         held = set(done).union(*map(columns_of, of_robot)) if own else set()
         if of_robot and (lacking := sorted({*own} - held)):
-            whose = "" if number is None else f"R{number:02d}="
             raise LogError(
-                f"{option} {whose}{lacking[0]}: nothing that was read holds {lacking[0]}; it holds "
+                f"{option(name, lacking[:1], number)}: nothing that was read holds {lacking[0]}; "
+                "it holds "
                 f"{', '.join(sorted(held))}."
             )
 
@@ -126,11 +127,14 @@ def renamed(series: Series, renames: Mapping[str, str]) -> Series:
         (name, *_), factor = by_name(renames[old], KNOWN)
         if name in columns and name not in renames:
             raise LogError(
-                f"--rename {old}={renames[old]}: there is a {name} already; say what that one is "
-                f"as well, as in --rename {name}={old}."
+                f"{option('rename', {old: renames[old]})}: there is a {name} already; say what "
+                "that one is "
+                f"as well, as in {option('rename', {name: old})}."
             )
         if name not in (OF_POSES if isinstance(series, PoseSeries) else OF_COMMANDS):
-            raise LogError(f"--rename {old}={renames[old]}: {old} cannot be {name}; correct it.")
+            raise LogError(
+                f"{option('rename', {old: renames[old]})}: {old} cannot be {name}; correct it."
+            )
         changed[name] = factor * columns[old]
     if not changed:
         return series
@@ -141,7 +145,7 @@ def renamed(series: Series, renames: Mapping[str, str]) -> Series:
         return _with_commands(series, left)
     for name in POSITION[:2]:
         if name not in left:
-            raise LogError(f"--rename: leaves no {name}; say which column that is.")
+            raise LogError(f"{option('rename')}: leaves no {name}; say which column that is.")
     if "theta_rad" in changed:
         left |= zip(QUATERNION, quaternion_from_heading(left["theta_rad"]).T, strict=True)
     return _with_poses(series, left)
@@ -154,7 +158,7 @@ def _kind_of(names: Collection[str], series: CommandSeries) -> tuple[CommandKind
     kind = next((k for k, own in VALUES.items() if set(own) <= set(names)), None)
     if kind is None:
         lacking = next(name for name in _names(series) if name not in names)
-        raise LogError(f"--rename: leaves no {lacking}; say which column that is.")
+        raise LogError(f"{option('rename')}: leaves no {lacking}; say which column that is.")
     return kind, False
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
+from twinmill.arguments import option
 from twinmill.data.checks import (
     InputFinding,
     check_changes,
@@ -68,11 +69,6 @@ MOST_PPM = 1e5  # by which one clock gains on another
 OF_KINDS = ("poses", "commands")  # tables of a mapping file
 LONGEST_HOLD_S = 3600  # a command held for longer is a mix-up of clocks
 
-POSES_ALONE = (
-    "no commands are given: metrics, plot, compare-swarm and export need none; compare, diagnose, "
-    "fit and explain do: import anew with --commands (of a bag with --command)."
-)
-
 
 def import_log(
     poses: Given,
@@ -108,7 +104,7 @@ def import_log(
         LogError: one sentence on what is wrong; nothing was written.
     """
     options = options or ImportOptions()
-    poses, commands = files_of(poses, "--poses"), files_of(commands, "--commands")
+    poses, commands = files_of(poses, "poses"), files_of(commands, "commands")
     given = Sources(poses, commands, motive, vicon, tuple(io_tsv), bag, detections)
     check_sources(given, options)
     _check_renames(options, [*poses, *commands], detections)
@@ -152,7 +148,11 @@ def _log_of(
     warnings = [f"Left out: {why}" for why in left_out.values()]
     warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
     if not command_series:
-        warnings.append(POSES_ALONE)
+        warnings.append(
+            "no commands are given: metrics, plot, compare-swarm and export need none; "
+            "compare, diagnose, fit and explain do: import anew with "
+            f"{option('commands')} (of a bag with {option('command')})."
+        )
     return parts, rows, warnings
 
 
@@ -233,8 +233,8 @@ def _read_tables(
     columns, read = _columns(options, kind), read_poses if kind == "poses" else read_commands
     lacks = columns.lacks_robot
     if len(paths) > 1:
-        names = " ".join(f"--robot '{p.name.split('.')[0]}={k}'" for k, p in enumerate(paths, 1))
-        lacks = f"number the files, whose names do not tell their robots: {names}"
+        names = {path.name.split(".")[0]: k for k, path in enumerate(paths, 1)}
+        lacks = f"number the files, whose names do not tell their robots: {option('robot', names)}"
 
     def of(path: Path) -> list:
         number = of_files.get(path, options.robot_id)
@@ -246,10 +246,11 @@ def _read_tables(
 def _geared(commands: list[CommandSeries], factor: float) -> list[CommandSeries]:
     """Wheel speeds multiplied, of each robot that has them."""
     if not (np.isfinite(factor) and factor):
-        raise LogError(f"--wheel-factor {factor:g}: must be a number other than 0.")
+        raise LogError(f"{option('wheel_factor', factor)}: must be a number other than 0.")
     if not any(series.kind == "wheel_speed" for series in commands):
         raise LogError(
-            f"--wheel-factor {factor:g}: does nothing, since the commands are no wheel speeds; "
+            f"{option('wheel_factor', factor)}: does nothing, since the commands are no wheel "
+            "speeds; "
             "leave it out."
         )
     return [
@@ -273,7 +274,8 @@ def _detections(
         where = f"{path.name}: robot {own.robot_id}"
         if own.robot_id not in poses:
             raise LogError(
-                f"{where}: has no poses; number robots alike in all files (--robot-id, --robot)."
+                f"{where}: has no poses; number robots alike in all files ({option('robot_id')}, "
+                f"{option('robot')})."
             )
         pose_us = poses[own.robot_id].utime_us
         if own.utime_us[-1] < pose_us[0] or own.utime_us[0] > pose_us[-1]:
@@ -310,7 +312,10 @@ def _check_renames(options: ImportOptions, tables: list[Path], detections: Path 
     for own in (options.rename, *options.own_renames.values()):
         names = {**options.rename, **own}
         if options.mapping and not detections and names.keys() - mapped - KNOWN:
-            raise LogError("--rename: does nothing beside --mapping; write it into that file.")
+            raise LogError(
+                f"{option('rename')}: does nothing beside {option('mapping')}; write it into that "
+                "file."
+            )
         files = tables + ([detections] if detections else [])
         check_renames(names, files, KNOWN | OF_DETECTIONS, mapped | KNOWN)
 
@@ -322,7 +327,8 @@ def _check_wheelbase(options: ImportOptions, commands: tuple[Path, ...]) -> None
     mapped = read_mapping(options.mapping, "commands", KNOWN) if options.mapping else ()
     if "steering_rad" not in {*mapped, *names_in(commands, KNOWN, options.rename)}:
         raise LogError(
-            "--wheelbase-m: no table of commands has a steering angle (steering_rad), which it is "
+            f"{option('wheelbase_m')}: no table of commands has a steering angle (steering_rad), "
+            "which it is "
             "for; leave the option out."
         )
 
@@ -332,7 +338,7 @@ def _exchanged(poses: list[PoseSeries], pairs: Sequence[tuple[int, int]]) -> lis
     ids = {series.robot_id: series.robot_id for series in poses}
     for a, b in pairs:
         if unknown := {a, b} - set(ids):
-            raise _unknown_robot("--exchange", min(unknown), list(ids))
+            raise _unknown_robot("exchange", min(unknown), list(ids))
         ids = {k: {a: b, b: a}.get(number, number) for k, number in ids.items()}
     return [replace(series, robot_id=ids[series.robot_id]) for series in poses]
 
@@ -358,24 +364,25 @@ def _check_names(
         if number not in ids or name not in names:
             known = f" (names are {', '.join(sorted(names))})" if names else ""
             raise LogError(
-                f"--robot {name}={number}: no robot in the files has that name{known}; correct it."
+                f"{option('robot', {name: number})}: no robot in the files has that name{known}; "
+                "correct it."
             )
     of_poses = {
-        "--pose-shift-s": options.pose_shift_s,
-        "--pose-clock-ppm": options.pose_clock_ppm,
-        "--heading-offset-deg": options.heading_offset_rad,
-        "--flip": options.flips,
-        "--rename": options.own_renames,
+        "pose_shift_s": options.pose_shift_s,
+        "pose_clock_ppm": options.pose_clock_ppm,
+        "heading_offset_deg": options.heading_offset_rad,
+        "flip": options.flips,
+        "rename": options.own_renames,
     }
-    for option, own in of_poses.items():
+    for name, own in of_poses.items():
         named = set(own) - {None} if isinstance(own, Mapping) else set()
         if unknown := named - set(ids):
-            raise _unknown_robot(option, min(unknown), ids)
+            raise _unknown_robot(name, min(unknown), ids)
 
 
-def _unknown_robot(option: str, robot_id: int, ids: Collection[int]) -> LogError:
+def _unknown_robot(name: str, robot_id: int, ids: Collection[int]) -> LogError:
     return LogError(
-        f"{option} R{robot_id:02d}=...: no robot in the files has that number, they are "
+        f"{option(name)}: no robot in the files is R{robot_id:02d}, they are "
         f"{', '.join(f'R{k:02d}' for k in sorted(set(ids)))}; correct it."
     )
 
@@ -386,7 +393,8 @@ def _turned(poses: list[PoseSeries], options: ImportOptions) -> list[PoseSeries]
         own = [p for p in poses if number in (None, p.robot_id)]
         if own and not any(np.isfinite(p.orientation_wxyz).any() for p in own):
             raise LogError(
-                "--heading-offset-deg: no heading was recorded that could be turned; leave the "
+                f"{option('heading_offset_deg')}: no heading was recorded that could be turned; "
+                "leave the "
                 "option out."
             )
     halves = [_of(p.robot_id, options.heading_offset_rad) / 2 for p in poses]
@@ -402,7 +410,8 @@ def _headed(poses: list[PoseSeries], commands: list[CommandSeries]) -> list[Pose
     told = {series.robot_id: series for series in commands}
     if any(series.world for series in commands):
         raise LogError(
-            "--heading-from-path: world-frame velocities do not tell along which axis the robot "
+            f"{option('heading_from_path', True)}: world-frame velocities do not tell along which "
+            "axis the robot "
             "goes; leave the option out."
         )
     return [
@@ -417,7 +426,8 @@ def _on_our_clock(series: PoseSeries, options: ImportOptions) -> np.ndarray:
     gains_ppm = _of(number, options.pose_clock_ppm)
     if not abs(gains_ppm) <= MOST_PPM:
         raise LogError(
-            f"--pose-clock-ppm {gains_ppm:g}: no clock gains or loses more than {MOST_PPM:g} ppm, "
+            f"{option('pose_clock_ppm', gains_ppm)}: no clock gains or loses more than "
+            f"{MOST_PPM:g} ppm, "
             "a tenth of its time; give parts per million."
         )
     gains = 1 + 1e-6 * gains_ppm
@@ -460,8 +470,8 @@ def _of_no_run(
     if not pairs:
         raise LogError(
             f"poses are of robots {[p.robot_id for p in poses]}, commands of {ids}: no "
-            f"robot has both; number them alike, for example with --robot {ids[0]}="
-            f"{poses[0].robot_id}."
+            f"robot has both; number them alike, for example with "
+            f"{option('robot', {str(ids[0]): poses[0].robot_id})}."
         )
     shift = not given.bag or options.receive_stamps
     wrong = _wrong_times(pairs, given, shift, own=True)
@@ -501,10 +511,12 @@ def _check_times(
     _check_rate(p, bool(given.poses and given.commands))
     if last_s < start_s or (not (c.repeat and shift) and first_s > end_s):
         remedy = (
-            "shift the poses, for example so that both start together: --pose-shift-s "
-            f"{f'R{p.robot_id:02d}=' if own else ''}{start_s - first_s:.3f}"
+            "shift the poses, for example so that both start together: "
+            + option(
+                "pose_shift_s", round(float(start_s - first_s), 3), p.robot_id if own else None
+            )
             if shift
-            else "take the times of receipt of both: --receive-stamps"
+            else f"take the times of receipt of both: {option('receive_stamps', True)}"
         )
         raise LogError(
             f"robot {p.robot_id}: poses from {first_s:.3f} to {last_s:.3f} s and commands from "
@@ -550,7 +562,7 @@ def _check_rate(poses: PoseSeries, in_tables: bool) -> None:
         unit = next((u for u, times in TIME_UNITS.items() if step_s / times < SLOWEST_S), "ns")
         remedy = (
             f"if the times are in {unit}, name that column t_{unit} in all files, or import anew "
-            f"with --rename t_s=t_{unit}"
+            f"with {option('rename', {'t_s': f't_{unit}'})}"
             if in_tables
             else "record them at 10 Hz or more"
         )

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.data.importers.series import CommandSeries
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import open_text
@@ -107,6 +108,6 @@ def _id_of_folder(path: Path) -> int:
     if not digits:
         raise LogError(
             f"{path}: neither its folder's name ends in a robot's number nor is "
-            "--robot-id given; give it."
+            f"{option('robot_id')} given; give it."
         )
     return int(digits[1])

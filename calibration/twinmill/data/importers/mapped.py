@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.importers.columns import (
     LEFT,
     Guess,
@@ -67,12 +68,12 @@ def check_renames(
         if not held and not (old in read and by_name(new, known)):
             names = "; ".join(f"{name} has {', '.join(h)}" for name, h in headers.items())
             raise LogError(
-                f"--rename {old}={new}: no table has a column '{old}'"
+                f"{option('rename', {old: new})}: no table has a column '{old}'"
                 f"{f' ({names})' if names else ''}; correct the name."
             )
         if not is_usual(new, known):
             raise LogError(
-                f"--rename {old}={new}: {new} is not one of our columns; they are "
+                f"{option('rename', {old: new})}: {new} is not one of our columns; they are "
                 f"{', '.join(sorted(known))}."
             )
 
@@ -137,8 +138,9 @@ def _renamed(table: str, mapping: Mapping, ours: dict[str, str], known: frozense
         named[old] = target, replace(mapping[old], **unit)
         if target in mapping and target not in (old, *ours):
             raise LogError(
-                f"{table}: --rename {old}={new}: there is a {target} already; say what that one is "
-                f"as well, as in --rename {target}={old}."
+                f"{table}: {option('rename', {old: new})}: there is a {target} already; say what "
+                "that one is "
+                f"as well, as in {option('rename', {target: old})}."
             )
     return dict(named.values())
 
@@ -150,7 +152,8 @@ def _rivals(table: str, guess: Guess) -> LogError:
         )
     return LogError(
         f"{table}: columns '{guess.rival}' and '{guess.column}' hold one quantity; take one out of "
-        "the file, or choose with a --mapping file (--explain-columns writes one)."
+        f"the file, or choose with a {option('mapping')} file ({option('explain_columns')} "
+        "writes one)."
     )
 
 
@@ -162,13 +165,15 @@ def _unsure(table: str, guess: Guess) -> LogError:
         what, factor = lacks(target)
         return LogError(
             f"{table}: column '{guess.column}' is {what}, and ours is {target}; let "
-            f"--explain-columns FILE write down all columns, write the factor there ({factor}), "
-            "and give that to --mapping."
+            f"{option('explain_columns')} write down all columns, write the factor there "
+            f"({factor}), "
+            f"and give that to {option('mapping')}."
         )
     if guess.zero:
         return LogError(
-            f"{table}: column '{guess.column}' {guess.why}; let --explain-columns FILE write down "
-            "all columns, check factor and zero there, and give that to --mapping."
+            f"{table}: column '{guess.column}' {guess.why}; let {option('explain_columns')} write "
+            "down "
+            f"all columns, check factor and zero there, and give that to {option('mapping')}."
         )
     stem, ours = split_unit(target)
     if len(guess.targets) > 1:  # both wheels of a side
@@ -179,6 +184,7 @@ def _unsure(table: str, guess: Guess) -> LogError:
     more = " (or _mm, _deg, _ms, _pwm ...)" if ours else ""
     return LogError(
         f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
-        f"--rename {guess.column}={new}{more}, or let --explain-columns FILE write down all "
-        "columns and give that to --mapping."
+        f"{option('rename', {guess.column: new})}{more}, or let {option('explain_columns')} "
+        "write down all "
+        f"columns and give that to {option('mapping')}."
     )

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from twinmill.arguments import option
 from twinmill.data.importers.series import PoseSeries, with_z_up
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import open_text
@@ -114,12 +115,13 @@ def robots_of(
         if number in series:
             raise LogError(
                 f"{name}: rigid body '{body}' gives the number {number}, which another has; give "
-                f"it its own in 0..99 with --robot '{body}=ID'."
+                f"it its own in 0..99 with {option('robot', {body: 'ID'})}."
             )
         own = _pose_series(number, utime_us, position_m, quaternion)
         if number < 0:
             left_out.append(
-                f"rigid body '{body}' gives no robot_id in 0..99; give it with --robot '{body}=ID'"
+                f"rigid body '{body}' gives no robot_id in 0..99; give it with "
+                f"{option('robot', {body: 'ID'})}"
             )
         elif not own.valid.any():
             left_out.append(f"rigid body '{body}' is never tracked; export it solved")
@@ -143,7 +145,7 @@ def _header(reader, name: str) -> _Header:
     if ends != ["format version", "frame"]:
         raise LogError(
             f"{name}: does not begin with 'Format Version' and a row 'Frame,Time "
-            "(Seconds)', so it is no Motive export; use --poses for plain CSV."
+            f"(Seconds)', so it is no Motive export; use {option('poses')} for plain CSV."
         )
     fields = dict(zip(map(str.title, rows[0][::2]), rows[0][1::2], strict=False))
     for key, good in (("Rotation Type", ROTATIONS), ("Coordinate Space", ("Global",))):

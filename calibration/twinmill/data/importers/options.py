@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from twinmill.arguments import option
 from twinmill.data.importers.robot_files import WORD
 from twinmill.data.importers.series import CommandSeries, PoseSeries
 from twinmill.data.log import LogError
@@ -86,7 +87,7 @@ class Sources:
     def names(
         self, options: "ImportOptions", series: Sequence[PoseSeries | CommandSeries]
     ) -> set[str]:
-        """Words by which --robot may call a robot."""
+        """Words by which a robot may be called."""
         called = {own.called for own in series} - {""}
         topics = [*options.pose_topics, *options.command_topics] if self.bag else []
         called |= {word for topic in topics for word in topic.replace(":", "/").split("/") if word}
@@ -98,67 +99,69 @@ class Sources:
 
 # Options that not every source has a use for: those that have, and what to do about others.
 USES = {
-    "--mapping": (
+    "mapping": (
         ("poses", "commands"),
-        "it says what the columns of tables are; --rename and --flip do of all sources",
+        "it says what the columns of tables are; to rename and to flip work with all sources",
     ),
-    "--pose": (("bag", "poses"), "it names a topic of a bag, or of a table of several topics"),
-    "--command": (
-        ("bag", "commands"),
-        "it names a topic of a bag, or of a table of several topics",
-    ),
-    "--receive-stamps": (("bag",), "a ROS bag alone has times of receipt"),
-    "--full-duty": (
+    "pose": (("bag", "poses"), "it names a topic of a bag, or of a table of several topics"),
+    "command": (("bag", "commands"), "it names a topic of a bag, or of a table of several topics"),
+    "receive_stamps": (("bag",), "a ROS bag alone has times of receipt"),
+    "full_duty": (
         ("bag",),
         "the names of a table's columns say it: fl_pct, or fl_unit of 1, fl_pwm of 255",
     ),
-    "--wheelbase-m": (("bag", "commands"), "it is for commands that are steering angles"),
-    "--wheel-factor": (("told",), "it is for commands that are wheel speeds"),
-    "--same-clock": (("told",), "without commands there is one clock alone"),
-    "--heading-from-path": (("told",), "the commands tell along which axis a robot goes"),
+    "wheelbase_m": (("bag", "commands"), "it is for commands that are steering angles"),
+    "wheel_factor": (("told",), "it is for commands that are wheel speeds"),
+    "same_clock": (("told",), "without commands there is one clock alone"),
+    "heading_from_path": (("told",), "the commands tell along which axis a robot goes"),
 }
 
 
 def check_sources(given: Sources, options: ImportOptions) -> None:
     """Raises LogError where sources do not go together, or have no use for an option."""
     if options.up not in ("x", "y", "z", None):
-        raise LogError(f"--up {options.up}: must be x, y or z.")
+        raise LogError(f"{option('up', options.up)}: must be x, y or z.")
     captures = [path for path in (given.poses, given.motive, given.vicon) if path]
     if given.bag and (captures or given.commands or given.io_tsv):
-        raise LogError("--bag: holds poses and commands; give no other source beside it.")
+        raise LogError(
+            f"{option('bag')}: holds poses and commands; give no other source beside it."
+        )
     if not given.bag and (len(captures) != 1 or (given.commands and given.io_tsv)):
         raise LogError(
             "a log needs one source of poses, and one of commands unless it is of poses alone: "
-            "give --poses, --motive or --vicon, and --commands or --io-tsv."
+            f"give {option('poses')}, {option('motive')} or {option('vicon')}, and "
+            f"{option('commands')} or {option('io_tsv')}."
         )
     several = max(len(given.poses), len(given.commands), len(given.io_tsv)) > 1
     if options.robot_id is not None and (not 0 <= options.robot_id <= 99 or several):
         raise LogError(
-            f"--robot-id {options.robot_id}: must be in 0..99 and fits one robot; "
+            f"{option('robot_id', options.robot_id)}: must be in 0..99 and fits one robot; "
             "number several by the names of their files or of their folders."
         )
     told = given.commands or given.io_tsv or (given.bag and options.command_topics)
     there = {name for name in ("poses", "commands", "bag") if getattr(given, name)}
     there |= {"told"} if told else set()
     asked = {
-        "--mapping": options.mapping,
-        "--pose": options.pose_topics,
-        "--command": options.command_topics,
-        "--receive-stamps": options.receive_stamps,
-        "--full-duty": options.full_duty is not None,
-        "--wheelbase-m": options.wheelbase_m is not None,
-        "--wheel-factor": options.wheel_factor is not None,
-        "--same-clock": options.same_clock,
-        "--heading-from-path": options.path_heading,
+        "mapping": options.mapping,
+        "pose": options.pose_topics,
+        "command": options.command_topics,
+        "receive_stamps": options.receive_stamps,
+        "full_duty": options.full_duty is not None,
+        "wheelbase_m": options.wheelbase_m is not None,
+        "wheel_factor": options.wheel_factor is not None,
+        "same_clock": options.same_clock,
+        "heading_from_path": options.path_heading,
     }
-    for option, (users, remedy) in USES.items():
-        if asked[option] and not there & {*users}:
+    for name, (users, remedy) in USES.items():
+        if asked[name] and not there & {*users}:
             raise LogError(
-                f"{option}: nothing that is read has a use for it: {remedy}; leave it out."
+                f"{option(name)}: nothing that is read has a use for it: {remedy}; leave it out."
             )
-    for option, topics in (("--pose", options.pose_topics), ("--command", options.command_topics)):
-        if len(topics) > 1 and not given.bag:
-            raise LogError(f"{option} {topics[1]}: of a table one topic is read; name one.")
+    for name in ("pose", "command"):
+        if len(asked[name]) > 1 and not given.bag:
+            raise LogError(
+                f"{option(name, [asked[name][1]])}: of a table one topic is read; name one."
+            )
 
 
 def check_numbered(
@@ -170,8 +173,10 @@ def check_numbered(
     if number is None or number in ids:
         return
     raise LogError(
-        f"--robot-id {number}: the files hold several robots ({', '.join(map(str, ids))}), each "
-        "with its number; leave the option out, or number each with --robot NAME=ID."
+        f"{option('robot_id', number)}: the files hold several robots "
+        f"({', '.join(map(str, ids))}), each "
+        "with its number; leave the option out, or number each with "
+        f"{option('robot', {'NAME': 'ID'})}."
     )
 
 

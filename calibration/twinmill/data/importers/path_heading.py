@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.importers.series import CommandSeries, PoseSeries, quaternion_from_heading
 from twinmill.data.log import LogError
 from twinmill.data.track import local_line
@@ -47,7 +48,9 @@ def with_path_heading(poses: PoseSeries, commands: CommandSeries) -> PoseSeries:
     who = f"robot {poses.robot_id}"
     recorded = poses.orientation_wxyz[np.isfinite(poses.orientation_wxyz).all(axis=1)]
     if len(recorded) and np.ptp(recorded, axis=0).max() > STILL:
-        raise LogError(f"--heading-from-path: {who} has headings; leave the option out.")
+        raise LogError(
+            f"{option('heading_from_path', True)}: {who} has headings; leave the option out."
+        )
     t_s = poses.utime_us * 1e-6
     heading_rad, told = np.full(len(t_s), np.nan), _told(commands, t_s[-1], who)
     way = _way_mps(t_s, poses)
@@ -61,7 +64,8 @@ def with_path_heading(poses: PoseSeries, commands: CommandSeries) -> PoseSeries:
     known = np.isfinite(heading_rad) & poses.valid
     if known.mean() < FEWEST:
         raise LogError(
-            f"--heading-from-path: the path shows the heading of {who} in {100 * known.mean():.0f} "
+            f"{option('heading_from_path', True)}: the path shows the heading of {who} in "
+            f"{100 * known.mean():.0f} "
             "% of the poses; drive ahead for two seconds at a time, or record the heading."
         )
     note = (
@@ -87,7 +91,8 @@ def _told(commands: CommandSeries, last_s: float, who: str) -> _CommandedMotion:
         turn = value[:, 2]
     elif commands.kind == "wheel_speed" and not value[:, 3].any():
         raise LogError(
-            f"--heading-from-path: {who} has three wheels, whose commands tell no axis without a "
+            f"{option('heading_from_path', True)}: {who} has three wheels, whose commands tell no "
+            "axis without a "
             "model; record the heading."
         )
     else:  # front left, front right, rear left, rear right

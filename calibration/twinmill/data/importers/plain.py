@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.data.bench_table import is_bench
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.columns import Mapping
@@ -79,7 +80,7 @@ class Columns:
     robots: dict[str, int] = field(default_factory=dict)
     up: str = "z"
     wheelbase_m: float | None = None
-    lacks_robot: str = "give --robot-id for a file of one robot"
+    lacks_robot: str = ""
 
     def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names, rows that are no samples of what is known left out."""
@@ -324,8 +325,9 @@ def _kind(table: Table) -> CommandKind:
     if not any(map(table.has, group)):
         raise LogError(
             f"{table.name}: no column is known to be a command (it has {', '.join(table.header)}); "
-            "say what its columns are, as with --rename NAME=vx_mps --rename NAME=omega_radps, or "
-            "let --explain-columns FILE write down all columns and give that to --mapping."
+            f"say what its columns are ({option('rename')}), or "
+            f"let {option('explain_columns')} write down all columns and give that to "
+            f"{option('mapping')}."
         )
     raise table.missing(next(name for name in group if not table.has(name)))
 
@@ -373,7 +375,8 @@ def _values(
     if kind == "duty" and not converted and top <= 1 and np.any(value % 1):
         raise LogError(
             f"{table.name}: duties go to {top:g} at most, which is no percent but a share of full "
-            f"duty; name the columns {columns[0][:2]}_unit ... in the file, or with --rename "
+            f"duty; name the columns {columns[0][:2]}_unit ... in the file, or with "
+            f"{option('rename')} "
             f"{columns[0]}={columns[0][:2]}_unit ..."
         )
     return value
@@ -404,7 +407,7 @@ def _refuse_degrees(table: Table, ids: np.ndarray) -> None:
             raise LogError(
                 f"{table.name}: robot {number}: theta_rad goes to {top:.0f} and jumps "
                 "by 360 where the robot turns round: it is in degrees; name it theta_deg, in the "
-                "file or with --rename theta_rad=theta_deg."
+                f"file or with {option('rename', {'theta_rad': 'theta_deg'})}."
             )
 
 
@@ -412,9 +415,8 @@ def _robot_ids(table: Table, columns: Columns) -> tuple[np.ndarray, list[str]]:
     """(rows,) robot_id, and what was done with names that are no numbers."""
     if not table.has("robot_id"):
         if columns.robot_id is None:
-            raise LogError(
-                f"{table.name}: column robot_id is missing; add it, or {columns.lacks_robot}."
-            )
+            remedy = columns.lacks_robot or f"give {option('robot_id')} for a file of one robot"
+            raise LogError(f"{table.name}: column robot_id is missing; add it, or {remedy}.")
         return np.full(len(table.rows), columns.robot_id), []
     cells = table.cells("robot_id")
     if "" in cells:
@@ -444,7 +446,7 @@ def _numbered(table: str, names: list[str], columns: Columns) -> tuple[dict[str,
         elif digits:
             numbers[name] = int(digits[-1])
     if len(numbers) < len(names) or (words and len(set(numbers.values())) < len(names)):
-        offer = " ".join(f"--robot '{name}={k}'" for k, name in enumerate(words, 1))
+        offer = option("robot", {name: k for k, name in enumerate(words, 1)})
         raise LogError(
             f"{table}: robot_id is {', '.join(repr(name) for name in words[:5])}, which gives no "
             f"number of its own to each robot; number them, for example with {offer}."
@@ -464,7 +466,8 @@ def _utime_us(table: Table, t_s: np.ndarray) -> np.ndarray:
     if (unit := unit_of_stamps(largest)) != "s":
         raise LogError(
             f"{table.name}: t_s goes to {largest:.4g}, which are no seconds; if it counts {unit} "
-            f"since 1970, name the column t_{unit} there, or with --rename t_s=t_{unit} if no "
+            f"since 1970, name the column t_{unit} there, or with "
+            f"{option('rename', {'t_s': f't_{unit}'})} if no "
             "other file's t_s is in seconds."
         )
     return np.round(t_s * 1e6).astype(np.int64)

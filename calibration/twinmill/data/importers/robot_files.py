@@ -8,6 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TypeVar
 
+from twinmill.arguments import option
 from twinmill.data.importers.series import CommandSeries, PoseSeries
 from twinmill.data.log import LogError
 
@@ -20,7 +21,7 @@ Given = Path | Sequence[Path] | None
 Series = TypeVar("Series", PoseSeries, CommandSeries)
 
 
-def files_of(given: Given, option: str) -> tuple[Path, ...]:
+def files_of(given: Given, name: str) -> tuple[Path, ...]:
     """The files that are given; a name with * or ? that is no file stands for those that fit it.
 
     Raises:
@@ -32,10 +33,10 @@ def files_of(given: Given, option: str) -> tuple[Path, ...]:
         if PATTERN.search(own[0].name) and not own[0].exists():
             own = sorted(own[0].parent.glob(own[0].name))
         if not own:
-            raise LogError(f"{option} {path}: no file has such a name; correct it.")
+            raise LogError(f"{option(name, str(path))}: no file has such a name; correct it.")
         found += own
     if twice := [path for path, times in Counter(found).items() if times > 1]:
-        raise LogError(f"{option} {twice[0]}: is given twice; name each file once.")
+        raise LogError(f"{option(name, str(twice[0]))}: is given twice; name each file once.")
     return tuple(found)
 
 
@@ -125,7 +126,8 @@ def read_each(
                 raise LogError(
                     f"{holder[series.robot_id].name} and {path.name} both hold {what} of robot "
                     f"{series.robot_id}; give other robots other numbers, for example with "
-                    f"--robot '{path.name.split('.')[0]}=ID', and other runs logs of their own."
+                    f"{option('robot', {path.name.split('.')[0]: 'ID'})}, and other runs logs of "
+                    "their own."
                 )
             holder[series.robot_id] = path
             found.append(series)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import turbopi
 
+from twinmill.arguments import option
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.ros_cut import check_chunks, is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames, on_floor
@@ -229,18 +230,15 @@ def _likely(topic: Topic) -> tuple[bool, bool, bool, bool, int]:
     return topic.kind not in MANY, measured, bool(base), not topic.fixed, topic.count
 
 
-def numbering(pairs: list[tuple[str, str]]) -> list[str]:
+def numbering(pairs: list[tuple[str, str]]) -> dict[str, Any]:
     """Options that number the robots whose topics have no number."""
     open_pairs = [pair for pair in pairs if _told(*pair, {}) is None]
     if open_pairs and len(pairs) == 1:
-        return ["--robot-id", "1"]
+        return {"robot_id": 1}
     taken = {_told(*pair, {}) for pair in pairs}
     free = (k for k in range(1, 100) if k not in taken)
-    return [
-        word
-        for pose, command in open_pairs
-        for word in ("--robot", f"{_name_in(command or pose)}={next(free)}")
-    ]
+    names = {_name_in(command or pose): next(free) for pose, command in open_pairs}
+    return {"robot": names} if names else {}
 
 
 def _words(name: str) -> list[str]:
@@ -275,7 +273,10 @@ def read_bag(
         LogError: unreadable, a topic that is not there or holds nothing that is known.
     """
     if not poses or (commands and len(poses) != len(commands)):
-        raise LogError("--pose and --command: give one of each for each robot, in the same order.")
+        raise LogError(
+            f"{option('pose')} and {option('command')}: give one of each for each robot, in the "
+            "same order."
+        )
     pairs = list(zip(poses, commands or [""] * len(poses), strict=True))
     numbers = [_number(pair, options, len(pairs)) for pair in pairs]
     roles = [*((topic, "pose") for topic in poses), *((topic, "command") for topic in commands)]
@@ -298,9 +299,11 @@ def read_bag(
 def _check_options(options: BagOptions, kinds: set[str]) -> None:
     """Raises LogError where a number is given that the commands, by their kinds, do not need."""
     if options.wheelbase_m is not None and not kinds & {*STEERED}:
-        raise LogError("--wheelbase-m: no command is a steering angle; leave the option out.")
+        raise LogError(
+            f"{option('wheelbase_m')}: no command is a steering angle; leave the option out."
+        )
     if options.full_duty is not None and all(COMMANDS[kind][0] != "duty" for kind in kinds):
-        raise LogError("--full-duty: no command is a duty; leave the option out.")
+        raise LogError(f"{option('full_duty')}: no command is a duty; leave the option out.")
 
 
 def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
@@ -309,7 +312,7 @@ def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
     number = _told(*pair, options.robots)
     if number is None:
         topic = pair[1] or pair[0]
-        remedy = "--robot-id 1" if robots == 1 else f"--robot {_name_in(topic)}=1"
+        remedy = option("robot_id", 1) if robots == 1 else option("robot", {_name_in(topic): 1})
         raise LogError(
             f"{topic}: has no number in 0..99 that tells the robot; number it, for example with "
             f"{remedy}."
@@ -582,7 +585,7 @@ def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
                 what = "frames" if kind == TF else "tags"
                 raise LogError(
                     f"{path.name}: {name} holds many {what}; name one as {name}:"
-                    f"{what[:-1].upper()} (`twinmill import --bag` alone lists them)."
+                    f"{what[:-1].upper()} (`twinmill import` of the bag alone lists them)."
                 )
             if kind == CORNERS:
                 raise LogError(
@@ -702,7 +705,7 @@ def _stamps(
         raise LogError(
             f"{topic}: the header stamps go back by {-steps_s.min():.3f} s at message "
             f"{int(steps_s.argmin()) + 2}: a clock was set while it recorded; take the times of "
-            "receipt with --receive-stamps."
+            f"receipt with {option('receive_stamps', True)}."
         )
     if back.any():
         notes.append(
@@ -714,7 +717,8 @@ def _stamps(
 def _poses(robot_id: int, given: _Rows, options: BagOptions) -> PoseSeries:
     if given.of_camera and options.up:
         raise LogError(
-            f"--up {options.up}: {given.topic} is seen by a camera, and laid on the floor that its "
+            f"{option('up', options.up)}: {given.topic} is seen by a camera, and laid on the floor "
+            "that its "
             "poses are on; leave the option out."
         )
     utime_us, evened = at_even_beat(given.utime_us, given.topic)
@@ -736,19 +740,22 @@ def _commands(robot_id: int, given: _Rows, options: BagOptions) -> CommandSeries
     topic, kind = given.topic, given.kind
     if kind == JOINTS and given.widths == [0]:
         raise LogError(
-            f"--command: {topic} has positions of joints and no velocities; record what the wheels "
+            f"{option('command')}: {topic} has positions of joints and no velocities; record what "
+            "the wheels "
             "are told, or let the driver publish velocities."
         )
     if len(given.widths) > 1 or given.widths[0] not in (2, 3, WIDTH):
         raise LogError(
-            f"--command: {topic} has {' or '.join(map(str, given.widths))} numbers a message, but "
+            f"{option('command')}: {topic} has {' or '.join(map(str, given.widths))} numbers a "
+            "message, but "
             "a robot here has two to four wheels, and each message tells all; choose another topic."
         )
     rows, notes = given.ordered()
     value = given.value[rows]
     if not np.isfinite(value).all():
         raise LogError(
-            f"--command: {topic} holds numbers that are not finite; correct the program that "
+            f"{option('command')}: {topic} holds numbers that are not finite; correct the program "
+            "that "
             "recorded them."
         )
     command_kind = COMMANDS[kind][0]
@@ -783,12 +790,13 @@ def _percent(topic: str, value: np.ndarray, full: float | None) -> tuple[np.ndar
         full = next((f for f in FULL_DUTIES if top <= f), FULL_DUTIES[-1]) if top else 100.0
     if not full > 0 or top > full:
         raise LogError(
-            f"--command: {topic}: duties go to {top:g}, beyond {full:g} for full duty; say which "
-            "number is full duty with --full-duty."
+            f"{option('command')}: {topic}: duties go to {top:g}, beyond {full:g} for full duty; "
+            "say which "
+            f"number is full duty with {option('full_duty')}."
         )
     if full != 100 and not given:
         notes = [
             f"{topic}: duties go to {top:g}: {full:g} is taken for full duty; else give "
-            "--full-duty."
+            f"{option('full_duty')}."
         ]
     return value * (100 / full), notes

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from twinmill.arguments import option
 from twinmill.data.log import CommandKind, LogError, heading_rad
 
 TURNED_RAD = 0.02  # turns a velocity by 2 % of itself
@@ -133,7 +134,8 @@ def velocities_of_steering(
     """
     if wheelbase_m is None or not wheelbase_m > 0:
         raise LogError(
-            f"{where}: tells steering angles; give the distance of the axles, --wheelbase-m METRES."
+            f"{where}: tells steering angles; give the distance of the axles in m, "
+            f"{option('wheelbase_m')}."
         )
     zero = np.zeros_like(speed_mps)
     omega_radps = speed_mps * np.tan(steering_rad) / wheelbase_m

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from twinmill.arguments import option
 from twinmill.data.importers.motive import robots_of
 from twinmill.data.importers.series import PoseSeries, with_z_up
 from twinmill.data.log import LogError
@@ -95,7 +96,7 @@ def _part(lines: list[str], name: str) -> _Part:
     if not parts or len(rows) < parts[0] + 6:
         raise LogError(
             f"{name}: has no part 'Objects' or 'Segments' with frames, so it is no Vicon export of "
-            "rigid bodies; use --poses for plain CSV."
+            f"rigid bodies; use {option('poses')} for plain CSV."
         )
     rate, bodies, axes, units, *frames = rows[parts[0] + 1 :]
     try:

@@ -19,6 +19,7 @@ from ribs.archives import GridArchive
 from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
 from ribs.schedulers import Scheduler
 
+from twinmill.arguments import option
 from twinmill.defaults import BATCH, PER_GENERATION
 from twinmill.files import alone_in, made_folder, replacing
 from twinmill.model.model_file import write_whole
@@ -127,10 +128,12 @@ class GenerationStore:
             if json.loads(manifest.read_text())["sha256"] != hunt.sha256:
                 raise ValueError(
                     f"{folder}: holds a search with other parameters, another model or version; "
-                    "choose another --out, or remove it."
+                    f"choose another {option('out')}, or remove it."
                 )
         elif folder.exists() and any(folder.iterdir()):
-            raise ValueError(f"{folder}: is not empty and holds no search; choose another --out.")
+            raise ValueError(
+                f"{folder}: is not empty and holds no search; choose another {option('out')}."
+            )
         text = json.dumps({"sha256": hunt.sha256, "hunt": asdict(hunt)}, indent=1, sort_keys=True)
         write_whole(manifest, text)
         self._parts.mkdir(exist_ok=True)

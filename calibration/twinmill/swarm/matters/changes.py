@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.arguments import option
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import NO_SIZE, NORMAL_95, catalogue_name, catalogue_of, effect_names
 from twinmill.model.ranges import Quantity, ranges
@@ -88,7 +89,8 @@ def factors(
         if name not in names:
             near = difflib.get_close_matches(name, sorted(names), n=1, cutoff=0)
             raise ValueError(
-                f"--only {name}: is no effect, and no number of the model that has an interval; "
+                f"{option('only', name)}: is no effect, and no number of the model that has an "
+                "interval; "
                 f"the nearest is '{near[0]}'."
             )
     return _acting([s for s in found if not only or s.name in only])

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 
+from twinmill.arguments import option
 from twinmill.listing import listed
 from twinmill.swarm.matters.differences import Difference
 from twinmill.swarm.matters.sensitivity import (
@@ -96,7 +97,7 @@ def next_step(found: Sensitivity) -> str:
     unsure = found.of(UNSURE)
     if unsure:
         text += (
-            f"{len(unsure)} answers are open after {found.request.seeds} runs; --seeds "
+            f"{len(unsure)} answers are open after {found.request.seeds} runs; {option('seeds')} "
             f"{4 * found.request.seeds} halves their intervals."
         )
     return text.strip()

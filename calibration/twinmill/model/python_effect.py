@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An effect written as a Python function, which the plants run as a formula.
+
+The function is called once, with symbols in place of signals and numbers. What it does to them is
+written down as the formula of the effect `equation`, so that fits, diagnoses, both plants and the
+export to C++ have it at their usual speed.
+"""
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import twinmill_native as native
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from twinmill.model.parameters import effect_names
+
+PLACES = ("p0", "p1", "p2", "p3")  # numbers that a formula may have
+STATES = ("state_rate", "second_rate")
+TRIED = np.random.default_rng(1).uniform(0.05, 0.4, (16, 32))  # signals, as of slow robots
+
+# numpy's functions in the words of muParser.
+WORDS: dict[Any, str] = {
+    np.add: "({}+{})",
+    np.subtract: "({}-{})",
+    np.multiply: "({}*{})",
+    np.true_divide: "({}/{})",
+    np.power: "({}^{})",
+    np.negative: "(-{})",
+    np.positive: "{}",
+    np.square: "({0}*{0})",
+    np.hypot: "sqrt({0}*{0}+{1}*{1})",
+    np.minimum: "min({},{})",
+    np.maximum: "max({},{})",
+    np.arctan2: "atan2({},{})",
+    np.less: "({}<{})",
+    np.less_equal: "({}<={})",
+    np.greater: "({}>{})",
+    np.greater_equal: "({}>={})",
+    np.equal: "({}=={})",
+    np.not_equal: "({}!={})",
+    np.logical_and: "({}&&{})",
+    np.bitwise_and: "({}&&{})",
+    np.logical_or: "({}||{})",
+    np.bitwise_or: "({}||{})",
+    np.where: "({}?{}:{})",
+    np.clip: "min(max({},{}),{})",
+    np.absolute: "abs({})",
+    np.log: "ln({})",
+    np.arcsin: "asin({})",
+    np.arccos: "acos({})",
+    np.arctan: "atan({})",
+    **{
+        f: f"{f.__name__}({{}})"
+        for f in (np.sqrt, np.exp, np.sign, np.sin, np.cos, np.tan, np.sinh, np.cosh, np.tanh)
+    },
+}
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of an effect, which fits find.
+
+    Attributes:
+        unit: in which the function takes it.
+        low, high: its range; what a fit tries beyond is taken for the nearer end.
+        prior: mean and standard deviation of what is known of it before; None: nothing.
+    """
+
+    unit: str = "1"
+    low: float = -math.inf
+    high: float = math.inf
+    prior: tuple[float, float] | None = None
+
+    def text(self, place: str) -> str:
+        """The number, within its range, as a formula has it."""
+        text = place if self.low == -math.inf else f"max({place},{_number(self.low)})"
+        return text if self.high == math.inf else f"min({text},{_number(self.high)})"
+
+
+class Symbol(NDArrayOperatorsMixin):
+    """A part of a formula, on which numpy's functions and Python's operators work."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def __array_ufunc__(self, function: Any, method: str, *given: Any, **options: Any) -> "Symbol":
+        return _applied(function if method == "__call__" and not options else method, given)
+
+    def __array_function__(self, function: Any, _: Any, given: Any, options: Any) -> "Symbol":
+        return _applied(function, (*given, *options.values()))
+
+    def __bool__(self) -> bool:
+        raise TypeError(
+            "an effect's function is written down as a formula and cannot branch on a signal; "
+            "use np.where in place of if, and & and | in place of and and or."
+        )
+
+    def __float__(self) -> float:
+        raise TypeError("an effect's function needs np.sin and the like, not those of math.")
+
+
+def _applied(function: Any, given: tuple[Any, ...]) -> Symbol:
+    if function not in WORDS:
+        known = ", ".join(sorted(f"np.{f.__name__}" for f in WORDS))
+        name = getattr(function, "__name__", function)
+        raise TypeError(f"np.{name}: no formula has it; there are {known}, and + - * / **.")
+    return Symbol(WORDS[function].format(*map(_text, given)))
+
+
+def _text(part: Any) -> str:
+    return part.text if isinstance(part, Symbol) else _number(part)
+
+
+def _number(value: Any) -> str:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"an effect's function: {number} cannot stand in a formula.")
+    return f"({number!r})" if number < 0 else repr(number)
+
+
+class PythonEffect:
+    """An effect that a Python function describes; made by `python_effect`.
+
+    Attributes:
+        name: of the function.
+        adds_to: the quantity that it adds to.
+        numbers: by name.
+        texts: of the effect `equation` that it is in a model.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        adds_to: str,
+        numbers: Mapping[str, Number],
+        rates: Mapping[str, Callable[..., Any] | None],
+    ) -> None:
+        self.name = function.__name__
+        self.adds_to, self.numbers = adds_to, dict(numbers)
+        self._function = function
+        if not 1 <= len(self.numbers) <= len(PLACES):
+            raise ValueError(
+                f"{self.name}: has {len(self.numbers)} numbers; an effect has one to four."
+            )
+        self.texts = {"adds_to": adds_to, "formula": self._formula(function)}
+        self.texts |= {key: self._formula(rate) for key, rate in rates.items() if rate is not None}
+        self._check_neutral()
+
+    @property
+    def card(self) -> dict[str, Any]:
+        """Description in the fields of a card of the catalogue."""
+        about = (inspect.getdoc(self._function) or "").partition("\n")[0]
+        return {
+            "name": self.name,
+            "summary": about,
+            "equation": "; ".join(f"{key}: {text}" for key, text in self.texts.items()),
+            "parameters": [{"name": name, **vars(n)} for name, n in self.numbers.items()],
+        }
+
+    @property
+    def priors(self) -> dict[str, tuple[float, float]]:
+        """By the places that numbers have in the formula."""
+        placed = zip(PLACES, self.numbers.values(), strict=False)
+        return {place: number.prior for place, number in placed if number.prior is not None}
+
+    def names(self, model: native.Model) -> dict[str, str]:
+        """Names of its numbers in a model, by their own names.
+
+        Raises:
+            ValueError: the model does not have the effect.
+        """
+        for instance, texts in zip(effect_names(model), model.texts, strict=True):
+            if all(texts.get(key) == text for key, text in self.texts.items()):
+                places = zip(self.numbers, PLACES, strict=False)
+                return {name: f"{instance}.{place}" for name, place in places}
+        raise ValueError(f"{self.name}: the model does not have this effect; add it first.")
+
+    def __call__(self, *signals: Any, **named: Any) -> Any:
+        """Value of the function itself."""
+        return self._function(*signals, **named)
+
+    def __repr__(self) -> str:
+        return f"PythonEffect({self.name}: {self.adds_to} + {self.texts['formula']})"
+
+    def _formula(self, function: Callable[..., Any]) -> str:
+        placed = zip(self.numbers.items(), PLACES, strict=False)
+        own = {name: number.text(place) for (name, number), place in placed}
+        return _text(function(*(Symbol(own.get(name, name)) for name in _arguments(function))))
+
+    def _check_neutral(self) -> None:
+        """Raises ValueError where it adds something though its numbers are all zero."""
+        zero = {name: np.clip(0.0, n.low, n.high) for name, n in self.numbers.items()}
+        signals = iter(TRIED)
+        given = [zero[n] if n in zero else next(signals) for n in _arguments(self._function)]
+        with np.errstate(all="ignore"):
+            if np.any(np.nan_to_num(self._function(*given))):
+                raise ValueError(
+                    f"{self.name}: adds something where its numbers are 0, or at the end of "
+                    "their range nearest to it; write it so that it then adds nothing."
+                )
+
+
+def _arguments(function: Callable[..., Any]) -> list[str]:
+    return list(inspect.signature(function).parameters)
+
+
+def python_effect(
+    adds_to: str,
+    numbers: Mapping[str, Number],
+    *,
+    state_rate: Callable[..., Any] | None = None,
+    second_rate: Callable[..., Any] | None = None,
+) -> Callable[[Callable[..., Any]], PythonEffect]:
+    """Makes a Python function an effect that models can have.
+
+    The function's arguments are the effect's numbers, and signals of the drive by their names in
+    `effect("equation")`. It returns what is added to the quantity, in that one's unit. It is made
+    of operators, `np.where` and other functions of numpy that work by element, and it adds nothing
+    where its numbers are zero.
+
+    Args:
+        adds_to: the quantity, as `vx_mps`; `effect("equation")` lists them.
+        numbers: what fits find, by the name of the argument; one to four.
+        state_rate: of an effect that remembers: ds/dt, a function of signals, numbers and `s`,
+            which then are arguments of the effect's function, too.
+        second_rate: dr/dt of a second state `r`.
+
+    Returns:
+        A decorator; what it makes goes into `Model.add`.
+
+    Raises:
+        ValueError: the function adds something where its numbers are zero, or has no number or too
+            many.
+        TypeError: the function does what no formula can.
+
+    Examples:
+        >>> @tm.python_effect("vx_mps", {"drag": tm.Number("s/m", low=0)})
+        ... def air(vx, drag):
+        ...     return -drag * vx * abs(vx)
+        >>> air
+        PythonEffect(air: vx_mps + (((-max(p0,0.0))*vx)*abs(vx)))
+    """
+    rates = dict(zip(STATES, (state_rate, second_rate), strict=True))
+    return partial(PythonEffect, adds_to=adds_to, numbers=numbers, rates=rates)
