@@ -199,6 +199,23 @@ def bag(folder: Path, run: Drive) -> list[str]:
     return ["--bag", str(folder / "run.mcap"), "--pose", "/r1/pose", "--command", "/r1/cmd_vel"]
 
 
+def io_tsv(folder: Path, run: Drive) -> list[str]:
+    """Duties from a TurboPi's own file: moves of a speed, a direction and a turn, 90 ahead."""
+    rows = np.column_stack([START_S + run.pose_t_s, run.place_m, run.heading_rad])
+    poses = _table(folder / "p.csv", "t_s,x_m,y_m,z_m,theta_rad", rows)
+    ahead, left, turn = run.told.T
+    direction_deg = np.degrees(np.arctan2(ahead, -left))
+    moves = np.column_stack([200 * np.hypot(ahead, left), direction_deg, -turn / 2])
+    lines = ["time_ns\tdetected\tsmoothed_detected\tmoves"]
+    lines += [
+        f"{START_S * 10**9 + round(t * 1e9)}\t0\t0\t[({v:.5f}, {d:.5f}, {w:.5f})]"
+        for t, (v, d, w) in zip(run.t_s, moves, strict=True)
+    ]
+    (folder / "io.tsv").write_text("\n".join(lines) + "\n")
+    return ["--poses", poses, "--io-tsv", str(folder / "io.tsv"), "--robot-id", "1"]
+
+
 SOURCES: dict[str, Callable[[Path, Drive], list[str]]] = {
     made.__name__: made for made in (tables, quaternions, topics, motive, vicon, bag)
 }
+OF_DUTIES = {"io_tsv": io_tsv}  # whose commands no model of the import explains

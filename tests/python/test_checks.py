@@ -682,6 +682,15 @@ def test_a_command_that_no_robot_follows_is_named_by_its_row(robot, wrong):
     assert "wheel 2" in found.evidence and "row 101 " in found.evidence
 
 
+def test_speeds_divided_by_the_time_of_day_are_told(robot):
+    """As odometry has them that takes a whole stamp in ns for a step of the clock."""
+    small = replace(robot, command=robot.command * 1e-14)
+    _one([small], "commands are next to nothing", "a time step in a wrong unit")
+    assert check_commanded(replace(robot, command=robot.command * 1e-3), "log") == []
+    parked = replace(small, pose=0 * small.pose)
+    assert check_commanded(parked, "log") == []
+
+
 def test_commands_in_another_unit_are_not_taken_for_single_mistakes(robot):
     """Millimetres a second as metres: all of them are large."""
     twist = np.zeros_like(robot.command)

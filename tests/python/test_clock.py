@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
 
+from twinmill.data.checks.lateness import _stepwise
 from twinmill.data.clock import estimate_offset
 from twinmill.data.log import LogError, read_log
 from twinmill.data.track import make_track
@@ -70,3 +72,16 @@ def test_motion_that_commands_do_not_explain_is_refused(steps):
 def test_constant_commands_are_refused(driven):
     with pytest.raises(LogError, match="never change"):
         estimate_offset(make_track(driven()))
+
+
+def test_steps_of_lateness_are_those_of_an_exhaustive_search():
+    """Of all ways to part eight stretches into pieces of two or more, one shift each."""
+    left = np.random.default_rng(3).random((5, 8))
+    for found in _stepwise(left, np.arange(5.0))[:4]:
+        ways = [
+            (0, *inner, 8)
+            for inner in combinations(range(1, 8), found.pieces - 1)
+            if np.diff((0, *inner, 8)).min() >= 2
+        ]
+        costs = [sum(left[:, a:b].sum(1).min() for a, b in pairwise(way)) for way in ways]
+        assert found.edges == ways[int(np.argmin(costs))]

@@ -22,9 +22,10 @@ from twinmill_cli import import_log as command
 from twinmill_cli.main import COMMANDS, LazyCommand, app
 
 sys.path.insert(0, str(Path(__file__).parent))
-from import_sources import SOURCES, Drive, drive
+from import_sources import OF_DUTIES, SOURCES, Drive, drive
 
 RIGHT = drive()
+EVERY = {**SOURCES, **OF_DUTIES}
 WORDS = r"\s--[a-z-]+(?:[ =](?!--)[\w=.-]+)?"
 
 
@@ -119,7 +120,8 @@ def test_a_printed_remedy_puts_right_a_log_of_every_source(mistake, tmp_path, mo
     options = [part.rstrip(".") for word in printed for part in shlex.split(word)]
     assert option in " ".join(options), said(done)
     monkeypatch.setattr(importing, "_told_of", lambda robots: [])
-    for made in SOURCES.values():
+    of_poses = wrong.told is RIGHT.told
+    for made in (EVERY if of_poses else SOURCES).values():
         _, right = run(tmp_path, made(tmp_path, RIGHT))
         put_right, log = run(tmp_path, made(tmp_path, wrong), *options)
         assert log is not None, (made.__name__, options, said(put_right))
@@ -147,7 +149,7 @@ def test_the_axis_that_is_up_is_told_and_put_right_in_every_source(up, tmp_path,
         quaternion = turn
 
     laid = Laid(RIGHT.t_s, RIGHT.pose_t_s, RIGHT.told, place, RIGHT.heading_rad)
-    for name, made in SOURCES.items():
+    for name, made in EVERY.items():
         if name == "motive":  # its own axes are laid down already: what is z there is -y of others
             continue
         _, right = run(tmp_path, made(tmp_path, RIGHT))
@@ -216,9 +218,9 @@ def test_every_option_of_the_command_is_asked_of_every_source():
     assert options_of_the_command() == set(ASKED)
 
 
-@pytest.mark.parametrize("source", SOURCES)
+@pytest.mark.parametrize("source", EVERY)
 def test_each_option_changes_the_log_or_is_refused_by_its_name(source, tmp_path, unchecked):
-    words = SOURCES[source](tmp_path, RIGHT)
+    words = EVERY[source](tmp_path, RIGHT)
     (tmp_path / "m.toml").write_text(
         '[poses]\nt_s = { column = "t_s" }\nx_m = { column = "x_m", factor = 2.0 }\n'
         'y_m = { column = "y_m" }\n[commands]\nt_s = { column = "t_s" }\n'
@@ -249,7 +251,7 @@ def test_each_option_changes_the_log_or_is_refused_by_its_name(source, tmp_path,
 
 def test_what_is_printed_of_times_that_do_not_meet_works_for_every_source(tmp_path, unchecked):
     late = changed(pose_t_s=RIGHT.pose_t_s + 100.0)
-    for made in SOURCES.values():
+    for made in EVERY.values():
         options, log = [], None
         for _ in range(3):  # of a bag receipt first, and then a shift
             done, log = run(tmp_path, made(tmp_path, late), *options)
@@ -260,9 +262,12 @@ def test_what_is_printed_of_times_that_do_not_meet_works_for_every_source(tmp_pa
 
 
 def test_signs_of_what_nothing_holds_are_refused(tmp_path, unchecked):
-    for made in SOURCES.values():
-        done, log = run(tmp_path, made(tmp_path, RIGHT), "--flip", "fl_pct")
-        assert log is None and "--flip fl_pct: nothing that was read holds fl_pct" in said(done)
+    for name, made in EVERY.items():
+        column = "vy_mps" if name in OF_DUTIES else "fl_pct"
+        done, log = run(tmp_path, made(tmp_path, RIGHT), "--flip", column)
+        assert log is None and f"--flip {column}: nothing that was read holds {column}" in said(
+            done
+        )
 
 
 @pytest.mark.parametrize("mode", ["explain", "list"])

@@ -3,6 +3,7 @@
 
 import csv
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -14,6 +15,7 @@ import pytest
 import turbopi
 
 from twinmill.data.importers.plain import Columns, read_poses
+from twinmill.data.log import read_log
 from twinmill.track.boards import Board
 from twinmill.track.camera import Camera, read_camera
 from twinmill.track.detect import Sightings, centres
@@ -127,9 +129,22 @@ def test_robots_that_move_opposite_to_their_headings_are_told_with_the_other_dra
     assert [word.split()[1] for word in told] == ["1", "2", "3"]
     assert all("track it with --family apriltag_36h11" in word for word in told)
     assert not any("opposite" in word for word in tracked[0]["warnings"])
-    assert "--heading-offset-deg R02=180" in told[1] and told[1] in " ".join(
-        capsys.readouterr().out.split()
-    )
+    assert told[1] in " ".join(capsys.readouterr().out.split())
+    family = re.search(r"--family (\S+);", told[0])[1]
+    drawn = track(folder, "--family", family, "--out", tmp_path / "q.csv", video="short.mp4")
+    turned = re.findall(r"--heading-offset-deg R\d\d=180", " ".join(told))
+    assert len(turned) == 3
+    for k, (poses, options) in enumerate((("p.csv", turned), ("q.csv", []))):
+        out = tmp_path / f"{k}.lcmlog"
+        words = [w for option in options for w in option.split()]
+        cli.run(["import", "--poses", str(tmp_path / poses), *words, "--out", str(out)])
+        log = read_log(out)
+        for tag in ROBOTS:
+            robot = log.robots[tag.number]
+            t_s = log.t0_utime_us / 1e6 + robot.pose_t_s[robot.valid]
+            off_rad = robot.pose[robot.valid, 2] - tag.path(t_s)[:, 2]
+            assert np.degrees(np.abs(np.angle(np.exp(1j * off_rad))).mean()) < 1
+    assert not any("opposite" in word for word in drawn["warnings"])
 
 
 def test_tags_of_aruco_are_followed_too(tmp_path):

@@ -173,17 +173,25 @@ def _left_by_stretch(
 
     Lag by lag, as what is summed for one is large.
     """
-    by_bend: list[list[np.ndarray]] = [[] for _ in range(SHAPES)]
-    for lag_s in lags_s:
-        power, along, total = Search.of_lag(motion, wheels, lag_s, SHIFTS_S).by_shift(lag_s)
-        for bend, of_lags in enumerate(by_bend):
-            p, m = power[:, :, bend], along[:, :, bend]
-            gain = np.maximum(m.sum(1), 0) / np.maximum(p.sum(1), 1e-12)
-            usual = SHRUNK * p.mean(1, keepdims=True)
-            own = np.maximum(m + usual * gain[:, None], 0) / np.maximum(p + usual, 1e-12)
-            of_lags.append(total + (own**2 * p - 2 * own * m).sum(axis=-1))
+    at_lags = [_left_at(motion, wheels, lag_s) for lag_s in lags_s]
+    by_bend = list(zip(*(left for left, _ in at_lags), strict=True))
     least = [min(left.min(axis=0).sum() for left in of_lags) for of_lags in by_bend]
-    return np.array(by_bend[int(np.argmin(least))]), total
+    return np.array(by_bend[int(np.argmin(least))]), at_lags[0][1]
+
+
+def _left_at(
+    motion: Motion, wheels: np.ndarray, lag_s: float
+) -> tuple[list[np.ndarray], np.ndarray]:
+    """(S, B) squares that shifts leave at one lag, by each bend; (B,) those of the motion."""
+    power, along, total = Search.of_lag(motion, wheels, lag_s, SHIFTS_S).by_shift(lag_s)
+    found = []
+    for bend in range(SHAPES):
+        p, m = power[:, :, bend], along[:, :, bend]
+        gain = np.maximum(m.sum(1), 0) / np.maximum(p.sum(1), 1e-12)
+        usual = SHRUNK * p.mean(1, keepdims=True)
+        own = np.maximum(m + usual * gain[:, None], 0) / np.maximum(p + usual, 1e-12)
+        found.append(total + (own**2 * p - 2 * own * m).sum(axis=-1))
+    return found, total
 
 
 def _normal(left: np.ndarray, total: np.ndarray) -> np.ndarray:

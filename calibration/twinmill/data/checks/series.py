@@ -13,6 +13,8 @@ from twinmill.data.track import Track, command_at
 STRONG = {"duty": (0.3,) * 4, "wheel_speed": (2.0,) * 4, "twist": (0.05, 0.05, 0.3, np.inf)}
 # Commands beyond these no robot on wheels follows: twenty times the fastest there are.
 ABSURD = {"duty": (20.0,) * 4, "wheel_speed": (1e4,) * 4, "twist": (500.0, 500.0, 1e3, np.inf)}
+LEAST_TOLD = 1e-5  # in any unit of commands: a hundredth of a mm/s, and no unit is so small
+MOVED_M = 0.05  # more than a robot that stands seems to go
 NAMES = {"twist": ("vx_mps", "vy_mps", "omega_radps")}  # of the others: wheels by their number
 UNDER_ONE = "give each robot its own robot_id, in its poses and in its commands"
 MOST_UNDER_ONE = 4  # robots under one number: after so many poses the first one is back
@@ -23,7 +25,7 @@ STANDS, STANDS_NOISY = np.array([0.005, 0.005, 0.035]), np.array([0.05, 0.05, 0.
 
 def check_commanded(robot: RobotLog, label: str) -> list[InputFinding]:
     """A finding of a robot's commands as they were recorded."""
-    return _absurd(robot, label) or _under_one_number(robot, label)
+    return _absurd(robot, label) or _nothing_told(robot, label) or _under_one_number(robot, label)
 
 
 def check_changes(robot: RobotLog, label: str) -> list[InputFinding]:
@@ -94,6 +96,25 @@ def _absurd(robot: RobotLog, label: str) -> list[InputFinding]:
             f"{robot.command_t_s[row]:.3f} s, row {row + 1} of its commands, and "
             f"{others[column]:.3g} at most in the rows that make sense",
             "correct or delete such rows, and import anew",
+            True,
+            label,
+            robot.robot_id,
+        )
+    ]
+
+
+def _nothing_told(robot: RobotLog, label: str) -> list[InputFinding]:
+    """A finding where a robot moves by next to nothing, as of a driver that mistook its clock."""
+    most, seen = float(np.abs(robot.command).max(initial=0.0)), robot.pose[robot.valid, :2]
+    moves = len(seen) > 0 and np.ptp(seen, axis=0).max() > MOVED_M
+    if not (moves and 0 < most < LEAST_TOLD):
+        return []
+    return [
+        InputFinding(
+            "its commands are next to nothing",
+            f"no number in them is above {most:.1g}",
+            "look at the program that wrote them (speeds so small come from a time step in a wrong "
+            "unit), or import anew with what it was really told",
             True,
             label,
             robot.robot_id,
