@@ -379,8 +379,8 @@ def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
     missing = _names(robots - fleet.here())
     if missing:
         raise ValueError(
-            f"{missing}: not heard in {tell.FIND_S:g} s, so nothing was started; `twinmill swarm "
-            "status` shows who is there, --partial starts the others."
+            f"{missing}: not heard in {tell.FIND_S:g} s, so nothing was started; "
+            "`twinmill swarm status` shows who is there, --partial starts the others."
         )
     # Half of all packets lost, one of a thousand has not been heard to sign in the first second.
     fleet.listen(tell.FIND_S, lambda: tell.all_linked(fleet, robots))
