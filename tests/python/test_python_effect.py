@@ -66,6 +66,12 @@ def test_a_model_with_it_is_fitted_and_held_by_its_names(carpet, added):
     assert names["along_x"] not in fitted.params and abs(fitted.params[names["along_y"]]) < 0.02
 
 
+def test_nothing_is_missing_beside_it(carpet, added):
+    log, model = carpet
+    assert tm.diagnose(log, model).verdict != "model_adequate"
+    assert tm.diagnose(log, added.model).verdict == "model_adequate"
+
+
 def test_the_plant_drives_by_it(added, tmp_path):
     """Straight on, 1 + GRAIN cos(theta - ALONG_RAD) times as fast as it is told."""
     (tmp_path / "script.csv").write_text("t_s,speed_input,turn_input\n0,50,0\n9,0,0\n")

@@ -27,7 +27,7 @@ class Columns:
 
     @classmethod
     def beside(cls, logs: Iterable[Sequence[np.ndarray]], count: int) -> "Columns":
-        """Of pieces of each log, as many of each; the logs' rows, `count`, one after the other.
+        """Stacks the rows of several logs, `count` in all; each log has as many pieces.
 
         Each log's pieces are made once those before are copied, into the memory that they leave.
         """
@@ -74,7 +74,7 @@ class Columns:
 
 
 def _joined(pieces: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The same, neighbours that are narrow in one."""
+    """Pieces with narrow neighbours joined into one."""
     found: list[np.ndarray] = []
     for narrow, some in groupby(pieces, lambda p: p.shape[1] <= NARROW):
         own = [*some]

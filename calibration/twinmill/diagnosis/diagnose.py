@@ -323,7 +323,7 @@ def _changing(opened: Sequence[Opened], model_file: ModelFile) -> dict[str, str]
 
 
 def _robot_of(own: Opened) -> int:
-    return own.measurement.track.robot_id if own.floor else own.measurement.robot_id
+    return own.track.robot_id if own.floor else own.measurement.robot_id
 
 
 def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
@@ -350,7 +350,7 @@ def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
             found |= dict.fromkeys(beginning_at_a_moment(), ONE_LOG)
         if len({_robot_of(o) for o in opened}) > 1:
             found |= dict.fromkeys(needing("contacts"), CONTACTS)
-        if all(np.isnan(o.measurement.track.battery_V).all() for o in opened if o.floor):
+        if all(np.isnan(o.track.battery_V).all() for o in opened if o.floor):
             found |= dict.fromkeys(needing("battery"), NO_VOLTAGE)
     return found
 

@@ -299,7 +299,7 @@ def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Out
     return [
         anew(
             off,
-            [o for o in logs if o.measurement.track.robot_id == off.robot_id],
+            [o for o in logs if o.track.robot_id == off.robot_id],
             common,
             max(lags, default=0.0),
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stands out in a log before its noise is known: a hint for who waits, and no finding.
+"""Salient effects in a log before its noise is known: a hint for who waits, and no finding.
 
 Effects are screened as in a search, on few predictions, over the errors that the model itself
 makes.
@@ -22,7 +22,7 @@ ABOUT = 0.8  # of the largest gain: what is as likely
 
 
 def at_first_sight(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> str:
-    """What the first robot seems to lack; empty where nothing stands out."""
+    """Effects that the first robot seems to lack; empty where nothing stands out."""
     log = next((m for m in measurements if isinstance(m, Measurement)), None)
     opened = open_roughly(log, model_file) if log else None
     if not opened:

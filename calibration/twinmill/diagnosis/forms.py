@@ -274,7 +274,7 @@ class Motion:
         cls, logs: Sequence[Opened], velocities: Sequence[np.ndarray], horizons: Sequence[int]
     ) -> "Motion":
         """Of logs and (N, 3) the velocity in each."""
-        responses = [own.floor.response for own in logs]
+        responses = [own.response for own in logs]
         velocity = np.concatenate(velocities)
         vx, vy, omega = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
         x, y = np.concatenate([r.pose[:, :2] for r in responses]).T
@@ -296,20 +296,20 @@ class Motion:
     @cached_property
     def parts(self) -> list[slice]:
         """The points of each log."""
-        ends = np.cumsum([0, *(len(own.floor.response.step_s) for own in self.logs)])
+        ends = np.cumsum([0, *(len(own.response.step_s) for own in self.logs)])
         return [slice(a, b) for a, b in pairwise(ends.tolist())]
 
     @cached_property
     def _step_s(self) -> np.ndarray:
         """(N,) of which the first of each log is 0."""
-        return np.concatenate([own.floor.response.step_s for own in self.logs])
+        return np.concatenate([own.response.step_s for own in self.logs])
 
     @cached_property
     def _captured_rad(self) -> np.ndarray:
         """(N,) headings as they are captured at the points."""
-        heading = [own.measurement.track.heading_smooth for own in self.logs]
+        heading = [own.track.heading_smooth for own in self.logs]
         pairs = zip(heading, self.logs, strict=True)
-        return np.nan_to_num(np.concatenate([h[own.floor.response.points] for h, own in pairs]))
+        return np.nan_to_num(np.concatenate([h[own.response.points] for h, own in pairs]))
 
     def _each(self, made: Callable[..., np.ndarray], *values: np.ndarray) -> np.ndarray:
         """(..., N) made of (N,) values, of each log by itself."""
@@ -374,7 +374,7 @@ class Motion:
     @cached_property
     def _sooner(self) -> np.ndarray:
         """(N,) half the share of a step at the end of which a value is held; 0 without a step."""
-        last_s = [own.measurement.track.timing.pose_period_s for own in self.logs]
+        last_s = [own.track.timing.pose_period_s for own in self.logs]
         last_s = np.repeat(last_s, [p.stop - p.start for p in self.parts])
         moved = self._step_s > 0
         return np.clip(1 - last_s / np.where(moved, self._step_s, np.inf), 0, 1) / 2 * moved
@@ -399,7 +399,9 @@ class Motion:
         """
         ends = np.cumsum([0, *(len(f.shapes) for f in forms)])
         pairs = zip(self.logs, kept, strict=True)
-        weights = [np.nan_to_num(o.data.weight[:, self.horizons][k])[:, None] for o, k in pairs]
+        weights = [
+            np.nan_to_num(o.trajectory.weight[:, self.horizons][k])[:, None] for o, k in pairs
+        ]
         rows = [np.flatnonzero(k) for k in kept]
         found = np.empty((sum(np.count_nonzero(k) for k in kept), ends[-1]))
         for adds_to in dict.fromkeys(f.adds_to for f in forms):
@@ -419,12 +421,12 @@ class Motion:
         axes = SPEEDS if adds_to == RIM else ("vx",)  # wheels and body are in proportion
         every = [[(self._along(f, axis), f.strengths[:, None]) for f in forms] for axis in axes]
         for log, part in zip(self.logs, self.parts, strict=True):
-            response = copy(log.floor.response)
+            response = copy(log.response)
             response.ends = response.ends[:, self.horizons]
             rows = (np.concatenate([v[:, part] * s for v, s in known]) for known in every)
             values = [np.ascontiguousarray(own.T) for own in rows]
             if adds_to == "theta_rad":
-                yield _turned(response, values[0], log.data.measured[:, self.horizons])
+                yield _turned(response, values[0], log.trajectory.measured[:, self.horizons])
             else:
                 pushes = self._pushes(adds_to, values, part)
                 yield displaced_by(response, self.velocity[part], pushes)

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,14 +26,14 @@ class Number:
     high: float
     unit: str
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return vars(self)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """What is left over one variable, and the formula's curve over it.
+    """Residual over one variable, and the formula's curve over it.
 
     Attributes:
         name: the variable, as formulas name it.
@@ -161,7 +162,7 @@ class Formula:
 
     @property
     def equals(self) -> str:
-        """What is added to what, with its numbers."""
+        """Equation of the formula, with its numbers."""
         return f"{self.forms[0].adds_to} += {self.text}"
 
     @property
@@ -169,7 +170,7 @@ class Formula:
         """Known physics that it looks like; empty if none."""
         return resembles(self.forms, [n.value for n in self.numbers], self.holds)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return {
             "equation": self.equation,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What known physics a formula looks like, by its shape and its sign; empty where neither says."""
+"""Known physics that a formula resembles by its shape and sign; empty if it resembles none."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -126,7 +126,7 @@ def _of_past(form: Form, own: Sequence[float]) -> str:
 
 
 def _of_few_periods(form: Form, seen: Mapping[str, tuple[float, float]]) -> str:
-    """What does not come again often enough in the logs to say that it comes again at all."""
+    """Waves with too few periods in the logs to be called periodic."""
     name, rate = form.wave
     if name not in seen or comes_again(rate, np.ptp(seen[name])):
         return ""

@@ -5,6 +5,7 @@ It shows at changes of the command alone, so that it looks like single moments; 
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -33,13 +34,13 @@ class Later:
     from_s: float
     later_s: float
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of JSON output."""
         return vars(self)
 
     @property
     def sentence(self) -> str:
-        """What changed, for people."""
+        """Sentence on the change, for people."""
         than = "later" if self.later_s > 0 else "sooner"
         return (
             f"From {self.from_s:.1f} s on the robot followed its commands "
@@ -54,7 +55,7 @@ def later_from(own: Opened, model: native.Model) -> tuple[Later, np.ndarray] | N
     None where it changes by too little, or takes too little: an event that passes has a lateness
     that suits it best, too.
     """
-    data = own.data.over(own.data.floor, np.ones(len(own.data.keep), bool))
+    data = own.trajectory.over(own.trajectory.floor, np.ones(len(own.trajectory.keep), bool))
     clock_s = model.get(CLOCK)
     shifts_s = np.arange(-REACH_S, REACH_S + STEP_S / 2, STEP_S)
     rows = data.rows(model, [CLOCK], clock_s + shifts_s[:, None])

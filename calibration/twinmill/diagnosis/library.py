@@ -59,7 +59,7 @@ def library(
         forms_alone: without terms that are no form.
     """
     pairs = list(zip(opened, models, strict=True))
-    velocities = [body_velocity_at(own.data, m, own.floor.response.points) for own, m in pairs]
+    velocities = [body_velocity_at(own.trajectory, m, own.response.points) for own, m in pairs]
     middles = _middles(opened) | _bends(velocities)
     values = [_named_terms(own, v, middles) for own, v in zip(opened, velocities, strict=True)]
     sizes = _sizes(values)
@@ -79,7 +79,7 @@ def library(
             beside = changes(k, body) if changes else []
             yield [body, *beside, _wheel_columns(own, model, of_wheels)]
 
-    columns = Columns.beside(pieces(), sum(own.data.weight.size for own in opened))
+    columns = Columns.beside(pieces(), sum(own.trajectory.weight.size for own in opened))
     return [*terms, *others, *of_wheels], columns, velocities
 
 
@@ -94,7 +94,7 @@ def _judged_together(
         terms: of the body, from whose (R, T) columns some of them follow.
     """
     of_all, parts = _terms_of_all_speeds(terms)
-    times_s = [own.floor.response.middle_s for own in opened]
+    times_s = [own.response.middle_s for own in opened]
     ways_m = [_way_m(own, v) for own, v in zip(opened, velocities, strict=True)]
     waves = [Waves.along(times_s, TIME, "t", WAVE_S), Waves.along(ways_m, WAY, "way", WAVE_M)]
     families = families_of(opened, velocities)
@@ -181,16 +181,16 @@ class Waves:
         """(R, 8 n) change of a log's rows, as (N, 3) `velocity` moves the robot."""
         angle = along[:, None] * self.rates
         gains = SWELL * np.stack([np.cos(angle), np.sin(angle)], axis=-1).reshape(len(angle), -1)
-        response = own.floor.response
+        response = own.response
         parts = [displaced(response, velocity, velocity[:, [k]] * gains, k) for k in range(3)]
-        weight = np.nan_to_num(own.data.weight)[..., None]
+        weight = np.nan_to_num(own.trajectory.weight)[..., None]
         columns = [part * weight for part in (sum(parts), *parts)]
         return np.concatenate(columns, axis=-1).reshape(weight.size, len(self.terms))
 
 
 def _way_m(own: Opened, velocity: np.ndarray) -> np.ndarray:
     """(N,) driven since the log's begin, at (N, 3) `velocity`."""
-    return np.cumsum(np.hypot(velocity[:, 0], velocity[:, 1]) * own.floor.response.step_s)
+    return np.cumsum(np.hypot(velocity[:, 0], velocity[:, 1]) * own.response.step_s)
 
 
 def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
@@ -225,11 +225,11 @@ def _middles(opened: Sequence[Opened]) -> dict[str, float]:
     """
     parts: dict[str, list[np.ndarray]] = {"x": [], "y": [], "t": [], "V": []}
     for own in opened:
-        response = own.floor.response
+        response = own.response
         parts["x"].append(response.pose[:, 0])
         parts["y"].append(response.pose[:, 1])
         parts["t"].append(response.middle_s)
-        parts["V"].append(np.nan_to_num(own.measurement.track.battery_V))
+        parts["V"].append(np.nan_to_num(own.track.battery_V))
     every = {name: np.concatenate(p) for name, p in parts.items()}
     found = {name: np.mean(values) for name, values in every.items()}
     found |= {f"t{k}": np.quantile(every["t"], part) for k, part in enumerate(PARTS)}
@@ -238,9 +238,9 @@ def _middles(opened: Sequence[Opened]) -> dict[str, float]:
 
 def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -> np.ndarray:
     """(R, 3 T) change of the rows by each term in each body axis, at (N, 3) `velocity`."""
-    response = own.floor.response
+    response = own.response
     values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)
-    weight = np.nan_to_num(own.data.weight)
+    weight = np.nan_to_num(own.trajectory.weight)
     columns = np.empty((*weight.shape, len(sizes), 3))
     for axis, channel in enumerate(CHANNELS):
         change = displaced(response, velocity, TYPICAL[channel] * values, axis)  # (W, H, 3, T)
@@ -252,7 +252,7 @@ def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:
     """Of each wheel that has a command of its own, and of all at some commands."""
     if model.drive not in ("duty", "wheel_speed"):
         return []
-    command = np.abs(np.concatenate([own.measurement.track.command for own in opened]))
+    command = np.abs(np.concatenate([own.track.command for own in opened]))
     largest = float(np.percentile(command, 95))
     if largest <= 0:
         return []
@@ -281,14 +281,14 @@ def _sign(place_m: float) -> str:
 
 def _wheel_columns(own: Opened, model: native.Model, terms: Sequence[Term]) -> np.ndarray:
     """(R, T) change of the rows by each term of a wheel, by the plant itself."""
-    before = errors_of(own.data, model)
+    before = errors_of(own.trajectory, model)
     columns = np.zeros((len(before), len(terms)))
     for k, term in enumerate(terms):
         with_it = model.copy()
         texts = {"adds_to": term.adds_to, "formula": f"p0*{term.formula}"}
         with_it.add_effect("equation", texts)
         name = f"{effect_names(with_it)[-1]}.p0"
-        (after,) = own.data.rows(with_it, [name], np.array([[term.strength]]))
+        (after,) = own.trajectory.rows(with_it, [name], np.array([[term.strength]]))
         columns[:, k] = before - after
     return columns
 
@@ -297,7 +297,7 @@ def _named_terms(
     own: Opened, velocity: np.ndarray, middles: Mapping[str, float]
 ) -> dict[tuple[str, str], np.ndarray]:
     """(group, formula) to values (N,) at the response's points, of (N, 3) `velocity` there."""
-    response, track = own.floor.response, own.measurement.track
+    response, track = own.response, own.track
     velocity = np.where(np.abs(velocity) < STILL, 0.0, velocity)
     vx, vy, turn = velocity.T
     theta, t_s = response.heading_rad, response.middle_s

@@ -133,7 +133,7 @@ def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Event
     for own, model in zip(opened, models, strict=True):
         if own.floor is None:
             continue
-        errors = own.data.errors(model)
+        errors = own.trajectory.errors(model)
         events = _several(own, errors)
         if events and (change := later_from(own, model)) and not _several(own, change[1]):
             later.append(change[0])
@@ -144,7 +144,7 @@ def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Event
 
 def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
     """Windows of each event, where these are so many that they are no accident; else none."""
-    data = own.data
+    data = own.trajectory
     moved = data.measured - errors
     missed = np.flatnonzero(
         is_far(errors, data.floor, SETTINGS.far, moved)
@@ -155,7 +155,7 @@ def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
 
 
 def _of_log(own: Opened, errors: np.ndarray, events: Sequence[np.ndarray]) -> list[Moment]:
-    data = own.data
+    data = own.trajectory
     every = _ways(data, errors)
     faint = all(abs(np.nanmedian(every[event]) - 1) < HARDLY for event in events)
     if faint and _weight(events, data.start_s) < 2 * SETTINGS.several:
@@ -176,7 +176,7 @@ def _at_changes(own: Opened, begins_s: np.ndarray) -> bool:
         own: the log.
         begins_s: of events, capture's clock.
     """
-    track = own.data.measurement.track
+    track = own.trajectory.measurement.track
     share = track.command / np.maximum(np.abs(track.command).max(axis=0), 1e-9)
     way = np.cumsum(np.abs(np.diff(share, axis=0, prepend=share[:1])).max(axis=1))
 
@@ -260,7 +260,7 @@ def left_out(own: Opened) -> list[Stretch]:
     gone = np.flatnonzero(~own.floor.keep)
     if not len(gone):
         return []
-    data = own.data
+    data = own.trajectory
     errors, found = data.errors(own.model), []
     missed = is_far(errors, data.floor, SETTINGS.far, data.measured - errors)
     for part in _events(gone, data.start_s):
@@ -274,7 +274,7 @@ def left_out(own: Opened) -> list[Stretch]:
 
 def held(own: Opened) -> list[tuple[float, float]]:
     """From when to when, s, a robot stood that was told to drive; whiles of HELD_S or more."""
-    data = own.data
+    data = own.trajectory
     measured, missed = (
         np.nan_to_num(d[:, HORIZON]) * ARM for d in (data.measured, data.errors(own.model))
     )

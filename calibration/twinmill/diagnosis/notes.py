@@ -98,10 +98,10 @@ def _no_more_than_left(own: Opened) -> Opened:
     and has it for noise. What a model explains is none, nor what reaches into a stretch that is
     left out.
     """
-    seen = own.data.keep
+    seen = own.trajectory.keep
     if not seen.all():
-        seen = seen & ~overlapping(own.data, ~seen)
-    left = np.where(seen[:, None, None], own.data.errors(own.model), np.nan)
+        seen = seen & ~overlapping(own.trajectory, ~seen)
+    left = np.where(seen[:, None, None], own.trajectory.errors(own.model), np.nan)
     return replace(own, floor=replace(own.floor, rms=np.fmin(own.floor.rms, rms(left))))
 
 
@@ -310,7 +310,7 @@ def irregularity(own: Opened, noise: Noise, model: native.Model, known_mps: floa
     )
     horizons_s = np.array(HORIZONS_S)
     along, turn = position.displaced(horizons_s), heading.displaced(horizons_s)
-    led = along[:, None] + turn[:, None] * _ahead_m2(own.data.measured)[:, ::-1]
+    led = along[:, None] + turn[:, None] * _ahead_m2(own.trajectory.measured)[:, ::-1]
     usual = np.sqrt(np.column_stack([led, turn]))
     with np.errstate(invalid="ignore"):
         over = np.log(own.floor.rms / usual)

@@ -241,7 +241,7 @@ def odd_runs(
 
 def _as_robot(own: Opened, number: int) -> Opened:
     """A run under a number of its own, to be compared with others as robots are."""
-    track = replace(own.measurement.track, robot_id=number)
+    track = replace(own.track, robot_id=number)
     return replace(own, measurement=replace(own.measurement, track=track))
 
 
@@ -309,7 +309,7 @@ def _begun_at(off: Outlier, common: native.Model, effect: str) -> list[Parameter
 
 
 def _ids(opened: Sequence[Opened]) -> list[int]:
-    return sorted({o.measurement.track.robot_id for o in opened if o.floor})
+    return sorted({o.track.robot_id for o in opened if o.floor})
 
 
 def _each_where_some_follow(
@@ -344,7 +344,7 @@ def _alone_state(
     opened: Sequence[Opened], state: State, robot_id: int, gains: bool = False
 ) -> State:
     """One robot's data with the state's model; free are its clock and, if asked, its gains."""
-    own = [i for i, o in enumerate(opened) if o.floor and o.measurement.track.robot_id == robot_id]
+    own = [i for i, o in enumerate(opened) if o.floor and o.track.robot_id == robot_id]
     data, models = [], []
     for i in own:
         data.append(opened[i].data if gains else _without_gains(opened[i].data))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether errors repeat at the same places.
+"""Test for errors that repeat at the same places.
 
 Errors of way, and of turning, at two moments far apart in time are multiplied with each other if
 the moments are near each other in the room: a quadratic form with a Gaussian kernel over places, as
@@ -43,11 +43,11 @@ def comes_again(opened: Sequence[Opened], models: Sequence[native.Model]) -> flo
     Returns:
         0 where it could be chance, or is little.
     """
-    of_model = [own.data.errors(model) for own, model in zip(opened, models, strict=True)]
+    of_model = [own.trajectory.errors(model) for own, model in zip(opened, models, strict=True)]
     found, floor = [0.0], None
     for of, (chance, share) in enumerate(_repeats(opened, of_model)):
         if chance < SETTINGS.place_chance and share > SETTINGS.place_share:
-            floor = floor or _repeats(opened, [own.floor.response.unboosted for own in opened])
+            floor = floor or _repeats(opened, [own.response.unboosted for own in opened])
             chance, _ = floor[of]
             found.append(share if chance < SETTINGS.place_chance_of_floor else 0.0)
     return max(found)
@@ -128,8 +128,8 @@ class _Ways:
 
     @staticmethod
     def of(own: Opened, errors: np.ndarray) -> "_Ways":
-        """Of a log, with the (W, H, 3) errors of a model."""
-        data, pose = own.data, own.data.measurement.track.pose
+        """Ways of a log, with the (W, H, 3) errors of a model."""
+        data, pose = own.trajectory, own.trajectory.measurement.track.pose
         error, way = errors[:, HORIZON], (data.measured - errors)[:, HORIZON, :2]
         length_m = np.hypot(*way.T)
         usable = data.keep & (np.nan_to_num(length_m) > LEAST_WAY_M)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is there for a part of each period, by the clock: the one of all such forms that fits best.
+"""Best-fitting periodic on/off disturbance.
 
 The way within one bin of time is a column; any form that is there in some bins is a sum of these.
 So thousands of periods, moments and parts cost little more than the bins do.
@@ -27,13 +27,13 @@ FIRST = 0.6  # share of a log that must predict the rest
 
 
 def comes_again(rate: float, span: float) -> bool:
-    """Whether a wave is seen so often along a name of the motion that it is no chance."""
+    """True if a wave has enough periods along a name of the motion not to be chance."""
     return rate * span * LONGEST > 2 * np.pi
 
 
 @dataclass(frozen=True)
 class Recurring:
-    """What is tried over the logs of some evidence.
+    """Periodic forms that are tried over the logs of some evidence.
 
     Attributes:
         rows: of the logs.
@@ -103,7 +103,7 @@ class Recurring:
         return Pool(forms, self.rows.raw(forms))
 
     def goes_on(self, raw: np.ndarray) -> bool:
-        """Whether what the first part of a log tells by itself predicts the rest.
+        """True if a form fitted to the first part of a log predicts the rest.
 
         Moments of chance do not come again by a clock, and waves that were fitted to them do not
         go on. Of several logs it is not asked: they tell it by themselves.

@@ -42,8 +42,8 @@ def resolutions(opened: Sequence[Opened]) -> list[Resolution]:
         opened: logs and tables, with the model that is asked about.
     """
     logs = [o for o in opened if o.floor and o.data is not None]
-    ids = sorted({o.measurement.track.robot_id for o in logs})
-    return [_of_robot([o for o in logs if o.measurement.track.robot_id == i]) for i in ids]
+    ids = sorted({o.track.robot_id for o in logs})
+    return [_of_robot([o for o in logs if o.track.robot_id == i]) for i in ids]
 
 
 def _of_robot(logs: Sequence[Opened]) -> Resolution:
@@ -54,7 +54,7 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
             model.set(name, 1.0)
     speed, turn = _shown(logs, models, GAINS)
     axes = _shown(logs, models, BASE_GAINS) if drives_sideways(models[0]) else (None, None)
-    return Resolution(logs[0].measurement.track.robot_id, speed, turn, *axes[:2])
+    return Resolution(logs[0].track.robot_id, speed, turn, *axes[:2])
 
 
 def _shown(

@@ -13,7 +13,7 @@ from twinmill.settings import Numbers, number
 
 @dataclass(frozen=True)
 class Settings(Numbers):
-    """What each number means stands beside it; scores are over the noise floor, 1.0 is right."""
+    """Thresholds of the diagnosis; scores are over the noise floor, where 1.0 is right."""
 
     # The search: which effect is accepted.
     starts: int = number(3000, "predictions; of more, every Nth start is looked at ...")
@@ -169,7 +169,7 @@ class Settings(Numbers):
     random_alone: float = number(4.5, "... and the same at a score at which nothing is left")
 
     def stricter(self, times: float) -> "Settings":
-        """The same with so many times the evidence."""
+        """Settings that require so many times the evidence."""
         times = min(max(times, 1.0), self.strictest)
         raised = ("evidence", "passing", "without_best", "without_visit", "less_evidence")
         return replace(self, **{k: times * getattr(self, k) for k in raised})

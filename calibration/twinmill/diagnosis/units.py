@@ -90,7 +90,7 @@ CONSTANTS |= {"1/m": PLAIN / NAMES["x"], "m/s": NAMES["vx"], "rad/s": NAMES["ome
 
 
 def units_of(form: Form) -> list[str]:
-    """Of a form's numbers, in their order.
+    """Units of a form's numbers, in their order.
 
     Raises:
         ValueError: the form adds or compares what differs in unit, or its rate is not one.

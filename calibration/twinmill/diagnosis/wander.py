@@ -31,7 +31,7 @@ ALONG, ACROSS, TURN, WITH_TURN = range(4)  # of `along_the_way`
 
 @dataclass(frozen=True)
 class Wander:
-    """What wanders by itself: first-order processes.
+    """Random wander: first-order processes.
 
     Attributes:
         way: standard deviation of the way, a share of it; 0 where that is not known to wander.
@@ -60,7 +60,7 @@ def _in_s(time_s: float) -> str:
 
 
 def wandering(logs: Sequence[tuple[Trajectory, np.ndarray]]) -> Wander | None:
-    """What wanders in logs; None where errors do not tell the next ones by more than chance.
+    """Wander in logs; None where errors do not predict the next ones better than chance.
 
     What wanders by itself does so all the time: what happens once lies in a quarter of the logs.
 

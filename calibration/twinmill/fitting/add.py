@@ -415,13 +415,13 @@ def with_own(opened: Sequence[Opened], robot_id: int, own: Sequence[Parameter]) 
     Raises:
         ModelError: it is in none of them.
     """
-    known = {o.measurement.track.robot_id for o in opened if o.floor and o.data is not None}
+    known = {o.track.robot_id for o in opened if o.floor and o.data is not None}
     if robot_id not in known:
         names = ", ".join(f"R{i:02d}" for i in sorted(known))
         raise ModelError(f"R{robot_id:02d}: is not among the robots of these logs ({names}).")
     return [
         replace(o, data=replace(o.data, own=(*o.data.own, *own)))
-        if o.floor and o.data is not None and o.measurement.track.robot_id == robot_id
+        if o.floor and o.data is not None and o.track.robot_id == robot_id
         else o
         for o in opened
     ]

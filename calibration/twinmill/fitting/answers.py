@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether commands answer how the robot strayed, as those of a controller do that sees it.
+"""Test for commands that respond to errors of the robot, as those of a controller do.
 
 What the robot is told can say nothing of what disturbed it before. Where a controller closes the
 loop, it does: commands late in a prediction tell of errors early in it, and a response to commands
@@ -23,19 +23,19 @@ CHANCE_OF_TWO = 0.01  # the same of the mean t of two channels, as if they were 
 
 
 class Slope(NamedTuple):
-    """Of early errors over what late commands add; in standard errors; by how many blocks."""
+    """Slope of early errors over what late commands add, its t, and the number of blocks."""
 
     value: float
     t: float
     blocks: int
 
     def beyond(self, chance: float) -> bool:
-        """Whether it is larger than by such a chance where there is none."""
+        """True if so large a slope has less than this chance where there is none."""
         return self.t > t_quantile(1 - chance, self.blocks - 1)
 
 
 def are_answers(errors: np.ndarray, left: np.ndarray, start_s: np.ndarray) -> bool:
-    """Whether what late commands make a response add goes with errors from before them.
+    """True if the response to late commands correlates with errors from before them.
 
     By least squares beside what early commands add; much in one channel, or some in two: a heading
     that strays takes the robot aside as well.

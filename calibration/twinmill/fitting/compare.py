@@ -282,7 +282,7 @@ def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     modelled = own.modelled()
     if isinstance(modelled, SteadyStates):
         return compare_steady(modelled)
-    windows = Windows.of(own.measurement.track)
+    windows = Windows.of(own.track)
     errors = np.where(own.floor.keep[:, None, None], windows.errors(modelled), np.nan)
     regimes = where_it_fails(modelled, windows, errors, own.floor.rms) if own.data else []
     gone = tuple(unseen(own.data, own.model)) if own.data else ()

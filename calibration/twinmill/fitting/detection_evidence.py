@@ -23,7 +23,7 @@ VOTE_WEIGHT = np.log(1 / VOTE_ERROR - 1)  # of one voted bit that two models pre
 
 @dataclass(frozen=True)
 class HeldOutFrames:
-    """What a model fitted to the other half says of each robot's frames; a list of (K,) each.
+    """Held-out predictions of each robot's frames, fitted to the other half; a list of (K,) each.
 
     Attributes:
         log_likelihood: of what was reported; NaN where nothing can be said.

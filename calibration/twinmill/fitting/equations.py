@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with a model's formulas over logs: states that grow, and values that never are."""
+"""Checks of a model's formulas over logs: states that grow, and formulas without a value."""
 
 from collections.abc import Sequence
 
@@ -36,7 +36,7 @@ def check_states(data: ErrorDataset, model: native.Model) -> None:
 
 
 def finite(data: ErrorDataset, model: native.Model) -> bool:
-    """Whether a model predicts something, and nothing that is beyond all bounds."""
+    """True if a model predicts something, and nothing beyond all bounds."""
     with np.errstate(all="ignore"):
         rows = errors_of(data, model)
         far = 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What begins or ends while nothing was measured is known to that gap, and no better.
+"""Moments within gaps of the measurement, which are known to the gap and no better.
 
 Predictions are the same wherever within a gap it is, so that the curvature of the cost tells
 nothing of how wide the interval is.

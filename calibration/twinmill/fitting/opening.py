@@ -11,8 +11,10 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.data.track import Track
 from twinmill.fitting.equations import check_states
 from twinmill.fitting.floor import NoiseFloor, coarse_offset_s, no_floor, noise_floor, too_poor
+from twinmill.fitting.response import Response
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.settings import FIT_SETTINGS
 from twinmill.model.model_file import ModelFile
@@ -61,6 +63,27 @@ class Opened:
     floor: NoiseFloor | None
     same_clock: bool
     phases: tuple[ParameterEstimate, ...] = ()
+
+    @property
+    def track(self) -> Track:
+        """Cleaned poses and commands of a log; a table has none."""
+        if isinstance(self.measurement, SteadyTable):
+            raise TypeError(f"{self.measurement.log_name}: a steady table has no track.")
+        return self.measurement.track
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Predictions of a log, over its floor; a table, or a log without a floor, has none."""
+        if not isinstance(self.data, Trajectory):
+            raise TypeError(f"{self.measurement.log_name}: has no predictions of poses.")
+        return self.data
+
+    @property
+    def response(self) -> Response:
+        """Smooth response to the commands by which the floor of a log was found."""
+        if self.floor is None or self.floor.response is None:
+            raise TypeError(f"{self.measurement.log_name}: has no floor by a response.")
+        return self.floor.response
 
     @property
     def score(self) -> float:
@@ -286,7 +309,7 @@ def of_few_commands(opened: Sequence[Opened]) -> str:
     Args:
         opened: measurements; of tables nothing is said.
     """
-    tracks = [o.measurement.track for o in opened if o.floor]
+    tracks = [o.track for o in opened if o.floor]
     if not tracks or len(tracks) < len(opened):
         return ""
     commands = np.concatenate([t.command[:-1] for t in tracks])
@@ -324,7 +347,7 @@ def wide_gains(model: native.Model, names: Sequence[str] = GAINS) -> tuple[Param
 def with_own_gains(opened: Sequence[Opened]) -> list[Opened]:
     """Each robot of several with gains of its own: robots of a kind differ by a few percent."""
     logs = [o for o in opened if o.floor]
-    if len({o.measurement.track.robot_id for o in logs}) < 2:
+    if len({o.track.robot_id for o in logs}) < 2:
         return list(opened)
     return [_with_gains(o) if o.floor else o for o in opened]
 
@@ -342,7 +365,7 @@ def with_own_of_runs(
 
 
 def _with_own_of_run(own: Opened, stds: Mapping[str, float] | None) -> Opened:
-    names = OWN if own.measurement.track.has_heading else OWN[:2]  # else it is never turned
+    names = OWN if own.track.has_heading else OWN[:2]  # else it is never turned
     free = []
     for p in base_parameters(own.model, names):
         usual = p.value if p.name == LAG else 1.0
@@ -369,7 +392,7 @@ def _with_lag(own: Opened, spread_s: float) -> Opened:
 
 
 def _with_gains(own: Opened) -> Opened:
-    names = GAINS if own.measurement.track.has_heading else GAINS[:1]  # else it is never turned
+    names = GAINS if own.track.has_heading else GAINS[:1]  # else it is never turned
     gains = []
     for p in base_parameters(own.model, names):
         spread = own.model.get(f"idiosyncrasy.{p.name}_std") or SPREAD

@@ -41,7 +41,9 @@ def log_of(event_mps: tuple[float, float]) -> SimpleNamespace:
     errors = within[..., None] * off_mps + random.normal(0, NOISE_M, predicted.shape)
     floor = np.full((len(HORIZONS_S), 3), NOISE_M)
     data = SimpleNamespace(start_s=start_s, measured=predicted + errors, floor=floor)
-    return SimpleNamespace(data=data, errors=errors, sees=np.flatnonzero(within.any(axis=1)))
+    return SimpleNamespace(
+        trajectory=data, data=data, errors=errors, sees=np.flatnonzero(within.any(axis=1))
+    )
 
 
 @pytest.mark.parametrize(
@@ -74,7 +76,7 @@ def test_a_robot_that_stands_though_it_is_told_to_drive_was_held(
     monkeypatch.setattr(f"{__name__}.LASTS_S", lasts_s)
     own = log_of((event_mps, 0.0))
     own.data.errors = lambda _: own.errors
-    found = held(SimpleNamespace(data=own.data, model=None))
+    found = held(SimpleNamespace(trajectory=own.data, model=None))
     assert len(found) == whiles
     for begin_s, end_s in found:
         assert begin_s == pytest.approx(BEGINS_S, abs=0.15)
@@ -87,7 +89,11 @@ def test_that_a_robot_was_held_is_said_beside_a_loss_for_a_while(monkeypatch, ef
     own = log_of((0.0, 0.0))
     own.data.errors = lambda _: own.errors
     log = SimpleNamespace(
-        data=own.data, model=None, floor=True, measurement=SimpleNamespace(label="a.lcmlog R01")
+        trajectory=own.data,
+        data=own.data,
+        model=None,
+        floor=True,
+        measurement=SimpleNamespace(label="a.lcmlog R01"),
     )
     notes = held_notes([log], [Finding("floor_patch", ("floor_patch", effect), [], 1.0, "group")])
     assert [n.startswith("a.lcmlog R01: from 20.") for n in notes] == [True] * told
@@ -134,7 +140,7 @@ def test_moments_that_all_are_at_changes_of_the_command_may_be_what_acts_there(b
     command = np.tile([[0.2, 0, 0], [-0.2, 0, 0]], (10, 1))
     track = SimpleNamespace(command=command, command_t_s=t_s)
     data = SimpleNamespace(measurement=SimpleNamespace(track=track))
-    own = SimpleNamespace(data=data, floor=SimpleNamespace(offset_s=0.0))
+    own = SimpleNamespace(trajectory=data, data=data, floor=SimpleNamespace(offset_s=0.0))
     at = _at_changes(own, np.array(begins_s))
     assert at == told
     words = sentence([Moment("run", 1, b, 0.7, "less", at) for b in begins_s])
@@ -194,7 +200,9 @@ def test_commands_that_act_later_from_a_moment_on_are_one_change(
         errors=lambda _: errors(clock["clock.offset_s"]),
         measurement=SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1)),
     )
-    own = SimpleNamespace(data=data, floor=SimpleNamespace(across=None, keep=data.keep))
+    own = SimpleNamespace(
+        trajectory=data, data=data, floor=SimpleNamespace(across=None, keep=data.keep)
+    )
     found = later_from(own, model)
     assert bool(found) == told
     if found:

@@ -216,7 +216,7 @@ def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(
     assert then.found == ["turn_asymmetry"]
     (parameter,) = then.ranking[0].parameters
     assert parameter.value == pytest.approx(asymmetry, abs=0.02)
-    with pytest.raises(ValueError, match="leave for out"):
+    with pytest.raises(ValueError, match="leave --for out"):
         cli.run([*words, "--for", "milling", "--force"])
 
 

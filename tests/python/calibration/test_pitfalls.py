@@ -558,7 +558,7 @@ def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, to
         errors=lambda _: nothing,
     )
     floor = SimpleNamespace(across=None, keep=np.ones(400, bool))
-    found = moments.events_of([SimpleNamespace(data=data, floor=floor)], [None])
+    found = moments.events_of([SimpleNamespace(trajectory=data, data=data, floor=floor)], [None])
     assert len(found.moments) == told
 
 
@@ -1409,7 +1409,13 @@ def test_a_stretch_in_which_the_model_is_right_is_not_told():
         start_s=start_s, measured=missed + 0.1, floor=floor, errors=errors.__getitem__
     )
     told = [
-        len(moments.left_out(SimpleNamespace(data=data, model=m, floor=SimpleNamespace(keep=keep))))
+        len(
+            moments.left_out(
+                SimpleNamespace(
+                    trajectory=data, data=data, model=m, floor=SimpleNamespace(keep=keep)
+                )
+            )
+        )
         for m in errors
     ]
     assert told == [0, 1]

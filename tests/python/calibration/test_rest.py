@@ -73,7 +73,7 @@ def wander(seed, gain_at, half_m=1.0, turn_at=None):
         measurement=SimpleNamespace(track=track),
     )  # fmt: skip
     response = SimpleNamespace(unboosted=errors)
-    return SimpleNamespace(data=data, floor=SimpleNamespace(response=response))
+    return SimpleNamespace(trajectory=data, data=data, response=response)
 
 
 def test_joints_between_tiles_come_again_at_their_places():
@@ -133,7 +133,7 @@ def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is
     data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
     floor = np.column_stack([along, along, turn])
     for times in (1.0, 3.0):
-        own = SimpleNamespace(data=data, floor=SimpleNamespace(rms=times * floor))
+        own = SimpleNamespace(trajectory=data, data=data, floor=SimpleNamespace(rms=times * floor))
         found = irregularity(own, Noise(*channels), model)
         assert found == pytest.approx(times)
         assert (found > SETTINGS.irregular) == (times > 1)
@@ -152,7 +152,7 @@ def test_a_robot_that_drives_faster_than_the_model_was_told_slips_more(speed_mps
     along, turn = (np.sqrt(c.displaced(np.array(HORIZONS_S))) for c in channels)
     data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
     own = SimpleNamespace(
-        data=data, floor=SimpleNamespace(rms=np.column_stack([along, along, turn]))
+        trajectory=data, data=data, floor=SimpleNamespace(rms=np.column_stack([along, along, turn]))
     )
     silent = ChannelNoise(0.0, 0.0, 0.1)
     found = irregularity(own, Noise(silent, silent, speed_mps), model, told_mps)
@@ -220,7 +220,7 @@ def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():
     ahead = np.sqrt(more.displaced(np.array(HORIZONS_S)))
     data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
     own = SimpleNamespace(
-        data=data, floor=SimpleNamespace(rms=np.column_stack([ahead, along, turn]))
+        trajectory=data, data=data, floor=SimpleNamespace(rms=np.column_stack([ahead, along, turn]))
     )
     found = irregularity(own, Noise(position, heading), model)
     assert found == pytest.approx(ahead[-1] / along[-1])
@@ -249,7 +249,7 @@ def test_a_heading_that_wanders_leads_the_robot_across_its_way_in_curves_too(cur
         found[round((k + 1) * step_s, 3)] = (*place, turned)
     ends = np.array([found[h] for h in HORIZONS_S])  # (H, 3, runs)
     data = SimpleNamespace(measured=np.moveaxis(ends, 2, 0))
-    own = SimpleNamespace(data=data, floor=SimpleNamespace(rms=ends.std(axis=2)))
+    own = SimpleNamespace(trajectory=data, data=data, floor=SimpleNamespace(rms=ends.std(axis=2)))
     assert irregularity(own, Noise(position, heading), model) == pytest.approx(1.0, abs=0.35)
 
 
@@ -358,6 +358,10 @@ class Over:
     floor: Floor
     model: None = None
 
+    @property
+    def trajectory(self) -> SimpleNamespace:
+        return self.data
+
 
 @pytest.mark.parametrize(("depends_on", "likely"), [([], True), (["heading"], False)])
 def test_what_a_doubtful_finding_depends_on_is_likely(depends_on, likely):
@@ -394,7 +398,7 @@ def test_each_wheel_with_a_command_of_its_own_has_its_formulas():
     """They are taken by `equation`; on a mecanum robot one wheel's command turns it."""
     model = native.Model.load("turbopi.toml")
     track = SimpleNamespace(command=np.ones((3, 4)))
-    own = SimpleNamespace(measurement=SimpleNamespace(track=track))
+    own = SimpleNamespace(track=track)
     terms = _wheel_terms([own], model)
     assert len({t.group for t in terms}) == 4
     assert len(terms) == 4 * len(SHAPES)

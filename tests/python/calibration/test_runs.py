@@ -222,7 +222,7 @@ def test_a_formula_that_turns_a_speed_round_is_none(size, back):
     """At 0.055 m/s the first one leaves (1 - 2.87) times the speed: 0.10 m/s backwards."""
     speed_mps = np.linspace(-0.2, 0.2, 201)
     names = {"vx": speed_mps, "t": np.arange(201.0)}
-    log = SimpleNamespace(floor=SimpleNamespace(response=SimpleNamespace(step_s=np.ones(201))))
+    log = SimpleNamespace(response=SimpleNamespace(step_s=np.ones(201)))
     motion = Motion([log], np.column_stack([speed_mps] * 3), names, ())
     around = Form("vx_mps", ("vx*max(0, 1 - abs(abs(vx)/0.055 - 1)/0.4)",), "speed", sizes=(1.0,))
     number = Number("p0", size, size, size, "1")

@@ -165,7 +165,7 @@ def test_tags_of_aruco_are_followed_too(tmp_path):
         _, miss = errors(tag, np.column_stack([own[name] for name in columns]))
         assert len(miss) == 4 and np.abs(miss[:, :2]).max() < 3e-3
         assert np.degrees(np.abs(miss[:, 2]).max()) < 1.5
-    with pytest.raises(ValueError, match="family='6x6': is none of 4x4_100"):
+    with pytest.raises(ValueError, match="--family 6x6: is none of 4x4_100"):
         track(tmp_path, "--family", "6x6", "--out", tmp_path / "q.csv")
 
 

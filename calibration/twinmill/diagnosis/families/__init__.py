@@ -33,7 +33,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
     """
     moving = np.concatenate(velocities)
     axes = [k for k in range(3) if np.abs(moving[:, k]).max() > STILL[k]]
-    pose = np.concatenate([own.floor.response.pose for own in opened])
+    pose = np.concatenate([own.response.pose for own in opened])
     return [
         *(of_speed(k, np.abs(moving[:, k])) for k in axes),
         *across_axes(moving),
@@ -43,7 +43,7 @@ def families_of(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> l
         *of_places(pose[:, :2]),
         *of_pushes(),
         *(of_course(n) for n in COURSES),
-        *of_drift(np.concatenate([own.floor.response.middle_s for own in opened])),
+        *of_drift(np.concatenate([own.response.middle_s for own in opened])),
         *of_beat(beat_of(opened)),
         *of_wheels(opened),
         *(of_rims(opened, velocities) if opened[0].model.drive == "twist" else ()),

@@ -26,8 +26,8 @@ class Family:
     def columns(self, own: Opened, velocity: np.ndarray) -> np.ndarray:
         """(R, k) change of a log's rows, as (N, 3) `velocity` moves the robot."""
         values = self.values(own, np.where(np.abs(velocity) < STILL, 0.0, velocity))
-        change = displaced_by(own.floor.response, velocity, values)
-        change *= np.nan_to_num(own.data.weight)[..., None]
+        change = displaced_by(own.response, velocity, values)
+        change *= np.nan_to_num(own.trajectory.weight)[..., None]
         return change.reshape(-1, len(self.terms))
 
 
@@ -55,12 +55,12 @@ class Humps:
         return np.maximum(0.0, 1.0 - np.abs(values - self.middles) / self.width)
 
     def texts(self, name: str) -> list[str]:
-        """Of each over a name, as the effect `equation` takes it."""
+        """Formulas of each hump over a name, as the effect `equation` takes them."""
         return [f"max(0, 1 - abs({name} - {m:g})/{self.width:g})" for m in self.middles]
 
 
 def pushed(own: Opened, shares: np.ndarray) -> dict[int, np.ndarray]:
     """Values along the room's x, then its y, by (N, K) shares of what is typical."""
     pushes = TYPICAL["vx_mps"] * shares
-    c, s = (f(own.floor.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
+    c, s = (f(own.response.heading_rad)[:, None] * pushes for f in (np.cos, np.sin))
     return {0: np.hstack([c, s]), 1: np.hstack([-s, c])}

@@ -37,7 +37,7 @@ def of_leaning(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> li
 
 def _moved(lean: Lean, own: Opened, velocity: np.ndarray) -> np.ndarray:
     """(N, 2) velocity of a marker that leans by a metre for each m/s^2."""
-    step_s = own.floor.response.step_s
+    step_s = own.response.step_s
     return led_by(lean(velocity, step_s), velocity, step_s)
 
 

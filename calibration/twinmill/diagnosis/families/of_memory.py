@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What depends on the way since a robot turned round, or on the last command that was taken.
+"""Errors that depend on the way since a robot turned round, or on the last command it took.
 
 Tyres and gears give way for the first degrees or millimetres of a new direction (Dahl 1968, "A
 solid friction model"), and a castor swings round on them. A driver that takes no small change of
@@ -19,7 +19,7 @@ from twinmill.model.parameters import LAG
 
 
 def of_memory(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> Iterator[Family]:
-    """Of each axis that moves, and of what commands are given to.
+    """Families of each axis that moves, and of each quantity that is commanded.
 
     Args:
         opened: logs over their floors, of one kind of robot.
@@ -33,7 +33,7 @@ def of_memory(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> Ite
             yield _swung_round(axis)
     if opened[0].model.drive == "twist":
         yield from (_small_changes(k, max(float(np.std(moving[:, k])), STILL[k])) for k in axes)
-    elif opened[0].floor.response.wheels:
+    elif opened[0].response.wheels:
         yield _small_changes_of_wheels(opened[0], moving)
 
 
@@ -42,7 +42,7 @@ def _wound_up(axis: int) -> Family:
     name, to = SPEEDS[axis], CHANNELS[axis]
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        way = velocity[:, axis] * own.floor.response.step_s
+        way = velocity[:, axis] * own.response.step_s
         gives = [1 - np.sign(way) * wound(way, most) for most in WOUND[axis]]
         return {axis: SWELL * velocity[:, [axis]] * np.column_stack(gives)}
 
@@ -56,7 +56,7 @@ def _swung_round(axis: int) -> Family:
     name = SPEEDS[axis]
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        way = velocity[:, axis] * own.floor.response.step_s
+        way = velocity[:, axis] * own.response.step_s
         swings = [(way != 0) * (1 - wound(way, most) ** 2) for most in WOUND[axis]]
         return {2: TYPICAL["omega_radps"] * np.column_stack(swings)}
 
@@ -77,8 +77,8 @@ def _small_changes(axis: int, usual: float) -> Family:
 
 
 def _small_changes_of_wheels(first: Opened, moving: np.ndarray) -> Family:
-    """The same of each wheel's."""
-    wheels = first.floor.response.wheels
+    """Small changes of a wheel's speed that the robot is told are not taken."""
+    wheels = first.response.wheels
     usual = max(float(np.std(moving @ w.rate)) for w in wheels)
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
@@ -93,8 +93,8 @@ def _small_changes_of_wheels(first: Opened, moving: np.ndarray) -> Family:
 
 
 def _told(own: Opened) -> np.ndarray:
-    return told_velocity_at(own.data, own.model, own.floor.response.points)
+    return told_velocity_at(own.trajectory, own.model, own.response.points)
 
 
 def _lagged(own: Opened, values: np.ndarray) -> np.ndarray:
-    return lagged(values, own.model.get(LAG), own.floor.response.step_s)
+    return lagged(values, own.model.get(LAG), own.response.step_s)

@@ -39,7 +39,7 @@ def of_pushes() -> list[Family]:
         return pushed(own, moves(velocity)[:, None])
 
     def veer(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        heading = own.floor.response.heading_rad
+        heading = own.response.heading_rad
         waves = np.column_stack([np.cos(heading), np.sin(heading)])
         return {2: TYPICAL["omega_radps"] * waves * moves(velocity)[:, None]}
 
@@ -56,7 +56,7 @@ def _over(axis: int, place: np.ndarray, most: int) -> Humps | None:
 
 
 def _strips(axis: int, humps: Humps, own: Opened) -> np.ndarray:
-    return humps.of(own.floor.response.pose[:, [axis]])
+    return humps.of(own.response.pose[:, [axis]])
 
 
 def _squares(sides: Sequence[Humps], own: Opened) -> np.ndarray:
@@ -120,7 +120,7 @@ def of_course(n: int) -> Family:
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
         ahead, left = velocity[:, [0]], velocity[:, [1]]
-        course = n * (own.floor.response.heading_rad[:, None] + np.arctan2(left, ahead))
+        course = n * (own.response.heading_rad[:, None] + np.arctan2(left, ahead))
         waves = SWELL * np.hstack([np.cos(course), np.sin(course)])
         return {
             0: np.hstack([waves * ahead, -waves * left]),

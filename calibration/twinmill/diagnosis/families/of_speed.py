@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What acts at some speeds alone: on the axis that has the speed, or on another."""
+"""Errors at some speeds alone: of the axis that has the speed, or of another."""
 
 from collections.abc import Iterator
 
@@ -27,7 +27,7 @@ def of_speed(axis: int, speed: np.ndarray) -> Family:
 
 
 def across_axes(moving: np.ndarray) -> Iterator[Family]:
-    """What turning does to driving, and driving to turning, at some speeds of (N, 3)."""
+    """Coupling of turning into driving and of driving into turning, at some speeds of (N, 3)."""
     travel, turning = _travel(moving), np.abs(moving[:, [2]])
     if not (travel > STILL[0]).any():
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What changes with time: all that is captured drifts or turns, the robot veers, or all swings."""
+"""Errors that change with time: poses drift or turn, the robot veers, or all swings."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -40,7 +40,7 @@ def of_drift(t_s: np.ndarray) -> list[Family]:
 
 def beat_of(opened: Sequence[Opened]) -> float:
     """Rate at which the errors of a log swing, rad/s; 0 at none, and of several logs."""
-    return opened[0].floor.response.beat_radps if len(opened) == 1 else 0.0
+    return opened[0].response.beat_radps if len(opened) == 1 else 0.0
 
 
 def of_beat(rate_radps: float) -> list[Family]:
@@ -89,12 +89,12 @@ def _pushing(rates: Sequence[float]) -> Family:
 
 def _swinging(own: Opened, rates: Sequence[float]) -> np.ndarray:
     """(N, 2 k) at a log's points."""
-    angle = own.floor.response.middle_s[:, None] * np.array(rates)
+    angle = own.response.middle_s[:, None] * np.array(rates)
     return np.hstack([np.cos(angle), np.sin(angle)])
 
 
 def _texts(rates: Sequence[float]) -> list[str]:
-    """Of the same in a formula."""
+    """Cosine and sine of each rate, as a formula has them."""
     return [f"{wave}({rate:g}*t)" for wave in ("cos", "sin") for rate in rates]
 
 
@@ -102,7 +102,7 @@ def _veering_from(at_s: float) -> Family:
     """It veers while it moves, before a moment in another way than after it."""
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        after = np.sign(own.floor.response.middle_s - at_s)
+        after = np.sign(own.response.middle_s - at_s)
         return {
             2: TYPICAL["omega_radps"] * moves(velocity)[:, None] * np.stack([after**2, after], 1)
         }

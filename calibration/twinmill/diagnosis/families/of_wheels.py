@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a wheel does at some of its angles, as one that is oval, or flat at a place."""
+"""Errors at some angles of a wheel, as of one that is oval, or flat at a place."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from twinmill.fitting.wheel_angles import TIMES, Wheel
 
 def of_wheels(opened: Sequence[Opened]) -> list[Family]:
     """One for each of a single log: what others' angles are at their begin is not known."""
-    return [_of_wheel(w) for w in opened[0].floor.response.wheels] if len(opened) == 1 else []
+    return [_of_wheel(w) for w in opened[0].response.wheels] if len(opened) == 1 else []
 
 
 def of_rims(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[Family]:
@@ -23,7 +23,7 @@ def of_rims(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[
         opened: logs over their floors, of one kind of robot.
         velocities: (N, 3) of the body in each.
     """
-    wheels = opened[0].floor.response.wheels
+    wheels = opened[0].response.wheels
     rims = [np.abs(v @ w.rate) for v in velocities for w in wheels]
     top_radps = max((float(np.quantile(r, MOST)) for r in rims), default=0.0)
     if top_radps <= 0:
@@ -31,7 +31,7 @@ def of_rims(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[
     humps = Humps.over(0.0, top_radps)
 
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        turns = [(w, (velocity @ w.rate)[:, None]) for w in own.floor.response.wheels]
+        turns = [(w, (velocity @ w.rate)[:, None]) for w in own.response.wheels]
         added = [(w, np.sign(r) * humps.of(np.abs(r))) for w, r in turns]
         return {k: SWELL * top_radps * sum(w.body[k] * a for w, a in added) for k in range(3)}
 
@@ -41,7 +41,7 @@ def of_rims(opened: Sequence[Opened], velocities: Sequence[np.ndarray]) -> list[
 
 def _of_wheel(wheel: Wheel) -> Family:
     def values(own: Opened, velocity: np.ndarray) -> dict[int, np.ndarray]:
-        waves = SWELL * wheel.waves(own.floor.response.moved) * (velocity @ wheel.rate)[:, None]
+        waves = SWELL * wheel.waves(own.response.moved) * (velocity @ wheel.rate)[:, None]
         return {axis: part * waves for axis, part in enumerate(wheel.body)}
 
     group, size = f"angle of the {wheel.words}", TYPICAL["rim_mps"] / SWELL
