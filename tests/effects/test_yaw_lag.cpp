@@ -83,6 +83,15 @@ TEST(YawLag, AddsToTheOneThatTheModelHas)
     }
 }
 
+// Two events may lie nearer to each other than exp() can tell: then nothing moves, and all stays finite.
+TEST(YawLag, HoldsThroughAStepTooShortToSee)
+{
+    constexpr double dt_s = 1e-18;
+    Player player(With("yaw_lag", {-0.03}, Lagging(kLag_s)), dt_s);
+    player.Play(kTurnLeft, dt_s);
+    EXPECT_NEAR(player.state.rim_mps[1], 0, 1e-12);
+}
+
 // Two lags in a row, a and b, answer a step by 1 - (a exp(-t/a) - b exp(-t/b)) / (a - b).
 TEST(YawLag, ComesBehindAFilterBeforeTheMotors)
 {

@@ -19,6 +19,17 @@ def log_evidence(y: np.ndarray, x: np.ndarray) -> float:
     return Linear.of(y, x).log_evidence
 
 
+def _root(x: np.ndarray) -> np.ndarray:
+    """(P, P) Cholesky factor of 1 + x x'."""
+    gram = x @ x.T
+    gram[np.diag_indices_from(gram)] += 1.0
+    try:
+        return np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:  # columns so large and alike that squares of them hide the 1
+        upper = np.linalg.qr(np.concatenate([np.eye(len(x)), x.T]), mode="r")
+        return (upper * np.sign(np.diag(upper))[:, None]).T
+
+
 @dataclass(frozen=True)
 class Linear:
     """A linear model that was conditioned on its data.
@@ -38,9 +49,7 @@ class Linear:
     @classmethod
     def of(cls, y: np.ndarray, x: np.ndarray) -> "Linear":
         """Conditions a model on y (R,) with columns x (P, R)."""
-        gram = x @ x.T
-        gram[np.diag_indices_from(gram)] += 1.0
-        low = np.linalg.cholesky(gram)
+        low = _root(x)
         return cls(y, x, low, solve_triangular(low, x @ y, lower=True))
 
     @cached_property

@@ -76,6 +76,18 @@ def test_evidence_is_that_of_the_marginal_normal_distribution():
     assert more.covariance == pytest.approx(np.linalg.inv(normal))
 
 
+def test_evidence_of_huge_columns_that_are_nearly_alike_is_that_of_their_singular_values():
+    """An effect near which the motion is unstable has such slopes."""
+    random = np.random.default_rng(3)
+    y, one, other = random.normal(size=(3, 60))
+    x = 1e9 * np.array([one, one + 1e-9 * other])
+    _, sizes, ways = np.linalg.svd(x, full_matrices=False)
+    along = ways @ y
+    left = y @ y - np.sum(along**2 * sizes**2 / (1 + sizes**2))
+    wanted = -left / 2 - np.log1p(sizes**2).sum() / 2
+    assert Linear.of(y, x).log_evidence == pytest.approx(wanted, rel=1e-6)
+
+
 def test_chances_of_all_sets_of_moments_add_up_to_one():
     for rate in (Rate(), Rate(0.1), Rate(0.3, 2.0, 50.0)):
         on = np.arange(13)

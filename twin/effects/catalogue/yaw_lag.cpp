@@ -30,9 +30,10 @@ constexpr ParameterSpec kParameters[] = {
      "turning follows later than driving", "turning follows sooner than driving", 0.05},
 };
 
-double Decay(double dt_s, double tau_s)
+// Share of a gap that is closed: exact in steps so short that its decay rounds to 1.
+double Closed(double dt_s, double tau_s)
 {
-    return tau_s > 0 ? std::exp(-dt_s / tau_s) : 0;
+    return tau_s > 0 ? -std::expm1(-dt_s / tau_s) : 1;
 }
 
 // Sets targets at which wheels with their own time constant end the step where the part of their
@@ -40,7 +41,7 @@ double Decay(double dt_s, double tau_s)
 // that one's part already.
 void Step(WheelSignals &s, const Numbers &v, double *)
 {
-    if (v[0] == 0)
+    if (v[0] == 0 || s.dt_s <= 0)
         return;
     const double before_s = s.turn_extra_s;
     s.turn_extra_s += v[0];
@@ -57,11 +58,11 @@ void Step(WheelSignals &s, const Numbers &v, double *)
     {
         if (k == 0 || s.tau_s[k] != s.tau_s[k - 1])  // most often all lag alike
         {
-            before = Decay(s.dt_s, s.tau_s[k] + before_s);
-            after = Decay(s.dt_s, s.tau_s[k] + s.turn_extra_s);
+            before = Closed(s.dt_s, s.tau_s[k] + before_s);
+            after = Closed(s.dt_s, s.tau_s[k] + s.turn_extra_s);
         }
         const double gap_mps = s.robot.spin[k] * (turn_mps - wanted_mps);
-        s.target_mps[k] += gap_mps * (after - before) / (1 - before);
+        s.target_mps[k] += gap_mps * (before - after) / before;
     }
 }
 
