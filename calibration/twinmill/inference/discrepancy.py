@@ -17,6 +17,7 @@ from twinmill.inference.steps import Motion
 SIZES = np.array([0.01, 0.03, 0.1, 0.3])  # from barely seen to a third of the way, relative
 CHANCE = np.array([0.6, 0.25, 0.1, 0.05])  # that a dependence has each: small ones are common
 STEP = float(np.sqrt(SIZES[1] / SIZES[0]))  # half the distance of two sizes, as a factor
+GROWS = 1.01 * STEP**2  # times its size in one log, up to which a wander is as usual: one distance
 NODES = 7  # of a curve over speed: as a table of duties has
 LATEST = 10  # steps that a response to a command may last
 

@@ -73,6 +73,7 @@ class Problem:
         names: of the effects that compete.
         rate: of moments, as the base's own log had them; None where that is not known.
         noise: what all flexible terms together leave.
+        wander: dependences on time and place that the base's own log had, and their sizes.
     """
 
     steps: Steps
@@ -83,6 +84,7 @@ class Problem:
     names: list[str]
     rate: Rate | None
     noise: Noise
+    wander: dict[str, float]
 
     def view(self, noise: Noise) -> View:
         """What may be missing, under a noise."""
@@ -174,10 +176,21 @@ def problem_of(
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always else None
-    rough = Problem(steps, motion, prior, base, found, names, rate, noise)
+    wander = _wander(always, found) if always else {}
+    rough = Problem(steps, motion, prior, base, found, names, rate, noise, wander)
     noise = _flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
     return replace(rough, noise=noise, base=base)
+
+
+def _wander(always: Always, found: Sequence[Kernel]) -> dict[str, float]:
+    """Size of each dependence whose function holds for one log alone."""
+    word = {k.name: k.depends_on for k in found if not k.lasting}
+    sizes: dict[str, float] = {}
+    for name, size in always.kernels:
+        if name in word:
+            sizes[word[name]] = max(size, sizes.get(word[name], 0.0))
+    return sizes
 
 
 def _set_to(model: native.Model, prior: Prior, always: Always) -> None:

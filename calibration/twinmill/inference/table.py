@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, SIZES, STEP
+from twinmill.inference.discrepancy import CHANCE, GROWS, SIZES, STEP
 from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
@@ -267,34 +267,44 @@ class _Comparison:
         )
 
     def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
-        """Entries with each dependence that is not beside already."""
+        """Entries with each dependence that is not beside already.
+
+        What the base's own log wanders with time or place is no news, of whatever form it is and up
+        to one step of the grid of sizes more.
+        """
         out = []
         for word in self.words[:-1]:
             if word in beside.words:
                 continue
-            at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
-            gains = own.gains[at] - np.log(len(at))
-            likely = gains + np.log(CHANCE)
-            total = float(logsumexp(likely))
-            if beside.words:
-                mimicked = beside.log_relative
-            else:
-                relative = self._log_relative(own.falls[at])
-                each = (gains + relative).reshape(len(relative), gains.size)
-                mimicked = np.logaddexp.reduce(each, axis=1) - total
-            f, s = np.unravel_index(likely.argmax(), likely.shape)
-            linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
-            out.append(
-                self._entry(
-                    beside,
-                    linear,
-                    words=(*beside.words, word),
-                    log_evidence=own.alone + beside.log_chance + total,
-                    fall=beside.fall if beside.words else float(own.falls[at][f, s]),
-                    mimicked=mimicked,
-                )
-            )
+            usual = GROWS * self.problem.wander.get(word, 0.0) >= SIZES
+            for sizes, words in ((~usual, (*beside.words, word)), (usual, beside.words)):
+                if sizes.any():
+                    out.append(self._with_word(beside, own, word, sizes=sizes, words=words))
         return out
+
+    def _with_word(
+        self, beside: _Beside, own: Evidence, word: str, *, sizes: np.ndarray, words: tuple
+    ) -> Entry:
+        """With a dependence of some of the sizes, told in these words."""
+        at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
+        gains = own.gains[at][:, sizes] - np.log(len(at))
+        likely = gains + np.log(CHANCE[sizes] / CHANCE[sizes].sum())
+        total = float(logsumexp(likely))
+        mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
+        if words and not beside.words:
+            relative = self._log_relative(own.falls[at][:, sizes])
+            each = (gains + relative).reshape(len(relative), gains.size)
+            mimicked = np.logaddexp.reduce(each, axis=1) - total
+        f, s = np.unravel_index(likely.argmax(), likely.shape)
+        linear = own.linear.with_columns(SIZES[sizes][s] * own.white(self.view, at[f]))
+        return self._entry(
+            beside,
+            linear,
+            words=words,
+            log_evidence=own.alone + beside.log_chance + total,
+            fall=beside.fall if beside.words else float(own.falls[at][:, sizes][f, s]),
+            mimicked=mimicked,
+        )
 
     def _entry(
         self,

@@ -251,3 +251,42 @@ def test_hidden_effects_of_a_foreign_plant(foreign, case):
     assert names[:1] == [HIDDEN[case]] if HIDDEN[case] else not names
     sure = {f.effect for f in found.answer.findings if f.certainty == "sure"}
     assert sure <= {HIDDEN[case]}
+
+
+class Wander:
+    """Gains of driving and of turning that wander by 1.5 % over some 10 s, as they like."""
+
+    def __init__(self, seed):
+        self.random = np.random.default_rng(seed)
+
+    def __call__(self, motion):
+        t_s = np.arange(len(motion)) * STEP_S
+        nodes_s = np.arange(0, t_s[-1] + 20, 10.0)
+        drives, turns = (
+            1 + 0.015 * np.interp(t_s, nodes_s, self.random.normal(size=len(nodes_s)))
+            for _ in range(2)
+        )
+        return motion * np.column_stack([drives, drives, turns])
+
+
+@pytest.mark.parametrize("seed, loss", [(4, 0.0), (5, 0.0), (4, 0.15)])
+def test_a_wander_that_the_base_has_is_no_news_and_a_loss_that_comes_again_is(
+    measure, tanh_robot, one_clock_base, seed, loss
+):
+    class Wanders(tanh_robot):
+        def __init__(self, seed, loss=0.0):
+            super().__init__()
+            self.wander, self.loss = Wander(seed), loss
+
+        def hindered(self, motion):
+            t_s = np.arange(len(motion)) * STEP_S
+            away = (t_s > 6) & (t_s < 13) | (t_s > 44) & (t_s < 51)
+            return self.wander(motion) * (1 - self.loss * away)[:, None]
+
+    before = measure(Wanders(100 + seed), 20, 80.0)
+    found = infer([measure(Wanders(seed, loss), 21, 80.0)], one_clock_base, [before]).answer
+    if loss:
+        assert found.verdict == "outside_catalogue"
+        assert next(iter(found.depends_on)) == "time"
+    else:
+        assert found.verdict in ("model_adequate", "refit_enough", "cannot_tell")
