@@ -89,7 +89,8 @@ def test_a_stop_needs_no_file_that_cannot_be_opened(driving, killed):
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (3, 3))
     begin_s = time.monotonic()
     for role in killed:
-        os.kill(pids[role], signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):  # it had stopped the board, and was done
+            os.kill(pids[role], signal.SIGKILL)
     assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
 
 
