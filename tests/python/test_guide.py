@@ -169,6 +169,13 @@ def test_plain_wheels_are_on_one_axle_unless_measured_and_a_side_is_told_alike()
         assert np.array_equal(left, rear_left) and np.array_equal(right, rear_right)
 
 
+def test_who_says_one_clock_is_told_to_say_so_to_the_bags_import():
+    for clocks, says in (("one", True), ("two", False)):
+        run(["guide", *told("ros", "ros", "twist", "mecanum", clocks), "-o", clocks])
+        text = " ".join(Path(clocks, "plan.md").read_text().split())
+        assert ("add `--same-clock` to it" in text) == says
+
+
 @pytest.mark.parametrize("wheels", ["differential", "ackermann"])
 def test_the_first_drive_stands_only_to_rest(wheels):
     """Legs that a robot could not drive were stood through: 14 of the first 20 s."""
