@@ -283,6 +283,23 @@ def test_what_the_page_on_other_simulators_shows_runs(folder, model_text):
     np.testing.assert_allclose(speeds, 0.3 * gains, rtol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("signs", "axis", "gain", "delay_s"),
+    [((1, 1, 1, 1), 0, 1.0, 0), ((-1, 1, 1, -1), 1, 0.89, 0), ((1, 1, 1, 1), 0, 1.0, 0.05)],
+)
+def test_the_ways_that_the_page_tells_to_check_with(signs, axis, gain, delay_s, folder):
+    """A first-order lag's way by algebra, speed times (time less lag and delay)."""
+    text = tm.Model.load("turbopi.toml").file.text
+    text += f'[[effect]]\nname = "input_delay"\ndelay_s = {delay_s}\n' if delay_s else ""
+    model = mujoco.MjModel.from_xml_string(mjcf(open_text(folder, text))[0])
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 0.366 * np.array(signs)
+    mujoco.mj_step(model, data, 2000)
+    by_hand_m = 0.366 * gain * (2 - 0.06 - delay_s)
+    assert data.qpos[axis] == pytest.approx(by_hand_m, abs=0.001)
+    assert f"{data.qpos[axis]:.3f} m" in (DOCS / "simulators.md").read_text()
+
+
 def two_wheeled(model_text):
     """A model on two wheels of one axle."""
     text = model_text("m").replace("half_wheelbase_m = 0.059", "half_wheelbase_m = 0")
