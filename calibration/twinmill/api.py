@@ -17,6 +17,7 @@ import logging
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
+from importlib.util import find_spec
 from numbers import Integral, Real
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -69,6 +70,7 @@ from twinmill.experiment.design import check as check_limits
 from twinmill.export.carried import open_robot
 from twinmill.export.log_files import export_log
 from twinmill.export.model_files import export_model
+from twinmill.extras import MissingExtra, installing
 from twinmill.files import plain, replacing
 from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
@@ -418,7 +420,7 @@ class Log(Shown):
         return joined.sort_values([*keys, "t_s"], ignore_index=True)
 
     def to_xarray(self) -> Any:
-        """The numbers of `to_pandas` as a dataset of xarray, which must be installed.
+        """The numbers of `to_pandas` as a dataset of xarray (`pip install xarray`).
 
         Returns:
             Variables along `t_s` if there is one robot in one log; else along `row`, with the
@@ -431,6 +433,12 @@ class Log(Shown):
             >>> tm.load("run.lcmlog").to_xarray()["x_m"].dims  # doctest: +SKIP
             ('t_s',)
         """
+        if find_spec("xarray") is None:  # which no extra brings: nothing else here takes it
+            raise MissingExtra(
+                "log.to_xarray() needs the package 'xarray', which is not installed; install it "
+                f"with: {installing('xarray')}",
+                name="xarray",
+            )
         frame = self.to_pandas()
         keys = ["log", "robot_id"]
         dataset = frame.rename_axis("row").to_xarray().set_coords([*keys, "t_s"])

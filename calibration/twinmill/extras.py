@@ -35,9 +35,13 @@ def missing(module: str, extra: str | None = None) -> str:
 
 def command(extra: str | None) -> str:
     """What installs an extra, or without one all that everybody gets, into this environment."""
+    return installing(f"'twinmill[{extra}]'" if extra else "twinmill")
+
+
+def installing(wanted: str) -> str:
+    """What installs a package into this environment."""
     pip = shutil.which("pip")
     own = pip and Path(pip).parent == Path(sys.executable).parent
-    wanted = f"'twinmill[{extra}]'" if extra else "twinmill"
     return f"{'pip' if own else f'{sys.executable} -m pip'} install {wanted}"
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import twinmill_native as native
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -35,6 +36,13 @@ def test_fences_that_a_command_prints_do_not_end_its_block(tmp_path):
     assert with_outputs(page, tmp_path).splitlines()[1:] == [
         "$ printf '```\\ntwinmill\\n```\\n'", "```", "twinmill", "```", "````"
     ]  # fmt: skip
+
+
+def test_the_page_on_sweeps_tells_every_metric():
+    page = (ROOT / "docs/sweep.md").read_text()
+    told = set(re.findall(r"^\| `(\w+)` \|", page.split("## Columns")[1], re.MULTILINE))
+    there = {*native.OUTCOMES, "cell", "seed", "class", "kernel", "log", "t_s"}
+    assert there <= told
 
 
 def test_the_tutorial_names_the_effect_that_the_recording_has(outputs, folder):

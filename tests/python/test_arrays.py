@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Logs from numbers in memory: what went in comes out, and what makes no run is refused."""
 
+import sys
+
 import lcm
 import numpy as np
 import pandas as pd
@@ -52,6 +54,12 @@ def test_a_pose_has_the_command_that_was_in_force():
     told = frame.set_index("t_s")["vx_mps"]
     assert told[0.98:0.99].isna().all() and told[1.0] == 0.1 == told[1.98] and told[2.0] == 0.2
     assert len(frame) == len(T_S)
+
+
+def test_without_xarray_the_sentence_says_what_installs_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ModuleNotFoundError, match=r"'xarray'.* not installed.*pip install xarray$"):
+        circle().to_xarray()
 
 
 def frames(kind: str):

@@ -343,6 +343,20 @@ def test_a_ros_bag_can_be_imported(kind, write_log, message, tmp_path):
     np.testing.assert_allclose(robot.pose[:, 0], 0.01 * np.arange(40))
 
 
+@pytest.mark.parametrize("to", ["mcap", "rosbag2"])
+def test_what_is_said_to_be_written_is_what_mcaps_own_reader_counts(log, tmp_path, to, capsys):
+    run(["export", str(log), "--to", to, "-o", str(tmp_path / "o"), "--json"])
+    said = json.loads(capsys.readouterr().out)
+    path = tmp_path / "o" if to == "mcap" else next((tmp_path / "o").glob("*.mcap"))
+    with open(path, "rb") as stream:
+        told = make_reader(stream).get_summary()
+    counts = told.statistics.channel_message_counts
+    assert said["written"] == {told.channels[k].topic: n for k, n in counts.items()}
+    run(["export", str(log), "--to", to, "-o", str(tmp_path / "o"), "--force"])
+    words = f"{sum(counts.values())} messages in {len(counts)} topics: "
+    assert capsys.readouterr().out.startswith(words)
+
+
 def test_what_ros_has_no_messages_for_is_said(log, tmp_path, capsys):
     run(["export", str(log), "--to", "rosbag2", "-o", str(tmp_path / "bag"), "--json"])
     said = json.loads(capsys.readouterr().out)["warnings"]

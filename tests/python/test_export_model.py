@@ -283,6 +283,68 @@ def test_what_the_page_on_other_simulators_shows_runs(folder, model_text):
     np.testing.assert_allclose(speeds, 0.3 * gains, rtol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("signs", "axis", "gain", "delay_s"),
+    [((1, 1, 1, 1), 0, 1.0, 0), ((-1, 1, 1, -1), 1, 0.89, 0), ((1, 1, 1, 1), 0, 1.0, 0.05)],
+)
+def test_the_ways_that_the_page_tells_to_check_with(signs, axis, gain, delay_s, folder):
+    """A first-order lag's way by algebra, speed times (time less lag and delay)."""
+    text = tm.Model.load("turbopi.toml").file.text
+    text += f'[[effect]]\nname = "input_delay"\ndelay_s = {delay_s}\n' if delay_s else ""
+    model = mujoco.MjModel.from_xml_string(mjcf(open_text(folder, text))[0])
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 0.366 * np.array(signs)
+    mujoco.mj_step(model, data, 2000)
+    by_hand_m = 0.366 * gain * (2 - 0.06 - delay_s)
+    assert data.qpos[axis] == pytest.approx(by_hand_m, abs=0.001)
+    assert f"{data.qpos[axis]:.3f} m" in (DOCS / "simulators.md").read_text()
+
+
+def two_wheeled(model_text):
+    """A model on two wheels of one axle."""
+    text = model_text("m").replace("half_wheelbase_m = 0.059", "half_wheelbase_m = 0")
+    return text.replace('"mecanum"', '"differential"')
+
+
+@pytest.mark.parametrize("told", [(0.2, 0.0), (-0.2, 0.0), (0.15, 1.0), (0.0, 2.0)])
+def test_a_robot_on_two_wheels_stays_level_and_drives_as_told(told, folder, model_text):
+    """MuJoCo reads the URDF as the page shows; rims by the kinematics of a unicycle."""
+    open_text(folder, two_wheeled(model_text))
+    run(["export-model", "m.toml", "--to", "urdf", "--out", "better.urdf"])
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "simulators.md").read_text(), re.DOTALL)
+    (block,) = [b for b in blocks if "better.urdf" in b]
+    exec(block, names := {"mujoco": mujoco})
+    spec, plane = names["spec"], mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(type=plane, size=[5, 5, 0.1])
+    spec.option.timestep, spec.option.integrator = 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    for side in ("fl", "fr"):
+        servo = spec.add_actuator(name=side, target=f"{side}_wheel_joint")
+        servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        servo.set_to_velocity(kv=0.5)
+    data = mujoco.MjData(model := spec.compile())
+    v_mps, w_radps = told
+    rims_mps = v_mps + w_radps * 0.067 * np.array([-1, 1])
+    data.ctrl[:] = rims_mps / 0.0325
+    mujoco.mj_step(model, data, 500)
+    tilts_deg = []
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+        tilts_deg.append(np.degrees(np.arccos(data.body("base_footprint").xmat[8])))
+    assert max(tilts_deg) < 0.5
+    assert data.qvel[5] == pytest.approx(w_radps, abs=0.03)
+    assert np.hypot(*data.qvel[:2]) == pytest.approx(abs(v_mps), abs=0.005)
+
+
+def test_in_gazebo_the_supports_slide(folder, model_text):
+    open_text(folder, two_wheeled(model_text))
+    run(["export-model", "m.toml", "--to", "sdf"])
+    collisions = ET.parse("m.sdf").findall("model/link[@name='base_link']/collision")
+    balls = [c for c in collisions if c.find("geometry/sphere") is not None]
+    assert [c.findtext("pose").split()[0][0] == "-" for c in balls] == [False, True]
+    for ball in balls:
+        assert [ball.findtext(f"surface/friction/ode/{mu}") for mu in ("mu", "mu2")] == ["0", "0"]
+
+
 BY_HAND = """
 [[effect]]
 name = "lag_by_duty"
@@ -415,12 +477,13 @@ def test_urdf_passes_its_own_checker_and_weighs_what_the_robot_does(wheels, fold
     assert sum(masses) == pytest.approx(1.2)
 
 
-@pytest.mark.parametrize("wheels", ["mecanum", "differential"])
+@pytest.mark.parametrize("wheels", ["mecanum", "differential", "two"])
 def test_sdf_passes_its_own_library(wheels, folder, model_text):
     library = ctypes.util.find_library("sdformat12")
     if not library:
         pytest.skip("libsdformat12 is not installed (Debian: libsdformat12-12)")
-    open_text(folder, model_text("m").replace('"mecanum"', f'"{wheels}"'))
+    four = model_text("m").replace('"mecanum"', f'"{wheels}"')
+    open_text(folder, two_wheeled(model_text) if wheels == "two" else four)
     run(["export-model", "m.toml", "--to", "sdf"])
     check = ctypes.CDLL(library).cmdCheck  # what `sdf --check` calls; prints what is wrong
     assert check(b"m.sdf") == 0

@@ -157,6 +157,25 @@ def test_what_is_missing_or_does_not_go_together_is_one_sentence(folder):
     assert (folder / "a" / "b" / "plan.md").is_file()
 
 
+def test_plain_wheels_are_on_one_axle_unless_measured_and_a_side_is_told_alike():
+    plan(*told("other", "csv", "duty", "differential", "two"))
+    wheels = native.Model.load("plan/mine.toml").wheels()
+    assert [wheel["x_m"] for wheel in wheels] == [0, 0]
+    for name in ("wheels", "drive"):
+        _, left, right, rear_left, rear_right = np.loadtxt(
+            f"plan/{name}.csv", delimiter=",", skiprows=1, unpack=True
+        )
+        assert np.any(left != right) and np.any(left)
+        assert np.array_equal(left, rear_left) and np.array_equal(right, rear_right)
+
+
+def test_who_says_one_clock_is_told_to_say_so_to_the_bags_import():
+    for clocks, says in (("one", True), ("two", False)):
+        run(["guide", *told("ros", "ros", "twist", "mecanum", clocks), "-o", clocks])
+        text = " ".join(Path(clocks, "plan.md").read_text().split())
+        assert ("add `--same-clock` to it" in text) == says
+
+
 @pytest.mark.parametrize("wheels", ["differential", "ackermann"])
 def test_the_first_drive_stands_only_to_rest(wheels):
     """Legs that a robot could not drive were stood through: 14 of the first 20 s."""

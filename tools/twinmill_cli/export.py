@@ -18,6 +18,8 @@ if working():  # not for --help
     from twinmill.export.log_files import ExportedLog, default_name, export_log
     from twinmill_cli.frame import open_model
 
+BY_TOPIC = (LogFormat.MCAP, LogFormat.ROSBAG2)
+
 
 def register(app: typer.Typer) -> None:
     """Adds the command to the application."""
@@ -58,11 +60,12 @@ def _export(
         done = export_log(
             *(log, to, out or default_name(log, to)), model=robots, command=command, force=force
         )
-    deliver(done.to_json(), _text(done), as_json)
+    words = ("messages", "topics") if to in BY_TOPIC else ("rows", "tables")
+    deliver(done.to_json(), _text(done, *words), as_json)
     return done.to_json()
 
 
-def _text(done: ExportedLog) -> str:
-    count, files = sum(done.channels.values()), ", ".join(map(str, done.files))
-    told = [f"{count} messages of {len(done.channels)} channels: {files}"]
+def _text(done: ExportedLog, what: str, where: str) -> str:
+    count, files = sum(done.written.values()), ", ".join(map(str, done.files))
+    told = [f"{count} {what} in {len(done.written)} {where}: {files}"]
     return "\n".join([*told, *(f"! {warning}" for warning in done.warnings)])

@@ -293,6 +293,8 @@ def _first_drive(model: native.Model) -> tuple[list[str], np.ndarray]:
     values = axes * [FULL_MPS, FULL_MPS, FULL_RADPS]
     if model.drive != "twist":
         speeds = np.array([model.wheel_speeds(*row) for row in values])
+        if speeds.shape[1] == 2:  # left and right, told all wheels of a side
+            speeds = np.tile(speeds, 2)
         speeds = np.pad(speeds, ((0, 0), (0, 4 - speeds.shape[1])))
         top = np.abs(speeds).max()
         values = np.rint(100 * speeds / top) if model.drive == "duty" else speeds

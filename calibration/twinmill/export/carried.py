@@ -99,6 +99,18 @@ class RobotModel:
         table = [n for n in names if n.startswith("base.wheel_speed_mps.")]
         return max(map(self.get, table)) if self.model.drive == "duty" else None
 
+    def support_radius_m(self) -> float:
+        """A ball between the hull's underside, which is at the axles' height, and the floor."""
+        return self.get("robot.wheel_radius_m") / 2
+
+    def supports_x_m(self) -> dict[str, float]:
+        """Place ahead by name of the balls that hold wheels on one axle level; else none."""
+        wheels = self.model.wheels()
+        if not wheels or any(wheel["x_m"] for wheel in wheels):
+            return {}
+        x_m = self.get("robot.body_radius_m") - self.support_radius_m()
+        return {"front_support": x_m, "rear_support": -x_m}
+
     def effects(self) -> list[tuple[str, dict, dict[str, float]]]:
         """Instance name, card and values by parameter of each effect."""
         cards = catalogue_of(self.model)

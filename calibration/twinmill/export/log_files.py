@@ -24,7 +24,8 @@ class ExportedLog:
     Attributes:
         out: the file or the folder.
         files: all that were written.
-        channels: messages by channel.
+        channels: messages of the log by channel.
+        written: messages by topic of a bag or an MCAP file, rows by table.
         warnings: sentences on what is odd in the log, or was left out.
         provenance: command, version, log_sha256 and t0_utime_us, as the files carry them.
     """
@@ -32,6 +33,7 @@ class ExportedLog:
     out: Path
     files: list[Path]
     channels: dict[str, int]
+    written: dict[str, int]
     warnings: list[str]
     provenance: dict
 
@@ -42,6 +44,7 @@ class ExportedLog:
             "files": [str(file) for file in self.files],
             "messages": sum(self.channels.values()),
             "channels": self.channels,
+            "written": self.written,
             "warnings": self.warnings,
             **self.provenance,
         }
@@ -89,22 +92,23 @@ def export_log(
         with needing("export"):
             from twinmill.export.mcap_file import write_mcap
         with replacing(out, force, inputs=[log]) as temporary:
-            write_mcap(recording, temporary, provenance, Body.of(model))
+            written = write_mcap(recording, temporary, provenance, Body.of(model))
     elif to is LogFormat.ROSBAG2:
         with replacing_folder(out, force, inputs=[log], holds=BAG_FILES) as temporary:
-            write_rosbag2(recording, temporary)
+            written = write_rosbag2(recording, temporary)
         if strange := left_out(recording):
             warnings.append(f"ROS has no messages for {', '.join(strange)}: left out.")
     else:
-        files = _write_tables(recording, provenance, out, to, force=force)
+        written = _write_tables(recording, provenance, out, to, force=force)
+        files = [out / f"{name}.{to}" for name in written]
     counts = {channel.name: len(channel.messages) for channel in recording.channels}
-    return ExportedLog(out, files, counts, warnings, provenance)
+    return ExportedLog(out, files, counts, dict(written), warnings, provenance)
 
 
 def _write_tables(
     recording: Recording, provenance: dict, folder: Path, to: LogFormat, *, force: bool
-) -> list[Path]:
-    """One file per table: all are there in the end, or none is new."""
+) -> dict[str, int]:
+    """One file per table: all are there in the end, or none is new. Returns rows by table."""
     with needing("export"):
         from twinmill.export.tables import tables_of, write_csv, write_parquet
     tables = tables_of(recording, provenance)
@@ -121,4 +125,4 @@ def _write_tables(
                 os.replace(whole / file.name, file)
         else:
             put_in_place(whole, folder, force)
-    return files
+    return {name: table.num_rows for name, table in tables.items()}

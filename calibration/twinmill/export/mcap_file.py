@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log as an MCAP file for Foxglove: all channels with all fields, and robots to look at."""
 
+from collections import Counter
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ KINDS = {int: FIELD.TYPE_INT64, float: FIELD.TYPE_DOUBLE, str: FIELD.TYPE_STRING
 OTHER = "#cc79a7"  # colour of robots with another channel prefix
 
 
-def write_mcap(recording: Recording, path: Path, provenance: dict, body: Body) -> int:
+def write_mcap(recording: Recording, path: Path, provenance: dict, body: Body) -> Counter[str]:
     """Writes a log in the order in which it was recorded.
 
     Each channel keeps its name and fields; log time is the recorder's stamp, publish time the
@@ -31,9 +32,10 @@ def write_mcap(recording: Recording, path: Path, provenance: dict, body: Body) -
         body: of all robots.
 
     Returns:
-        How many messages of the log were written.
+        Messages written, by topic.
     """
     robots: dict[str, RobotScene] = {}
+    written: Counter[str] = Counter()
     for channel in recording.channels:
         if channel.type_name in ("pose", "telemetry"):
             color = COLORS.get(channel.prefix, OTHER)
@@ -58,9 +60,11 @@ def write_mcap(recording: Recording, path: Path, provenance: dict, body: Body) -
                 drawn = robot.on_telemetry(message, stamp_us)
             for topic, picture in drawn:
                 writer.write_message(topic, picture, 1000 * stamp_us, 1000 * stamp_us)
+                written[topic] += 1
             sent = _to_protobuf(message)
             writer.write_message(channel.name, sent, 1000 * stamp_us, 1000 * message.utime_us)
-    return len(events)
+            written[channel.name] += 1
+    return written
 
 
 def _to_protobuf(message: Any) -> Any:

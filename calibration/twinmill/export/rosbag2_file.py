@@ -4,6 +4,7 @@
 Bag time is the recorder's stamp; headers have the sender's. Poses that are not valid are left out.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,19 +23,22 @@ KINDS = ("pose", "telemetry", "drive", "detection", "truth", "run")  # that ROS 
 Said = tuple[str, Any]  # topic and message
 
 
-def write_rosbag2(recording: Recording, folder: Path) -> None:
+def write_rosbag2(recording: Recording, folder: Path) -> Counter[str]:
     """Writes the channels of KINDS as topics of each robot, as /r03/pose; with a prefix /twin_r03.
 
     Args:
         recording: what to write.
         folder: of the bag; must not exist.
+
+    Returns:
+        Messages written, by topic.
     """
     with needing("ros"):  # slow to import
         from rosbags.rosbag2 import StoragePlugin, Writer
         from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    speaker, topics = Speaker(store.types), {}
+    speaker, topics, written = Speaker(store.types), {}, Counter()
     known = [c for c in recording.channels if c.type_name in KINDS]
     events = sorted(
         (stamp_us, k, number)
@@ -49,6 +53,8 @@ def write_rosbag2(recording: Recording, folder: Path) -> None:
                 if topic not in topics:
                     topics[topic] = writer.add_connection(topic, kind, typestore=store)
                 writer.write(topics[topic], 1000 * stamp_us, store.serialize_cdr(message, kind))
+                written[topic] += 1
+    return written
 
 
 def left_out(recording: Recording) -> list[str]:

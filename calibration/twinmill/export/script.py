@@ -22,7 +22,7 @@ from twinmill.model.model_file import write_whole
 TOPIC = "/cmd_vel"
 PERIOD_S = 0.05
 TWIST = "geometry_msgs/msg/Twist"
-BAG_VERSION = 9  # of rosbag2's metadata: Iron and later
+BAG_VERSION = 9  # of rosbag2's metadata: Jazzy and later
 BAG_FILES = ("metadata.yaml", "*.db3", "*.mcap")  # of a bag that was written here
 
 

@@ -48,6 +48,7 @@ def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
         inertia_kgm2=robot.hull_inertia_kgm2(),
     )
     _camera(base, robot, body_m)
+    _supports(base, robot)
     for wheel in robot.model.wheels():
         _wheel(model, robot, wheel)
     if robot.model.wheel_kind in DRIVES:
@@ -97,6 +98,18 @@ def _camera(base: ET.Element, robot: RobotModel, x_m: float) -> None:
     _text(clip, "far", _n(max(detection["range_m"], 0.02)))
 
 
+def _supports(base: ET.Element, robot: RobotModel) -> None:
+    """Balls without friction under the hull, as castors."""
+    radius_m = robot.support_radius_m()
+    for name, x_m in robot.supports_x_m().items():
+        for use in ("visual", "collision"):
+            part = ET.SubElement(base, use, name=f"{name}_{use}")
+            _text(part, "pose", _n(x_m, 0, -HULL_HEIGHT_M / 2 - radius_m, 0, 0, 0))
+            ball = ET.SubElement(ET.SubElement(part, "geometry"), "sphere")
+            _text(ball, "radius", _n(radius_m))
+        _friction(part, "0", "0")
+
+
 def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
     name, radius_m = wheel["name"], robot.get("robot.wheel_radius_m")
     heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
@@ -128,12 +141,18 @@ def _grip(collision: ET.Element, robot: RobotModel, wheel: dict) -> None:
     shape = collision.find("geometry")
     shape.clear()
     _text(ET.SubElement(shape, "sphere"), "radius", _n(robot.get("robot.wheel_radius_m")))
-    surface = ET.SubElement(collision, "surface")
-    ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
-    _text(ode, "mu", "1")
-    _text(ode, "mu2", "0" if robot.model.wheel_kind in ROLLERS else _n(PLAIN_GRIP))
+    across = "0" if robot.model.wheel_kind in ROLLERS else _n(PLAIN_GRIP)
+    ode = _friction(collision, "1", across)
     expressed = {f"{prefix}:expressed_in": "base_link" for prefix in PREFIXES}
     ET.SubElement(ode, "fdir1", expressed).text = _n(*wheel["grip"], 0)
+
+
+def _friction(collision: ET.Element, along: str, across: str) -> ET.Element:
+    surface = ET.SubElement(collision, "surface")
+    ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
+    _text(ode, "mu", along)
+    _text(ode, "mu2", across)
+    return ode
 
 
 def _drive(model: ET.Element, robot: RobotModel) -> None:

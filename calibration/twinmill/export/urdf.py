@@ -2,6 +2,7 @@
 """A model as URDF: the body, wheels on continuous joints, and the camera's frame."""
 
 import xml.etree.ElementTree as ET
+from copy import deepcopy
 
 import numpy as np
 
@@ -21,7 +22,7 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
     wheel_m, body_m = robot.get("robot.wheel_radius_m"), robot.get("robot.body_radius_m")
     ET.SubElement(root, "link", name="base_footprint")
     _joint(root, "base_joint", "fixed", "base_footprint", child="base_link", place=(0, 0, wheel_m))
-    _solid(
+    base = _solid(
         root=root,
         name="base_link",
         place=(0, 0, HULL_HEIGHT_M / 2),
@@ -31,6 +32,7 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
         mass_kg=robot.hull_mass_kg,
         inertia_kgm2=robot.hull_inertia_kgm2(),
     )
+    _supports(base, robot)
     for wheel in robot.model.wheels():
         _wheel(root, robot, wheel)
     pan_rad = robot.model.detection_model()["pan_rad"]
@@ -56,13 +58,28 @@ def _left(robot: RobotModel) -> list[Left]:
         *robot.base_left(why),
         Left("sensor", why),
     ]
+    if robot.supports_x_m():
+        why = "URDF has no friction; tell the program that front_support and rear_support slide"
+        left.append(Left("friction", why))
     return [*left, *robot.left_effects(("view_pan",), "URDF")]
 
 
+def _supports(base: ET.Element, robot: RobotModel) -> None:
+    """Balls under the hull, as castors."""
+    radius_m = robot.support_radius_m()
+    for name, x_m in robot.supports_x_m().items():
+        for use in ("visual", "collision"):
+            place = (x_m, 0, -radius_m)
+            _shape(base, use, place, (0, 0, 0), name=name, shape=_ball(radius_m))
+
+
 def _wheel(root: ET.Element, robot: RobotModel, wheel: dict) -> None:
-    """Turns about its axle (z of its link, to the left of where it rolls)."""
+    """Turns about its axle (z of its link, to the left of where it rolls).
+
+    Touches in one point, as a ball does: a cylinder drags its edges through curves.
+    """
     name, radius_m = wheel["name"], robot.get("robot.wheel_radius_m")
-    _solid(
+    link = _solid(
         root=root,
         name=f"{name}_wheel",
         place=(0, 0, 0),
@@ -72,6 +89,7 @@ def _wheel(root: ET.Element, robot: RobotModel, wheel: dict) -> None:
         mass_kg=robot.wheel_mass_kg,
         inertia_kgm2=robot.wheel_inertia_kgm2(),
     )
+    link.find("collision/geometry")[:] = [_ball(radius_m)]
     heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
     place, turned = (wheel["x_m"], wheel["y_m"], 0), (-np.pi / 2, 0, heading_rad)
     joint = _joint(
@@ -99,7 +117,7 @@ def _solid(
     length_m: float,
     mass_kg: float,
     inertia_kgm2: tuple[float, float, float],
-) -> None:
+) -> ET.Element:
     """A link that is a full cylinder along z."""
     link = ET.SubElement(root, "link", name=name)
     inertial = ET.SubElement(link, "inertial")
@@ -107,11 +125,28 @@ def _solid(
     ET.SubElement(inertial, "mass", value=f"{mass_kg:.9g}")
     diagonal = dict(zip(("ixx", "iyy", "izz"), (f"{v:.9g}" for v in inertia_kgm2), strict=True))
     ET.SubElement(inertial, "inertia", ixy="0", ixz="0", iyz="0", **diagonal)
-    for kind in ("visual", "collision"):
-        part = ET.SubElement(link, kind)
-        _origin(part, place, turned)
-        shape = ET.SubElement(part, "geometry")
-        ET.SubElement(shape, "cylinder", radius=f"{radius_m:.9g}", length=f"{length_m:.9g}")
+    cylinder = ET.Element("cylinder", radius=f"{radius_m:.9g}", length=f"{length_m:.9g}")
+    for use in ("visual", "collision"):
+        _shape(link, use, place, turned, name=name, shape=cylinder)
+    return link
+
+
+def _shape(
+    link: ET.Element,
+    use: str,
+    place: tuple[float, ...],
+    turned: tuple[float, ...],
+    *,
+    name: str,
+    shape: ET.Element,
+) -> None:
+    part = ET.SubElement(link, use, name=name)
+    _origin(part, place, turned)
+    ET.SubElement(part, "geometry").append(deepcopy(shape))
+
+
+def _ball(radius_m: float) -> ET.Element:
+    return ET.Element("sphere", radius=f"{radius_m:.9g}")
 
 
 def _joint(
