@@ -179,7 +179,7 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
 
 
 def _told_early(names: list[str], state: State, is_stopped: bool) -> str:
-    """What became of robots before they were stopped."""
+    """Sentence on robots that had ended before they were stopped."""
     if not state.stands:
         return f"{', '.join(names)} {state.words}"
     return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {state.words}"
