@@ -83,7 +83,7 @@ TEST(YawLag, AddsToTheOneThatTheModelHas)
     }
 }
 
-// Two events may lie nearer to each other than exp() can tell: then nothing moves, and all stays finite.
+// Two events may lie nearer to each other than exp() can tell: nothing moves, and all stays finite.
 TEST(YawLag, HoldsThroughAStepTooShortToSee)
 {
     constexpr double dt_s = 1e-18;
