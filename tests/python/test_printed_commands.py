@@ -117,6 +117,8 @@ def check_named(line: str) -> None:
     given = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
     if program == "twinmill" and words[0] in ("--help", "--install-completion"):
         return
+    if program == "twinmill" and len(words) == 1 and words[0] in cli.GROUPS:  # lists its commands
+        return
     if program == "twinmill" and not words[0].startswith("<"):
         name, *words = words
         command = COMMANDS[name].command()

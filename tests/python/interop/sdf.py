@@ -51,8 +51,11 @@ def held_by_sdformat(path: Path) -> str:
     return subprocess.check_output([sys.executable, "-c", code], text=True)
 
 
-def _write_three(folder: Path) -> None:
-    """Robots on mecanum wheels, on three omni wheels, and on plain ones."""
+def _write_robots(folder: Path) -> None:
+    """Robots on mecanum wheels, on three omni wheels, and on plain ones, four and two."""
+    one_axle = TEXT.replace(f"half_wheelbase_m = {HALF_WHEELBASE_M}", "half_wheelbase_m = 0")
+    text = one_axle.replace('"mecanum"', '"differential"')
+    write(folder, "sdf", text).rename(folder / "two.sdf")
     for wheels in ("differential", "omni3", "mecanum"):
         text = TEXT.replace('"mecanum"', f'"{wheels}"')
         write(folder, "sdf", text).rename(folder / f"{wheels}.sdf")
@@ -63,7 +66,7 @@ def _write_three(folder: Path) -> None:
     "Gazebo Fortress, its physics (DART)",
     "libignition-physics5-dartsim-plugin5",
     "libignition-physics-sdf-dev",
-    ours=_write_three,
+    ours=_write_robots,
 )
 def gazebo(folder: Path) -> Told:
     """The engine that Gazebo loads, without the program around it: its joints held at speeds."""
@@ -78,6 +81,8 @@ def gazebo(folder: Path) -> Told:
     for way in ("ahead", "turning"):
         told[f"four plain wheels: {way}"] = _drives(folder, "differential", WAYS[way])
     curve = (0.15, 0, 0.8)
+    ways = (WAYS["ahead"], WAYS["turning"], curve)
+    told["two plain wheels"] = all(_drives(folder, "two", way) for way in ways)
     told["four plain wheels: middle of a curve"] = _drives(folder, "differential", curve)
     return told
 
@@ -115,8 +120,9 @@ def _rims_mps(wheels: str, vx: float, vy: float, omega: float) -> dict[str, floa
         return {k: vy * math.cos(a) - vx * math.sin(a) + turn_mps for k, a in at_rad.items()}
     sides = {"fl": -1, "fr": 1, "rl": 1, "rr": -1}
     turns = {"fl": -1, "fr": 1, "rl": -1, "rr": 1}
-    if wheels == "differential":
-        return {k: vx + turns[k] * HALF_TRACK_M * omega for k in sides}
+    plain = {"differential": sides, "two": ("fl", "fr")}
+    if wheels in plain:
+        return {k: vx + turns[k] * HALF_TRACK_M * omega for k in plain[wheels]}
     lever_m = HALF_TRACK_M + HALF_WHEELBASE_M
     return {k: vx + sides[k] * vy + turns[k] * lever_m * omega for k in sides}
 
