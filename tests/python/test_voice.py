@@ -15,6 +15,7 @@ from twinmill_cli.swarm import ended_by_signals
 from twinmill_cli.voice import Voice
 
 BLOCKED_S = 0.3
+WRITTEN = 1_000_000  # bytes: far more than a pipe holds
 
 
 class SilentBus:
@@ -51,13 +52,16 @@ def test_who_gives_words_never_waits_until_they_are_written(voice):
     """As at a halted terminal: the writer blocks in a pipe until somebody reads it."""
     reads, writes = os.pipe()
     begin_s = time.monotonic()
-    voice.tell(lambda: os.write(writes, b"x" * 1_000_000))
+    voice.tell(lambda: os.write(writes, bytes(WRITTEN)))
     voice.say("another word")
     assert time.monotonic() - begin_s < BLOCKED_S and not voice.is_idle
     time.sleep(BLOCKED_S)
     assert not voice.is_idle
-    while not voice.is_idle:
-        os.read(reads, 1_000_000)
+    left = WRITTEN
+    while left:
+        left -= len(os.read(reads, left))
+    wait_until_idle(voice)
+    assert voice.is_idle
     os.close(reads)
     os.close(writes)
     voice.check()
