@@ -278,6 +278,18 @@ def _of_cut(robot: RobotLog, ends: np.ndarray, *, gap: bool, lost: bool, moves: 
     return f"cut at {begin_s:.3f} s: {what} for {end_s - begin_s:.3f} s, then {moved_m:.3f} m away."
 
 
+def without(segment: np.ndarray, cut: np.ndarray) -> np.ndarray:
+    """(N,) numbers of the stretches that are left of those of a track, without poses that are cut.
+
+    Args:
+        segment: (N,) as in Track.
+        cut: (N,) bool.
+    """
+    kept = np.where(cut, -1, segment)
+    begins = (kept >= 0) & (np.diff(kept, prepend=-1) != 0)
+    return np.where(kept >= 0, np.cumsum(begins) - 1, -1)
+
+
 def _segments(
     robot: RobotLog, index: np.ndarray, begins: np.ndarray, notes: list[str]
 ) -> np.ndarray:

@@ -22,6 +22,7 @@ from twinmill.data.checks import (
 )
 from twinmill.data.checks.bodies import give_back
 from twinmill.data.checks.lateness import Lateness
+from twinmill.data.cuts import without
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
 from twinmill.data.time_base import TimeBase, find_time_base, retimed
@@ -147,11 +148,9 @@ class Measurement:
         inside = np.zeros(len(t_s), bool)
         for begin_s, end_s in stretches_s:
             inside |= (t_s >= begin_s) & (t_s <= end_s)
-        kept = np.where(inside, -1, segment)
-        begins = (kept >= 0) & (np.diff(kept, prepend=-1) != 0)
-        number = np.where(kept >= 0, np.cumsum(begins) - 1, -1)
         smooth_rad = np.where(inside, np.nan, self.track.heading_smooth)
-        track = replace(self.track, segment=number, heading_smooth=smooth_rad)
+        kept = without(segment, inside)
+        track = replace(self.track, segment=kept, heading_smooth=smooth_rad)
         return replace(self, track=track, warnings=[*self.warnings, why])
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from twinmill.data.cuts import without
 from twinmill.data.track import Track
 
 CORNER = 1.25  # times a body's radius: corners of a nearly square one stand out (TurboPi: 1.24)
@@ -29,8 +30,4 @@ def apart(track: Track, others: Sequence[Track], body_radius_m: float) -> Track:
             )
             away_m = np.hypot(track.pose[:, 0] - x_m, track.pose[:, 1] - y_m)
             touching |= away_m < 2 * CORNER * body_radius_m
-    if not touching.any():
-        return track
-    kept = np.where(touching, -1, track.segment)
-    begins = (kept >= 0) & (np.diff(kept, prepend=-1) != 0)
-    return replace(track, segment=np.where(kept >= 0, np.cumsum(begins) - 1, -1))
+    return replace(track, segment=without(track.segment, touching)) if touching.any() else track
