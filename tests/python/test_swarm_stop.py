@@ -2,6 +2,7 @@
 """`twinmill swarm stop` where nobody answers: a person sees at once what it waits for."""
 
 import os
+import signal
 import time
 
 from twinmill_cli import swarm
@@ -21,6 +22,21 @@ def test_a_stop_that_nobody_hears_says_at_once_what_it_waits_for(monkeypatch, tm
     code, out, _ = twinmill("swarm", "stop", "--lcm-url", url, "--timeout-s", "2")
     assert code == 1 and len(said_s) == 1 and said_s[0] < 1.5
     assert "No robot was heard" in out and "--host" in out
+
+
+def test_a_stop_outlives_the_terminal_that_it_came_from(monkeypatch, tmp_path, twinmill):
+    """As where ssh breaks off while robots out of reach have not yet signed."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    ended = []
+    monkeypatch.setattr(swarm, "_waiting_words", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
+    before = signal.signal(signal.SIGHUP, lambda *_: ended.append("hung up"))
+    try:
+        code, out, _ = twinmill("swarm", "stop", "--lcm-url", "memq://", "--timeout-s", "2")
+        assert code == 1 and "No robot was heard" in out and not ended
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert ended == ["hung up"]
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_who_never_commanded_a_robot_gets_no_key_by_stopping_or_looking(

@@ -283,7 +283,7 @@ def _stop(
     """
     asked = parse_robots(robots or None)  # an empty list is no reason to stop nobody
     operator_key, fault = _key_if_there(key)
-    with saying_nothing() as say:
+    with outliving_its_terminal(), saying_nothing() as say:
         hosts, fleet = tell.Hosts(host or ()), Fleet(lcm_url, channel_prefix, key=operator_key)
         given = tell.stop(
             fleet,
@@ -304,6 +304,16 @@ def _driving(fleet: Fleet, asked: set[int]) -> list[str]:
     """Robots that drive and were not asked; nobody was asked where all were."""
     others = [fleet.robots[i] for i in sorted(set(fleet.robots) - asked)] if asked else []
     return [f"R{r.robot_id:02d}" for r in others if r.mode in DRIVING and r.is_here]
+
+
+@contextmanager
+def outliving_its_terminal() -> Iterator[None]:
+    """A closed terminal or a lost ssh connection ends nothing before the robots have signed."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 @contextmanager
