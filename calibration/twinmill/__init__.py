@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import fit as fit
     from twinmill.api import import_log as import_log
     from twinmill.api import infer as infer
+    from twinmill.api import infer_robots as infer_robots
     from twinmill.api import load as load
     from twinmill.api import next_run as next_run
     from twinmill.api import simulate as simulate

@@ -1831,8 +1831,9 @@ def infer_robots(
         ModelError: the model cannot be read.
 
     Examples:
-        >>> {robot: found.verdict for robot, found in tm.infer_robots("swarm.lcmlog").items()}
-        {1: 'model_adequate', 2: 'effect_missing'}
+        >>> found = tm.infer_robots(log, "fitted.toml")
+        >>> {robot: one.findings[0].effect for robot, one in found.items()}
+        {0: 'coasting'}
     """
     log, model = _log(log), _model(model)
     measurements = log.measurements(model)

@@ -88,7 +88,7 @@ def test_speed_and_steering_angle_are_read_with_the_wheelbase(case, imported):
     """Omega = v tan(steering) / wheelbase; the truth has a lag of 0.10 s and a gain of 1."""
     folder = case("steering_csv")
     words = ["--poses", folder / "poses.csv", "--commands", folder / "commands.csv"]
-    with pytest.raises(AssertionError, match="--wheelbase-m METRES"):
+    with pytest.raises(AssertionError, match="distance of the axles in m, --wheelbase-m"):
         imported(*words, "--same-clock")
     log, _ = imported(*words, "--same-clock", "--wheelbase-m", 0.3)
     _, _, speed, steering = rows_of(folder / "commands.csv").T
@@ -130,7 +130,12 @@ def test_poses_alone_make_a_log_and_what_needs_commands_says_so(case, imported, 
     assert twinmill("export", out, "--to", "csv", "-o", tmp_path / "o.csv")[0] == 0
     for words in (["compare"], ["diagnose"], ["fit", "-o", tmp_path / "m.toml"]):
         code, _, wrong = twinmill(*words, out, "--model", case("models") / "twist.toml")
-        assert code and "no commands of it" in wrong and "import --commands" in wrong
+        assert (
+            code
+            and "no commands of it" in wrong
+            and "import anew" in wrong
+            and "--commands" in wrong
+        )
     words = ["--heading-from-path", "--same-clock"]
     for word in words:
         code, _, wrong = twinmill("import", "--poses", folder / "poses.csv", word, "-o", "x.lcmlog")

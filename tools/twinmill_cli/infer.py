@@ -100,7 +100,7 @@ def _infer(
     if as_json:
         deliver(data, None, as_json)
     else:
-        from twinmill.report.inference import terminal  # slow to import, and JSON needs none
+        from twinmill.report.inference import terminal_of_robots  # slow, and JSON needs none
 
-        deliver(data, terminal(results), as_json)
+        deliver(data, terminal_of_robots(results), as_json)
     return results

@@ -36,11 +36,11 @@ def sentence(answer: Answer) -> str:
     return f"Missing: {names}{_on(answer)}."
 
 
-def terminal(results: list[Inference]) -> RenderableType:
-    """What `twinmill infer` prints: of one robot all, of several what is missing of each."""
+def terminal_of_robots(results: list[Inference]) -> RenderableType:
+    """Text of `twinmill infer`: of one robot all, of several what is missing of each."""
     if len(results) > 1:
         return Group(show.table(_robots(results)), Text(ONE_BY_ONE))
-    return _of_one(results[0])
+    return terminal(results[0])
 
 
 def _robots(results: list[Inference]) -> Table:
@@ -56,7 +56,8 @@ def _robots(results: list[Inference]) -> Table:
     return Table("Each robot by itself", ["robot", "answer", "numbers"], rows, words=(0, 1, 2))
 
 
-def _of_one(result: Inference) -> RenderableType:
+def terminal(result: Inference) -> RenderableType:
+    """Text on one robot: verdict, effects, dependences, and what is no news."""
     answer = result.answer
     parts: list[RenderableType] = [Text(sentence(answer)), Text()]
     if answer.findings:
