@@ -320,22 +320,15 @@ def test_a_robot_on_two_wheels_stays_level_and_drives_as_told(told, folder, mode
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / "simulators.md").read_text(), re.DOTALL)
     (block,) = [b for b in blocks if "better.urdf" in b]
     exec(block, names := {"mujoco": mujoco})
-    spec, plane = names["spec"], mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(type=plane, size=[5, 5, 0.1])
-    spec.option.timestep, spec.option.integrator = 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    for side in ("fl", "fr"):
-        servo = spec.add_actuator(name=side, target=f"{side}_wheel_joint")
-        servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
-        servo.set_to_velocity(kv=0.5)
-    data = mujoco.MjData(model := spec.compile())
+    data = mujoco.MjData(model := names["free"])
     v_mps, w_radps = told
     rims_mps = v_mps + w_radps * 0.067 * np.array([-1, 1])
     data.ctrl[:] = rims_mps / 0.0325
-    mujoco.mj_step(model, data, 500)
+    mujoco.mj_step(model, data, 250)
     tilts_deg = []
-    for _ in range(1000):
+    for _ in range(500):
         mujoco.mj_step(model, data)
-        tilts_deg.append(np.degrees(np.arccos(data.body("base_footprint").xmat[8])))
+        tilts_deg.append(np.degrees(np.arccos(min(1.0, data.body("base_footprint").xmat[8]))))
     assert max(tilts_deg) < 0.5
     assert data.qvel[5] == pytest.approx(w_radps, abs=0.03)
     assert np.hypot(*data.qvel[:2]) == pytest.approx(abs(v_mps), abs=0.005)
