@@ -85,14 +85,15 @@ def _infer(
         check_new_file(keep, force, [model_file.path, *logs, *own])
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
         measurements = load(logs, model_file)
+        robots = {track.robot_id for _, track in measurements.tracks}
+        if keep is not None and len(robots) > 1:
+            raise ValueError(
+                f"infer: --keep writes what one robot's log tells, and these are {len(robots)} "
+                "robots; give logs of the one that the model was fitted to."
+            )
         before = load(own, model_file) if own else ()
         results = infer_robots(measurements, model_file, before, progress)
     if keep is not None:
-        if len(results) > 1:
-            raise ValueError(
-                f"infer: --keep writes what one robot's log tells, and these are {len(results)} "
-                "robots; give logs of the one that the model was fitted to."
-            )
         with_kept(model_file, results[0].always, keep, source.command).write(force)
     each = [result.to_json() for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
