@@ -63,6 +63,13 @@ def processes(robot):
     return {"driver": robot.children()[0], "parent": robot.process.pid, "guard": robot.guards()[0]}
 
 
+def kill(number, *pids):
+    """Signals each that still runs: whoever saw another's end may have stopped the board and be done."""
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
+
+
 ROLES = ("driver", "parent", "guard")
 SOME = [*itertools.combinations(ROLES, 1), *itertools.combinations(ROLES, 2)]
 
@@ -72,8 +79,7 @@ SOME = [*itertools.combinations(ROLES, 1), *itertools.combinations(ROLES, 2)]
 def test_whoever_is_left_stops_the_wheels(driving, roles, number):
     pids = processes(driving)
     begin_s = time.monotonic()
-    for role in roles:
-        os.kill(pids[role], number)
+    kill(number, *(pids[role] for role in roles))
     if roles == ("guard",) and number == signal.SIGKILL:
         # The parent starts another: nothing is lost for long.
         assert wait_until(lambda: driving.guards() not in ([], [pids["guard"]]))
@@ -88,9 +94,7 @@ def test_a_stop_needs_no_file_that_cannot_be_opened(driving, killed):
     for pid in pids.values():
         resource.prlimit(pid, resource.RLIMIT_NOFILE, (3, 3))
     begin_s = time.monotonic()
-    for role in killed:
-        with contextlib.suppress(ProcessLookupError):  # it had stopped the board, and was done
-            os.kill(pids[role], signal.SIGKILL)
+    kill(signal.SIGKILL, *(pids[role] for role in killed))
     assert stands_for_good(driving, begin_s) < LIMIT_S + SLACK_S
 
 
@@ -148,9 +152,7 @@ def test_killall_leaves_the_guard(driving):
 @pytest.mark.parametrize("number", [signal.SIGTSTP, signal.SIGQUIT, signal.SIGUSR1])
 def test_keys_of_a_terminal_leave_no_wheel_turning(driving, number):
     begin_s = time.monotonic()
-    for pid in (driving.process.pid, *driving.children()):
-        with contextlib.suppress(ProcessLookupError):  # the first may have ended the second
-            os.kill(pid, number)
+    kill(number, driving.process.pid, *driving.children())
     if number == signal.SIGUSR1:  # nothing that asks it to end
         time.sleep(0.3)
         assert driving.wait_for(LEFT)  # a frame that came late may have stopped it for a moment
