@@ -64,7 +64,7 @@ def processes(robot):
 
 
 def kill(number, *pids):
-    """Signals each that still runs: whoever saw another's end may have stopped the board and be done."""
+    """Signals each that still runs: one that saw another end may have stopped the board already."""
     for pid in pids:
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, number)
