@@ -58,6 +58,7 @@ class Answer:
             cannot_tell.
         findings: effects, the one worth most first.
         nothing, outside: probabilities that nothing is missing, and that something nameless is.
+        stale: probability that the base is known no better than a data sheet.
         effects: probability of each effect that was fitted, likeliest first.
         depends_on: what is left depends on, likeliest first, each with its probability.
         share: of the excess squared error that the likeliest dependence takes.
@@ -67,6 +68,7 @@ class Answer:
     findings: list[Named]
     nothing: float
     outside: float
+    stale: float
     effects: dict[str, float]
     depends_on: dict[str, float]
     share: float
@@ -79,6 +81,7 @@ class Answer:
             "probability": {
                 "nothing": self.nothing,
                 "outside": self.outside,
+                "stale": self.stale,
                 "effects": self.effects,
             },
             "rest": {
@@ -99,16 +102,17 @@ def answer(table: Table) -> Answer:
     best = _likeliest(every, lambda b: tuple(sorted(b.fitted))) if something else ()
     named = [_named(name, best, every, table) for name in _by_worth(best, table)]
     findings = [f for f in named if f.probability >= PRIORS.member]
+    stale = sum(b.probability for b in every if b.entry.stale)
     if not something:
-        stale = sum(b.probability for b in every if b.nothing and b.entry.stale)
-        verdict = "refit_enough" if stale > nothing / 2 else "model_adequate"
+        refit = sum(b.probability for b in every if b.nothing and b.entry.stale)
+        verdict = "refit_enough" if refit > nothing / 2 else "model_adequate"
         verdict = verdict if nothing >= 0.5 else "cannot_tell"
     elif outside >= 0.5 or not findings:
         verdict = "outside_catalogue"
     else:
         verdict = "ambiguous" if findings[0].certainty == "group" else "effect_missing"
     words, share = _rest(best, every, table) if something else ({}, 0.0)
-    return Answer(verdict, findings, nothing, outside, _of_each(every), words, share)
+    return Answer(verdict, findings, nothing, outside, stale, _of_each(every), words, share)
 
 
 def _of_each(every: list[Belief]) -> dict[str, float]:

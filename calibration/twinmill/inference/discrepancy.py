@@ -69,6 +69,8 @@ def _of_time(m: Motion) -> Iterator[Form]:
         yield f"{name} gain", _gains(m, w, "all"), share
         yield f"{name} gain of travel", _gains(m, w, "travel"), share
         yield f"{name} gain of turns", _gains(m, w, "turn"), share
+        if name == "slow":
+            yield f"{name} way aside", _aside(m, w), share
     w, share = _waves(m.t_s, 8.0, 4.0)
     yield "push", _pushes(m, w, "room"), np.tile(share, 2)
     yield "turning", _pushes(m, w, "turn"), share
@@ -80,10 +82,16 @@ def _of_place(m: Motion) -> Iterator[Form]:
     yield "gain of all", _gains(m, w, "all"), share
     yield "gain of turns", _gains(m, w, "turn"), share
     yield "push", _pushes(m, w, "room"), np.tile(share, 2)
+    yield "push of the body", _pushes(m, w, "body"), np.tile(share, 2)
     yield "turning", _pushes(m, w, "turn"), share
+    yield "way aside", _aside(m, w), share
     (wx, share_x), (wy, share_y) = (_waves(p, 0.4, 0.12) for p in m.place.T)
     both = np.concatenate([share_x, share_y]) / 2
-    yield "strips both ways", _gains(m, np.concatenate([wx, wy]), "travel"), both
+    strips = np.concatenate([wx, wy])
+    yield "strips both ways", _gains(m, strips, "travel"), both
+    yield "strips both ways, of all", _gains(m, strips, "all"), both
+    yield "push of the body by strips", _pushes(m, strips, "body"), np.tile(both, 2)
+    yield "turning by strips", _pushes(m, strips, "turn"), both
     yield "strips along x", _gains(m, wx, "travel"), share_x
     yield "strips along y", _gains(m, wy, "travel"), share_y
 
@@ -99,6 +107,7 @@ def _of_heading(m: Motion) -> Iterator[Form]:
     yield "gain, up to four times a turn", _gains(m, np.concatenate([low, high]), "all"), 1 / 8
     course = m.heading + np.arctan2(m.moved[:, 1], m.moved[:, 0])
     yield "gain by course", _gains(m, _harmonics(course, (1, 2, 4)), "travel"), 1 / 6
+    yield "way aside by course", _aside(m, _harmonics(course, (1, 2, 4))), 1 / 6
 
 
 def _of_speed(m: Motion) -> Iterator[Form]:
@@ -118,6 +127,9 @@ def _of_speed(m: Motion) -> Iterator[Form]:
         for k in range(3)
     ]
     yield "curve that differs backwards", np.concatenate(signed), 1 / 4
+    fast = _hats(speed, m.top[3], NODES)[1:]
+    yield "push of the body", _pushes(m, fast, "body"), 1 / 4
+    yield "turning", _pushes(m, fast, "turn"), 1 / 4
 
 
 def _of_coupling(m: Motion) -> Iterator[Form]:
@@ -156,6 +168,14 @@ def _of_past(m: Motion) -> Iterator[Form]:
         for n in (0, 1, 2, 4, 7)
     ]
     yield "after a rise or a fall", np.array(events), 0.3
+    back = [
+        np.exp(-_way_since_back(m.moved[:, k]) / (n * m.top[k]))
+        for n in (0.7, 2)
+        for k in (0, 1, 2)
+    ]
+    own = [b[:, None] * m.moved * axes[k % 3] for k, b in enumerate(back)]
+    yield "after turning back", np.array(own), 1 / 2
+    yield "turning after turning back", _pushes(m, np.array(back), "turn"), 1 / 6
 
 
 def _terms(terms, usual: np.ndarray) -> np.ndarray:
@@ -164,6 +184,16 @@ def _terms(terms, usual: np.ndarray) -> np.ndarray:
     for k, (term, axis) in enumerate(terms):
         out[k, :, axis] = term * usual[axis]
     return out
+
+
+def _way_since_back(moved: np.ndarray) -> np.ndarray:
+    """(W,) way along an axis since it was driven the other way, in the unit of `moved`."""
+    way, sign = np.zeros(len(moved)), np.sign(moved)
+    for k in range(1, len(moved)):
+        back = sign[k] and sign[k] != sign[k - 1]
+        sign[k] = sign[k] or sign[k - 1]
+        way[k] = 0.0 if back else way[k - 1] + abs(moved[k - 1])
+    return way
 
 
 def _later(values: np.ndarray, steps: int) -> np.ndarray:
@@ -177,6 +207,11 @@ def _gains(m: Motion, waves: np.ndarray, which: str) -> np.ndarray:
     """(K, W, 3) displacements scaled by (K, W) waves: of travel, turns, or all alike."""
     on = {"travel": (1, 1, 0), "turn": (0, 0, 1), "all": (1, 1, 1)}[which]
     return waves[:, :, None] * (m.moved * on)
+
+
+def _aside(m: Motion, waves: np.ndarray) -> np.ndarray:
+    """(K, W, 3) displacements led aside by (K, W) waves: a heading that is off does the same."""
+    return waves[:, :, None] * np.column_stack([-m.moved[:, 1], m.moved[:, 0], 0 * m.t_s])
 
 
 def _pushes(m: Motion, waves: np.ndarray, frame: str) -> np.ndarray:

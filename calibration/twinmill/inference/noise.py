@@ -23,6 +23,7 @@ ROWS = 60  # of the banded Toeplitz matrix whose last Cholesky row is the MA par
 MEMORY_S = (0.02, 2.0)  # shorter is white over a step, longer is a dependence on time
 LEAST = 5e-5, 1e-4  # sensor in m or rad, drive in m/s or rad/s: a tenth of a good capture's
 EVALUATIONS = 45  # of the simplex: its evidence is flat within half a unit by then
+SEEN = 0.5  # information in units of the prior, below which a direction says nothing of the noise
 HEAVY = 5.0  # standard deviations, beyond which a step weighs as under Student's t
 
 
@@ -60,6 +61,15 @@ class Noise:
         scales = [self._filters[c][2] for c in np.flatnonzero(observed)]
         found = count * float(np.sum(np.log(scales)))
         return found if self.weight is None else found - float(np.log(self.weight[observed]).sum())
+
+    def log_odds(self, usual: "Noise") -> float:
+        """Log prior of such a noise over that of the usual one: one unit of the logarithms wide."""
+        return -0.5 * float(np.sum((self.logs - usual.logs) ** 2))
+
+    @property
+    def logs(self) -> np.ndarray:
+        """(3, 3) logarithms of sensor, drive and memory of each channel."""
+        return np.log([self.sensor, self.drive, self.memory_s])
 
     @cached_property
     def _filters(self) -> list[tuple[np.ndarray, np.ndarray, float]]:
@@ -102,24 +112,39 @@ def fit_noise(errors: np.ndarray, columns: np.ndarray, stretches, begin: Noise) 
         stretches: of the steps.
         begin: where to begin, with a weak prior of one unit of the logarithms about it.
     """
-    logs = np.log([begin.sensor, begin.drive, begin.memory_s])
+    logs = begin.logs
     for c in range(3):
-        used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
-        both = np.concatenate([errors[None, :, c], columns[used][:, :, c]])
-        if np.any(both[0]):
+        if np.any(errors[:, c]):
+            used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
+            own = _seen(columns[used][:, :, c], stretches, logs[:, c], begin.step_s)
+            both = np.concatenate([errors[None, :, c], own])
             logs[:, c] = _fit_channel(both, stretches, logs[:, c], begin.step_s)
     sensor, drive, memory = np.exp(logs)
     return replace(begin, sensor=sensor, drive=drive, memory_s=np.clip(memory, *MEMORY_S))
+
+
+def _white(
+    rows: np.ndarray, stretches, logs: np.ndarray, step_s: float
+) -> tuple[np.ndarray, float]:
+    """(K, W) white rows of one channel under a noise, and the scale of its innovations."""
+    a = np.exp(-step_s / np.clip(np.exp(logs[2]), *MEMORY_S))
+    ar, ma, scale = arma(np.exp(logs[0]), np.exp(logs[1]), a)
+    parts = [lfilter(ar, ma, rows[:, k], axis=1) for k in stretches]
+    return np.concatenate(parts, axis=1) / scale, scale
+
+
+def _seen(columns: np.ndarray, stretches, logs: np.ndarray, step_s: float) -> np.ndarray:
+    """(K', W) directions of (K, W) columns of which a channel tells more than their prior does."""
+    white, _ = _white(columns, stretches, logs, step_s)
+    values, ways = np.linalg.eigh(white @ white.T)
+    return ways[:, values > SEEN].T @ columns
 
 
 def _fit_channel(both: np.ndarray, stretches, start: np.ndarray, step_s: float) -> np.ndarray:
     """(3,) logarithms of sensor, drive and memory; `both` holds (1 + K, W) errors and columns."""
 
     def cost(logs: np.ndarray) -> float:
-        a = np.exp(-step_s / np.clip(np.exp(logs[2]), *MEMORY_S))
-        ar, ma, scale = arma(np.exp(logs[0]), np.exp(logs[1]), a)
-        parts = [lfilter(ar, ma, both[:, k], axis=1) for k in stretches]
-        white = np.concatenate(parts, axis=1) / scale
+        white, scale = _white(both, stretches, logs, step_s)
         found = log_evidence(white[0], white[1:]) - white.shape[1] * np.log(scale)
         return -found + 0.5 * float(np.sum((logs - start) ** 2))
 

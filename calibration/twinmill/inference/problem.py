@@ -27,7 +27,6 @@ CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between 
 FINE_GRID_S = np.arange(-0.05, 0.0501, 0.002)  # about that, where logs are set side by side
 CLOCK_REACH_S = 0.3  # about the best of the grid
 FLEXIBLE = 0.05  # gain error of each kernel while noise is looked for first
-SEEN = 0.5  # information in units of the prior, below which a direction says nothing of the noise
 NO_LAG_S = 1e-3
 
 
@@ -42,7 +41,7 @@ class View:
         parts: of each kernel in these.
         grams: of each kernel, (K, K) products.
         moments: white columns of moments, and their products, as `moments.find` takes them.
-        log_size: of the noise.
+        log_size: of the noise, less its log prior.
         block: (R,) number of the block of time of each white row.
     """
 
@@ -72,6 +71,7 @@ class Problem:
         kernels: nameless dependences that compete.
         names: of the effects that compete.
         rate: of moments, as the base's own log had them; None where that is not known.
+        usual: noise as other logs had it.
         noise: what all flexible terms together leave.
         wander: dependences on time and place that the base's own log had, and their sizes.
     """
@@ -83,6 +83,7 @@ class Problem:
     kernels: list[Kernel]
     names: list[str]
     rate: Rate | None
+    usual: Noise
     noise: Noise
     wander: dict[str, float]
 
@@ -101,7 +102,7 @@ class Problem:
             parts,
             [stacked[part] @ stacked[part].T for part in parts],
             (at_moments, flat @ flat.T),
-            noise.log_size(len(self.steps), self.steps.observed),
+            noise.log_size(len(self.steps), self.steps.observed) - noise.log_odds(self.usual),
             np.tile(self.steps.block, 3),
         )
 
@@ -177,7 +178,7 @@ def problem_of(
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always else None
     wander = _wander(always, found) if always else {}
-    rough = Problem(steps, motion, prior, base, found, names, rate, noise, wander)
+    rough = Problem(steps, motion, prior, base, found, names, rate, noise, noise, wander)
     noise = _flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
     return replace(rough, noise=noise, base=base)
@@ -245,16 +246,12 @@ def _begin_noise(steps: Steps, model_file: ModelFile, always: Always | None) -> 
 
 def _flexible_noise(p: Problem) -> Noise:
     """The noise that all effects and all dependences together leave; far errors weigh less."""
-    fitter = Fitter(p.steps, p.noise, p.prior.columns)
     free = [np.tensordot(np.linalg.cholesky(p.base.cov).T, p.base.slopes, 1)]
     for c in p.columns(p.base).values():
         if c.masks is None and len(c.columns):
             free.append(PRIORS.size * c.columns)
     free += [FLEXIBLE * k.columns for k in p.kernels]
     columns = np.concatenate(free)
-    white = fitter.whiten(columns)
-    values, ways = np.linalg.eigh(white @ white.T)
-    columns = np.tensordot(ways[:, values > SEEN].T, columns, 1)
     noise = fit_noise(p.base.errors, columns, p.steps.stretches, p.noise)
     white = noise.whiten(columns, p.steps.stretches)
     y = noise.whiten(p.base.errors, p.steps.stretches)

@@ -15,6 +15,7 @@ from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
+from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import effect_names
 
 COMPARED = 10  # sets of the table ...
@@ -34,6 +35,7 @@ class Entry:
         log_evidence: integrated over numbers, forms and sizes.
         log_mimicked: for each of `subsets`, the same where an unnamed thing is in its place, of
             which the dependence is the part that the effect's form does not take.
+        log_formed: for each effect, the same where the first dependence is what its formula misses.
         blocks: (B,) log density of each block of time at the posterior mean.
         fall: of the squares by the dependence.
     """
@@ -43,6 +45,7 @@ class Entry:
     words: tuple[str, ...]
     log_evidence: float
     log_mimicked: tuple[float, ...]
+    log_formed: tuple[float, ...]
     blocks: np.ndarray
     fall: float
 
@@ -75,8 +78,9 @@ def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
 def table_of(search: Search) -> Table:
     """Evidence of the likely sets, each under the noise that suits it best of three.
 
-    Three noises: what all flexible terms leave, what the base leaves, what the best set leaves.
-    With one noise for all, slow drive noise is told as a dependence on time.
+    Three noises: what all flexible terms leave, what the base leaves, what the best set leaves with
+    its likeliest dependence. With one noise for all, slow drive noise is told as a dependence on
+    time.
     """
     p, order = search.problem, search.likely()
     inside = [k for k in search.fitted if set(k) < set(order[0])]
@@ -84,9 +88,10 @@ def table_of(search: Search) -> Table:
     whole = {(), *order[:WHOLE]}
     views = [search.view]
     fitted = {names: search.polished(names) for names in kept}
-    for names in dict.fromkeys([(), order[0]]):
+    best_set = search.fitted[order[0]]
+    for h, beside in ((fitted[()], None), (fitted[order[0]], _likeliest_columns(best_set, p))):
         search.progress("noise")
-        views.append(p.view(noise_of(fitted[names], p)))
+        views.append(p.view(noise_of(h, p, beside)))
     entries: dict[tuple, Entry] = {}
     falls: dict[tuple, float] = {}  # under the first noise, as the excess is
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
@@ -118,9 +123,25 @@ def table_of(search: Search) -> Table:
     )
 
 
-def noise_of(h: Hypothesis, p: Problem) -> Noise:
-    """The noise that a hypothesis leaves; steps weigh as with all flexible terms."""
+def _likeliest_columns(own: Evidence, p: Problem) -> np.ndarray:
+    """(K, W, 3) columns of the likeliest dependence at its size; none if it gains nothing."""
+    gains = own.gains + np.log(CHANCE)
+    f, s = np.unravel_index(gains.argmax(), gains.shape)
+    columns = SIZES[s] * p.kernels[f].columns
+    return columns if gains[f, s] > 0 else columns[:0]
+
+
+def noise_of(h: Hypothesis, p: Problem, beside: np.ndarray | None = None) -> Noise:
+    """The noise that a hypothesis leaves; steps weigh as with all flexible terms.
+
+    Args:
+        h: the hypothesis.
+        p: of the logs.
+        beside: (K, W, 3) columns of a dependence that is there as well.
+    """
     columns = np.tensordot(np.linalg.cholesky(h.cov).T, h.slopes, 1)
+    if beside is not None:
+        columns = np.concatenate([columns, beside])
     at_mean = h.errors + np.tensordot(h.value - h.mean, h.slopes, 1)
     return fit_noise(at_mean, columns, p.steps.stretches, p.noise)
 
@@ -136,6 +157,7 @@ class _Beside:
         fall: of the squares by it; 0 if it is none.
         log_relative: (M,) log prior of its size where it is what the form of each of `subsets`
             leaves, over that of a thing of its own.
+        log_form: (E,) the same where it is what the formula of each effect misses.
         cov: prior covariance of a stale base; None for what is known.
         local: (B,) what moments cost the evidence, in the blocks in which they are: where a block
             counts less, so does the price of what happened in it.
@@ -146,6 +168,7 @@ class _Beside:
     log_chance: float
     fall: float
     log_relative: np.ndarray
+    log_form: np.ndarray
     cov: np.ndarray | None
     local: np.ndarray
 
@@ -213,9 +236,9 @@ class _Comparison:
             chance = float(found.log_chance(rate)[len(on)]) if rate else 0.0
             white = np.concatenate([np.zeros((0, len(bare.y))), *(m.white for m in on)])
             fall = 2 * float(found.gains[len(on)])
-            relative = self._log_relative(np.array(fall))
+            relative, form = self._log_relative(np.array(fall)), self._log_form(np.array(fall))
             local = self._price(bare, white, on, chance)
-            beside.append(_Beside(words, white, chance, fall, relative, cov, local))
+            beside.append(_Beside(words, white, chance, fall, relative, form, cov, local))
         return beside[0], beside[1]
 
     def _price(self, bare: Linear, white: np.ndarray, on, chance: float) -> np.ndarray:
@@ -241,6 +264,7 @@ class _Comparison:
             usual.log_chance + float(np.log(CHANCE[s] / forms)),
             float(own.falls[f, s]) if gains[f, s] > 0 else 0.0,
             self._log_relative(own.falls[f, s]) - np.log(CHANCE[s]),
+            self._log_form(own.falls[f, s]) - np.log(CHANCE[s]),
             None,
             usual.local,
         )
@@ -256,14 +280,14 @@ class _Comparison:
         """The entry with no more than what is beside."""
         linear = self._linear(beside)
         found = self.h.log_evidence(linear, beside.cov) + beside.log_chance
-        mimicked = beside.log_relative if beside.words else -np.inf
         return self._entry(
             beside,
             linear,
             words=beside.words,
             log_evidence=found,
             fall=beside.fall,
-            mimicked=mimicked,
+            mimicked=beside.log_relative if beside.words else -np.inf,
+            formed=beside.log_form if beside.words else -np.inf,
         )
 
     def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
@@ -291,10 +315,13 @@ class _Comparison:
         likely = gains + np.log(CHANCE[sizes] / CHANCE[sizes].sum())
         total = float(logsumexp(likely))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
+        formed: np.ndarray | float = beside.log_form if beside.words else -np.inf
         if words and not beside.words:
-            relative = self._log_relative(own.falls[at][:, sizes])
-            each = (gains + relative).reshape(len(relative), gains.size)
-            mimicked = np.logaddexp.reduce(each, axis=1) - total
+            falls = own.falls[at][:, sizes]
+            mimicked, formed = (
+                np.logaddexp.reduce((gains + log).reshape(len(log), gains.size), axis=1) - total
+                for log in (self._log_relative(falls), self._log_form(falls))
+            )
         f, s = np.unravel_index(likely.argmax(), likely.shape)
         linear = own.linear.with_columns(SIZES[sizes][s] * own.white(self.view, at[f]))
         return self._entry(
@@ -304,6 +331,7 @@ class _Comparison:
             log_evidence=own.alone + beside.log_chance + total,
             fall=beside.fall if beside.words else float(own.falls[at][:, sizes][f, s]),
             mimicked=mimicked,
+            formed=formed,
         )
 
     def _entry(
@@ -315,15 +343,24 @@ class _Comparison:
         log_evidence: float,
         fall: float,
         mimicked: np.ndarray | float,
+        formed: np.ndarray | float,
     ) -> Entry:
         share = self.view.log_size * np.bincount(self.view.block) / len(self.view.block)
         blocks = linear.log_densities(self.view.block) - share + beside.local
-        each = np.broadcast_to(mimicked, len(self.squares))
         found = log_evidence - self.view.log_size
-        stale = beside.cov is not None
         return Entry(
-            self.h.effects, stale, words, found, tuple(float(found + m) for m in each), blocks, fall
+            self.h.effects,
+            beside.cov is not None,
+            words,
+            found,
+            tuple(float(found + m) for m in np.broadcast_to(mimicked, len(self.squares))),
+            tuple(float(found + m) for m in np.broadcast_to(formed, len(self.h.effects))),
+            blocks,
+            fall,
         )
+
+    def _log_form(self, falls: np.ndarray) -> np.ndarray:
+        return log_form(self.squares[: len(self.h.effects)], falls)
 
     def _log_relative(self, falls: np.ndarray) -> np.ndarray:
         """(M, ...) log prior of a dependence that takes these squares as what effects leave.
@@ -335,6 +372,22 @@ class _Comparison:
         share = falls / np.maximum(falls + squares, 1e-300)
         with np.errstate(divide="ignore"):
             return np.log(np.minimum(1, share * STEP**2) - share / STEP**2)
+
+
+def log_form(squares: np.ndarray, falls: np.ndarray) -> np.ndarray:
+    """(E, ...) log prior of a dependence as what a formula misses, by size.
+
+    The error of a formula relative to the size of its effect has an exponential distribution: of
+    those with a known mean the one that says least. Each size stands for a bin of their grid.
+
+    Args:
+        squares: (E,) that each effect takes.
+        falls: (...) squares that the dependence takes.
+    """
+    squares = squares.reshape(-1, *[1] * np.ndim(falls))
+    error = np.sqrt(falls / np.maximum(squares, 1e-300)) / PRIORS.form
+    with np.errstate(divide="ignore"):
+        return -error / STEP + np.log(-np.expm1(-error * (STEP - 1 / STEP)))
 
 
 def _as_without_moments(entries: list[Entry]) -> list[Entry]:

@@ -11,14 +11,14 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import SIZES, kernels
+from twinmill.inference.discrepancy import SIZES, STEP, _aside, _way_since_back, kernels
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Noise
 from twinmill.inference.posterior import beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
-from twinmill.inference.table import Entry, Table
+from twinmill.inference.table import Entry, Table, log_form
 
 STEP_S = 0.1
 
@@ -159,10 +159,11 @@ def table(entries):
     return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"))
 
 
-def entry(effects, words, log_evidence, mimicked=None):
+def entry(effects, words, log_evidence, mimicked=None, formed=None):
     mimicked = tuple(mimicked or [-np.inf] * (2 ** len(effects) - 1))
+    formed = tuple(formed or [-np.inf] * len(effects))
     blocks = np.full(6, log_evidence / 6)
-    return Entry(effects, False, words, log_evidence, mimicked, blocks, 1.0)
+    return Entry(effects, False, words, log_evidence, mimicked, formed, blocks, 1.0)
 
 
 def test_flat_evidence_leaves_the_prior_odds():
@@ -182,8 +183,8 @@ def test_what_one_block_alone_speaks_for_is_less_sure():
     single = np.r_[12.0, np.zeros(7)]
 
     def sure(blocks):
-        found = Entry(("battery_sag",), False, (), 12.0, (-np.inf,), blocks, 0.0)
-        none = Entry((), False, (), 0.0, (), np.zeros(8), 0.0)
+        found = Entry(("battery_sag",), False, (), 12.0, (-np.inf,), (-np.inf,), blocks, 0.0)
+        none = Entry((), False, (), 0.0, (), (), np.zeros(8), 0.0)
         return beliefs(table([none, found]))[1].probability
 
     assert sure(even) > 0.999
@@ -200,6 +201,42 @@ def test_an_unnamed_thing_looks_rather_like_an_effect_that_depends_on_the_same(e
                        (lambda b: effect in b.effects, lambda b: effect in b.mimicked))  # fmt: skip
         alike = PRIORS.alike * kin + (1 - PRIORS.alike) / 10
         assert mimic / real == pytest.approx(density * alike / (PRIORS.effects / 10))
+
+
+@pytest.mark.parametrize("effect, takes", [("battery_sag", True), ("wheel_gain", False)])
+def test_a_dependence_may_be_what_a_formula_misses_if_its_effect_depends_on_the_same(effect, takes):
+    """Then it costs no prior of a further thing, and is told as none; no wheel's gain has time."""
+    entries = [entry((), (), -50), entry((effect,), ("time",), 0, formed=[log(0.2)])]
+    found = beliefs(table(entries))
+    further, own = (
+        sum(b.probability for b in found if b.effects and bool(b.words) == told)
+        for told in (True, False)
+    )
+    q = PRIORS.outside / 2 / (1 - PRIORS.outside)
+    assert own / further == pytest.approx(0.2 / q if takes else 0)
+
+
+def test_chances_of_what_a_formula_misses_add_up_to_one():
+    """Over a grid of sizes from nothing to everything, each for what lies about it."""
+    falls = STEP ** (2 * np.arange(-40, 20, 2.0))
+    found = log_form(np.array([1.0]), falls)
+    assert np.exp(logsumexp(found, axis=1)) == pytest.approx(1, abs=1e-4)
+    mean = np.exp(found[0]) @ np.sqrt(falls)
+    assert mean == pytest.approx(PRIORS.form, rel=0.1)
+
+
+def test_a_heading_that_is_off_leads_the_way_aside():
+    """A rotation by a small angle, seen from the body: to second order of the angle."""
+    m, angle = motion(), 1e-4
+    c, s = np.cos(angle), np.sin(angle)
+    turned = m.moved @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    (led,) = _aside(m, np.full((1, len(m.t_s)), angle))
+    assert m.moved + led == pytest.approx(turned, abs=1e-9)
+
+
+def test_way_since_it_was_driven_the_other_way():
+    moved = np.array([0.0, 1.0, 2.0, 0.0, 3.0, -1.0, -1.0, 0.0, -2.0, 4.0])
+    assert _way_since_back(moved).tolist() == [0, 0, 1, 3, 3, 0, 1, 2, 2, 0]
 
 
 @pytest.mark.parametrize("effects", [("transient_loss", "abrupt_loss"), ("transient_loss",) * 2])
