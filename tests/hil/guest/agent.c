@@ -183,8 +183,8 @@ static int write_text(const char *path, const char *text)
     return file != NULL && fclose(file) != 0 ? -1 : result;
 }
 
-// A signal, and the processes that get it, one right after the other. Whoever saw another end may be
-// done before its own signal comes.
+// A signal, and the processes that get it, one right after the other. Whoever saw another end may
+// be done before its own signal comes.
 // @return how many got it, or -1 and errno.
 static long signal_all(char **word, int count)
 {
