@@ -378,6 +378,8 @@ def start(
     agreed = partial or all(a.accepted and a.signed for a in given)
     if agreed:
         fleet.listen(instant_s - time.monotonic(), dropouts)
+    if dropouts().taken:  # that operator may be about to tell more of them
+        fleet.listen(min(OTHERS_S, instant_s - CALL_OFF_S - time.monotonic()))
     out, stopped, late = dropouts(), [], []
     if agreed and not out:
         patience_s = LATE_S if partial and not link_timeout_ms else BEGUN_S
