@@ -178,7 +178,9 @@ def _drive(
         begun, held = of_start(started, options["link_timeout_ms"] == 0), Held(fleet, started)
         data |= {"start_utime_us": started.utime_us, "called_off": started.called_off}
         voice.tell(lambda: _finish("start", started.answers, begun, data, as_json=as_json))
-        if started.called_off or not held.robots or options["link_timeout_ms"] == 0:
+        if started.called_off or not held.robots:
+            return begun
+        if options["link_timeout_ms"] == 0:
             while not voice.is_idle:
                 fleet.listen(0.1)
             fleet.watch()  # the last that ends it, while robots drive on
@@ -452,7 +454,7 @@ def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: 
     clocks_s = {i: fleet.robots[i].clock_s for i in sorted(robots & set(fleet.robots))}
     told = of_clocks({f"R{i:02d}": s for i, s in clocks_s.items()}, ahead_s)
     if any(abs(s) > tell.BEGUN_S for s in clocks_s.values()) and not may_differ:
-        raise ValueError(f"nothing was started: {told}; --partial starts all the same.")
+        raise ValueError(f"nothing was started: {told}; --partial starts those that do not refuse.")
     if told:
         say(f"{told}.")
 

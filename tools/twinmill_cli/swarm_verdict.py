@@ -100,7 +100,7 @@ def of_busy(busy: list[Robot]) -> str:
             False: "already, and no operator is heard who holds it",
         }[robot.is_held]
         if not robot.drives:
-            who = "still, held by another operator who counts to its start, or has driven it"
+            who = "still, held by another operator who may be counting down to a start"
         by.setdefault(("drive" if robot.drives else "stand", who), []).append(
             f"R{robot.robot_id:02d}"
         )
