@@ -57,7 +57,8 @@ static void name_boards(struct named *named, const struct options *options)
 
 // Tells all of them zero, again and again, until one has confirmed it. The other kind is then not
 // there.
-static enum outcome stop_named(struct named *named)
+// @param says what came of it; the program that has a board may write to it again.
+static enum outcome stop_named(struct named *named, bool says)
 {
     const int64_t end_us = watch_now_us() + PATIENCE_MS * 1000;
     for (;;)
@@ -69,11 +70,14 @@ static enum outcome stop_named(struct named *named)
             const char *path = devices_board_path(stopper->config, stopper->dry_run);
             if (stopper_stop(stopper))
             {
-                say("%s: zero to all wheels, confirmed", path != NULL ? path : "stub");
+                if (says)
+                {
+                    say("%s: zero to all wheels, confirmed", path != NULL ? path : "stub");
+                }
                 return OUTCOME_CONFIRMED;
             }
             told = told || stopper->was_told;
-            if (stopper->was_told && watch_now_us() >= end_us)
+            if (says && stopper->was_told && watch_now_us() >= end_us)
             {
                 say("%s: zero to all wheels, NOT CONFIRMED by the board", path);
             }
@@ -107,7 +111,7 @@ static enum outcome stop_if_there(const struct app_config *config)
         err = hal_battery_read(&stopper->devices.battery, &pack_mV);
     }
     const bool is_board = err == FW_OK && pack_mV >= PACK_MIN_MV && pack_mV <= PACK_MAX_MV;
-    const enum outcome outcome = is_board ? stop_named(&named) : OUTCOME_NOTHING;
+    const enum outcome outcome = is_board ? stop_named(&named, true) : OUTCOME_NOTHING;
     stopper_close(stopper);
     return outcome;
 }
@@ -194,24 +198,23 @@ int stop_command(const struct options *options)
         return 0;
     }
     name_boards(&named, options);
-    bool is_left = true;
-    enum outcome outcome = OUTCOME_NOTHING;
+    bool is_left = true, was_held = false;
     pid_t holders[NAMED_MAX] = {0};
     for (int i = 0; i < named.count; ++i)
     {
         holders[i] = end_holder(devices_board_path(&named.config[i], options->dry_run));
+        was_held = was_held || holders[i] != 0;
     }
-    outcome = stop_named(&named);
+    // At once, whatever becomes of who has it; what that wrote last may come after this stop.
+    enum outcome outcome = stop_named(&named, !was_held);
     for (int i = 0; i < named.count; ++i)
     {
-        // What it wrote last may have come after the stop.
-        if (holders[i] != 0)
-        {
-            is_left = wait_for_holder(devices_board_path(&named.config[i], options->dry_run),
-                                      holders[i]) &&
-                      is_left;
-            outcome = stop_named(&named);
-        }
+        const char *path = devices_board_path(&named.config[i], options->dry_run);
+        is_left = (holders[i] == 0 || wait_for_holder(path, holders[i])) && is_left;
+    }
+    if (was_held)
+    {
+        outcome = stop_named(&named, true);
     }
     if (outcome != OUTCOME_CONFIRMED || !options->is_whole)
     {

@@ -317,9 +317,13 @@ def test_stop_waits_for_no_pipe(tmp_path):
 
 
 def test_stop_ends_the_program_that_drives(driving):
-    assert stop("--config", "/dev/null", "--board", f"stub:{driving.record}").returncode == 0
+    """What that had under way may come after the first zero: the last comes once it has ended."""
+    done = stop("--config", "/dev/null", "--board", f"stub:{driving.record}")
+    rows_at_end = driving.rows()
     code, _ = driving.end()
-    assert code == 0 and driving.duties() == ZERO
+    assert done.returncode == code == 0 and driving.duties() == ZERO
+    assert driving.rows() == rows_at_end
+    assert done.stderr.count("zero to all wheels, confirmed") == 1
 
 
 def test_a_line_that_opens_is_no_board():

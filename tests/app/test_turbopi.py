@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import resource
 import shlex
 import signal
@@ -171,6 +172,19 @@ def test_camera_that_comes_back_under_another_name_is_found_by_its_lasting_one(t
         robot.camera.path = tmp_path / "another"
         robot.camera.plug()
         assert robot.wait_for(LEFT)
+
+
+def test_the_lasting_name_on_the_page_is_one_of_udevs_and_is_what_is_opened(tmp_path):
+    """Its 60-persistent-v4l.rules: by-id/$env{ID_BUS}-$env{ID_SERIAL}-video-index$attr{index}."""
+    page = Path(__file__).parents[2] / "docs/robot.md"
+    (name,) = re.findall(r"`camera = (\S+)`", page.read_text())
+    assert re.fullmatch(r"/dev/v4l/by-id/usb-[\w.-]+-video-index0", name)
+    with Robot(TURBOPI, tmp_path, "--start", "--camera", name) as robot:
+        said = ""
+        while f"{name}: No such file or directory" not in said:
+            said = robot.process.stderr.readline()
+            assert said
+    assert {duties for _, duties in robot.rows()} == {ZERO}
 
 
 def test_script_is_played_once(tmp_path):

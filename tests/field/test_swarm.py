@@ -4,6 +4,7 @@
 import os
 
 import pytest
+import typer
 from network import run_session
 
 from twinmill.robots.tell import make_command
@@ -92,7 +93,7 @@ def test_numbers_of_commands_cannot_be_guessed():
 
 @pytest.mark.parametrize("text", ["a", "", "1,,2", "100", "-1", "1.5"])
 def test_robots_that_cannot_be_are_refused(text):
-    with pytest.raises(ValueError, match=r"0\.\.99"):
+    with pytest.raises(typer.BadParameter, match=r"0\.\.99"):
         parse_robots(text)
 
 

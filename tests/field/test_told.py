@@ -18,6 +18,7 @@ pytestmark = pytest.mark.skipif(
 )
 LIMIT_S, SLACK_S = 0.5, 0.5  # promised; for a machine that is busy with other tests
 LINK_LOST_S = 2.0  # link_timeout_ms
+BEGUN_S = 0.5  # in which all have to begin; else all are told to stop
 NEVER = None  # no wheel turned
 
 
@@ -100,6 +101,79 @@ FAULTS = {
         NEVER,
         is_brief=True,
     ),
+    "restarted_in_the_countdown": Fault(
+        "one robot's driver dies in the countdown",
+        ("Called off: R02 was started anew, and has forgotten it.", "All stand."),
+        1,
+        NEVER,
+        is_brief=True,
+    ),
+    "gone_in_the_countdown": Fault(
+        "one robot's program ends in the countdown",
+        ("Called off: R02 was not heard any more.", "NOT ALL STAND: R02: no stop was confirmed."),
+        1,
+        NEVER,
+    ),
+    "gone_in_the_countdown_partial": Fault(
+        "the same with --partial; then Ctrl-C (R01)",
+        ("but not all: R02 did not", "NOT ALL STAND: R02: no stop was confirmed."),
+        1,
+    ),
+    "gone_at_the_instant": Fault(
+        "R02 hangs 0.3 s before the instant (R01, from its first move)",
+        ("Called off: R02 was not driving when the others had begun.", "NOT ALL STAND: R02"),
+        1,
+        BEGUN_S,
+    ),
+    "another_starts_in_the_countdown": Fault(
+        "another operator starts the same robots in the countdown; then Ctrl-C of the second",
+        (
+            "Called off: R01, R02 were taken over by another operator (start at",
+            "R01, R02: left to that operator.",
+        ),
+        1,
+        is_brief=True,
+    ),
+    "ctrl_c_in_the_countdown": Fault(
+        "Ctrl-C in the countdown",
+        ("All stand; the start was ended before", "all had confirmed it."),
+        1,
+        NEVER,
+    ),
+    "ctrl_c_without_end": Fault(
+        "Ctrl-C every 2 ms until the tool has ended", ("Started at", "All stand."), 0, is_brief=True
+    ),
+    "laptop_a_day_ahead": Fault(
+        "a laptop whose clock is a day ahead starts and arms; then another, and Ctrl-C",
+        (
+            "nothing was started: this computer's clock is 86400.00 s ahead of those of R01, R02",
+            "Started at",
+            "All stand.",
+        ),
+        0,
+    ),
+    "stop_ended_by_ctrl_c": Fault(
+        "Ctrl-C of a `swarm stop` that waits for R09 (from its first packet)",
+        (
+            "NOT ALL STAND: R09: no stop was confirmed.",
+            "Ended by a signal after",
+            "R01, R02 confirmed it.",
+        ),
+        1,
+    ),
+    "stop_ended_by_sigterm": Fault(
+        "the same by SIGTERM",
+        (
+            "NOT ALL STAND: R09: no stop was confirmed.",
+            "Ended by a signal after",
+            "R01, R02 confirmed it.",
+        ),
+        1,
+        is_brief=True,
+    ),
+    "robots_mistyped": Fault(
+        '`swarm start --robots "1;2"`', ("'--robots': 1;2: must be numbers in 0..99",), 2, NEVER
+    ),
     "one_is_missing": Fault(
         "`swarm start --robots 1,9` where there is no R09",
         ("R09: not heard in 1 s, so nothing was started",),
@@ -172,7 +246,7 @@ FAULTS = {
         0,
     ),
     "untethered_and_one_hangs": Fault(
-        "R02 hangs in the countdown of `swarm start --untethered`, and goes on later",
+        "R02 hangs in the countdown of `swarm start --untethered --partial`, and goes on later",
         ("Started at", "but not all: R02 did not in time, told to stop", "NOT ALL STAND: R02"),
         1,
         NEVER,
@@ -250,6 +324,25 @@ def test_a_count_that_another_stopped_ends_with_it(session):
     """The stop itself is over after that; the instant was later."""
     row = session["stopped_in_the_countdown"]
     assert row["ended_s"] < row["ahead_s"] - 1 and not row["ok"]
+
+
+def test_of_two_countdowns_the_last_is_the_one_that_starts(session):
+    """The first starts nobody and stops nobody; the second has said whom it takes over."""
+    row = session["another_starts_in_the_countdown"]
+    code, said = row["second"]
+    assert row["stood"] and row["drove"] and code == 0 and "All stand." in said
+    assert said.index("held by another operator who may be counting") < said.index("Started at")
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_a_partial_start_goes_on_without_who_is_gone(session):
+    assert session["gone_in_the_countdown_partial"]["drove"]
+    assert session["gone_at_the_instant"]["other_stood"]
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_a_wrong_clock_of_one_laptop_locks_no_other_out(session):
+    assert session["laptop_a_day_ahead"]["early_code"] == 1
 
 
 @pytest.mark.skipif(not ALL, reason="part of make check-long")

@@ -33,10 +33,16 @@ from twinmill.robots.fleet import GONE_S, URL, Fleet
 
 IDS = (1, 2)
 COMMAND = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
+# This computer's clock is set wrong, as the command sees it.
+CLOCK = (
+    "import time; now, now_ns = time.time, time.time_ns; "
+    "time.time, time.time_ns = lambda: now() + {0}, lambda: now_ns() + {0} * 10**9; "
+)
 CTRL_C, CTRL_S, CTRL_Z = b"\x03", b"\x13", b"\x1a"
 LINK_TIMEOUT_S = 2.0
 TRIES = 3  # to start
 STAYS_S = 0.5  # a robot that was stopped
+AT_THE_INSTANT_S = 0.3  # before it: who falls silent then is not missed before it
 HALTED_S = 0.5  # in which the held table wants to be drawn twice
 START = ("start", "--arm", "--robots", "1,2")
 
@@ -44,8 +50,11 @@ START = ("start", "--arm", "--robots", "1,2")
 class Operator:
     """`twinmill swarm` as a process: at a terminal of its own, which can be halted, or on pipes."""
 
-    def __init__(self, key: Path, *words: str, terminal: bool = True, **options):
-        command = [sys.executable, "-c", COMMAND, "swarm", *words, "--key", str(key)]
+    def __init__(
+        self, key: Path, *words: str, terminal: bool = True, clock_ahead_s: int = 0, **options
+    ):
+        program = (CLOCK.format(clock_ahead_s) if clock_ahead_s else "") + COMMAND
+        command = [sys.executable, "-c", program, "swarm", *words, "--key", str(key)]
         self.said = ""
         self.keyboard, self._closed = None, False
         if terminal:
@@ -389,10 +398,7 @@ class Field:
     def untethered_and_one_hangs(self) -> dict:
         """In the countdown: it must not begin by itself once nobody expects it."""
         begin_s, robot, fleet = time.monotonic(), self.robots[2], Fleet(URL, key=self.key)
-        self.operator = operator = Operator(
-            self.key_file, *START, "--untethered", "--in-s", "3", terminal=False
-        )
-        fleet.listen(20, lambda: 2 in fleet.robots and len(fleet.robots[2].acks) > 1)
+        self.operator = operator = self._counting("--untethered", "--partial", "--in-s", "3")
         hung = [robot.process.pid, *robot.children(), *robot.guards()]
         for pid in hung:
             os.kill(pid, signal.SIGSTOP)
@@ -464,13 +470,7 @@ class Field:
     def stopped_in_the_countdown(self) -> dict:
         """By another, once both have accepted; nothing starts at the instant."""
         begin_s, fleet, ahead_s = time.monotonic(), Fleet(URL, key=self.key), 4.0
-        self.operator = operator = Operator(
-            self.key_file, *START, "--json", "--in-s", str(ahead_s), terminal=False
-        )
-        # The answers to arm and to start.
-        fleet.listen(
-            20, lambda: all(i in fleet.robots and len(fleet.robots[i].signed_acks) > 1 for i in IDS)
-        )
+        self.operator = operator = self._counting("--json", "--in-s", str(ahead_s))
         said_s = time.monotonic()
         tell.stop(fleet, set())
         code = operator.end()
@@ -480,6 +480,126 @@ class Field:
         row = self._unmoved(begin_s, code)
         said = [data["sentence"]]
         return row | {"said": said, "ended_s": ended_s, "ahead_s": ahead_s, "ok": data["ok"]}
+
+    def _counting(self, *words: str) -> Operator:
+        """A start whose robots have all accepted; its instant is seconds away."""
+        fleet = Fleet(URL, key=self.key)
+        operator = Operator(self.key_file, *START, *words, terminal=False)
+        # The answers to arm and to start.
+        fleet.listen(
+            20, lambda: all(i in fleet.robots and len(fleet.robots[i].signed_acks) > 1 for i in IDS)
+        )
+        return operator
+
+    def restarted_in_the_countdown(self) -> dict:
+        """Its driver starts anew, and knows of no start."""
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        os.kill(self.robots[2].children()[0], signal.SIGKILL)
+        return self._unmoved(begin_s, self.operator.end())
+
+    def gone_in_the_countdown(self) -> dict:
+        """As by its battery switch."""
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        self.robots[2].process.terminate()
+        code = self.operator.end(40)
+        row = self._unmoved(begin_s, code)
+        self.robots[2] = self.robot(2, "2 after the countdown")
+        time.sleep(1)
+        return row
+
+    def gone_in_the_countdown_partial(self) -> dict:
+        """Those that are there start: that was asked for."""
+        self.operator = operator = self._counting("--in-s", "4", "--partial")
+        self.robots[2].process.terminate()
+        drove = wait_until(lambda: "but not all" in operator.plain, 20)
+        drove = drove and self.robots[1].duties() != ZERO
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end(), [1]) | {"drove": drove}
+        self.robots[2] = self.robot(2, "2 after the partial start")
+        time.sleep(1)
+        return row
+
+    def gone_at_the_instant(self) -> dict:
+        """Too late to call the start off before it: the others drive for a moment, and stand."""
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        instant_s = time.monotonic() + 4
+        time.sleep(instant_s - time.monotonic() - AT_THE_INSTANT_S)
+        hung = [self.robots[2].process.pid, *self.robots[2].children()]
+        for pid in hung:
+            os.kill(pid, signal.SIGSTOP)
+        code = self.operator.end(40)
+        for pid in reversed(hung):
+            os.kill(pid, signal.SIGCONT)
+        time.sleep(1)
+        moves_s = [t for t, duties in self.robots[1].rows() if t > begin_s and duties != ZERO]
+        unmoved = self._unmoved(begin_s, code, [2])["after_s"] is None
+        return self.row(moves_s[0], code, [1]) | {"other_stood": unmoved}
+
+    def another_starts_in_the_countdown(self) -> dict:
+        """The last start counts: the first ends at once, and says whose the robots are."""
+        begin_s, first = time.monotonic(), self._counting("--in-s", "5")
+        second = Operator(self.key_file, *START, "--in-s", "3", terminal=False)
+        code = first.end()
+        stood = not any(self.moved(i, begin_s) for i in IDS)
+        wait_until(lambda: second.has_ended or "Ctrl-C stops them" in second.plain, 20)
+        drove = all(robot.duties() != ZERO for robot in self.robots.values())
+        fault_s = time.monotonic()
+        second.process.send_signal(signal.SIGINT)
+        second_code = second.end()
+        self.operator = first
+        row = self.row(fault_s, code) | {"stood": stood, "drove": drove}
+        return row | {"second": [second_code, second.plain]}
+
+    def ctrl_c_in_the_countdown(self) -> dict:
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        time.sleep(0.5)
+        self.operator.process.send_signal(signal.SIGINT)
+        return self._unmoved(begin_s, self.operator.end())
+
+    def laptop_a_day_ahead(self) -> dict:
+        """It arms and is refused; then another, whose clock is right, starts."""
+        early = Operator(self.key_file, *START, terminal=False, clock_ahead_s=86400)
+        early_code = early.end()
+        arm = Operator(self.key_file, "arm", terminal=False, clock_ahead_s=86400)
+        assert arm.end() == 0, arm.plain
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end())
+        said = [line for line in early.plain.splitlines() if line.strip()]
+        return row | {"said": [*said, *row["said"]], "early_code": early_code}
+
+    def stop_ended_by_ctrl_c(self) -> dict:
+        return self._stop_ended_by(signal.SIGINT)
+
+    def stop_ended_by_sigterm(self) -> dict:
+        return self._stop_ended_by(signal.SIGTERM)
+
+    def _stop_ended_by(self, number: int) -> dict:
+        """While it waits for one that is not there."""
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s:
+            self.operator = Operator(self.key_file, "stop", "--robots", "1,2,9", terminal=False)
+            wait_until(lambda: "stop is said all the time" in self.operator.plain, 20)
+            self.operator.process.send_signal(number)
+            code = self.operator.end()
+        operator.end()
+        return self.row(stops_s[0], code)
+
+    def ctrl_c_without_end(self) -> dict:
+        """Until the tool has ended: none of them comes too late to change what it says."""
+        operator = self.held()
+        fault_s = time.monotonic()
+        while not operator.has_ended and time.monotonic() < fault_s + 20:
+            operator.process.send_signal(signal.SIGINT)
+            time.sleep(0.002)
+        return self.row(fault_s, operator.end())
+
+    def robots_mistyped(self) -> dict:
+        begin_s = time.monotonic()
+        self.operator = Operator(self.key_file, "start", "--robots", "1;2", terminal=False)
+        return self._unmoved(begin_s, self.operator.end())
 
     def one_is_missing(self) -> dict:
         """Nobody is told anything: neither to start nor, then, to stop."""

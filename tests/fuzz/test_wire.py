@@ -9,6 +9,8 @@ Seconds and seed come from TWINMILL_FUZZ_S and TWINMILL_FUZZ_SEED: to search for
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,14 @@ def test_corpora_hold_only_packets_that_are_whole_or_refused_everywhere(kind):
         data = path.read_bytes()
         assert not FRAGMENT.search(data), path
         assert not CHANNEL_WITHOUT_END.search(data), path
+
+
+def test_pictures_of_the_corpus_end_no_decoder_of_others():
+    """Pillow's and OpenCV's, in a process of their own: they read them, or say that they cannot."""
+    script, pictures = Path(__file__).with_name("decode_pictures.py"), CORPUS / "mjpg"
+    command = [sys.executable, script, *sorted(pictures.iterdir())]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_programs_survive_any_packet(tmp_path):

@@ -137,7 +137,7 @@ class Robot(Watched):
 
     def __exit__(self, *_):
         if self.pid not in self.rig.ends:
-            self.rig.kill(self.pid, signal.SIGTERM)
+            self.rig.kill(signal.SIGTERM, self.pid)
             self.wait_for_end()
         assert self.rig.duties[-1].wire == ZERO
 

@@ -119,8 +119,8 @@ def end_all(guest, robot):
         guest.systemctl("stop", SERVICE)
         return
     if robot.pid not in guest.ends:
-        guest.words("k", robot.pid, int(signal.SIGCONT))
-        guest.words("k", robot.pid, int(signal.SIGTERM))
+        guest.words("k", int(signal.SIGCONT), robot.pid)
+        guest.words("k", int(signal.SIGTERM), robot.pid)
         robot.wait_for_end()
     guest.run(PROGRAM, *SETTINGS, "--stop")
 
@@ -163,7 +163,7 @@ def note(table, fault, after_s):
 def test_processes(drive, table, roles, number):
     robot = drive("--set", "restart_ms=-1")
     pids = {"driver": robot.driver(), "parent": robot.pid, "guard": robot.guard()}
-    fault_s = min(robot.rig.kill(pids[role], number) for role in roles)
+    fault_s = robot.rig.kill(number, *(pids[role] for role in roles))
     what = "killed" if number == signal.SIGKILL else "stopped (SIGSTOP)"
     if roles == ("guard",) and number == signal.SIGKILL:
         robot.rig.wait(lambda: robot.rig.words("d", robot.pid, "wheelguard")[0] > 0)
@@ -193,7 +193,7 @@ def test_what_the_robot_works_takes_no_longer_on_a_machine_that_is_busy(guest, d
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGTSTP])
 def test_signals(drive, table, number):
     robot = drive()
-    fault_s = robot.rig.kill(robot.pid, number)
+    fault_s = robot.rig.kill(number, robot.pid)
     names = {"SIGINT": "SIGINT (Ctrl-C)", "SIGTSTP": "SIGTSTP (Ctrl-Z)"}
     after_s = stands_after(robot, fault_s)
     note(table, f"{names.get(number.name, number.name)} to the program", after_s)
@@ -215,7 +215,7 @@ def test_messages_that_nobody_reads(guest, drive, table, fault):
         fault_s = robot.show(robot.view)
     else:
         number = signal.SIGKILL if "killed" in fault else signal.SIGSTOP
-        fault_s = guest.kill(robot.driver(), number)
+        fault_s = guest.kill(number, robot.driver())
     note(table, f"{fault}, stderr full and unread", stands_after(robot, fault_s))
 
 
@@ -241,7 +241,7 @@ def test_only_the_driver_cannot_reach_the_board(guest, drive, table):
 def test_nobody_can_open_the_board_again(guest, drive, table, call):
     robot = drive("--set", "restart_ms=-1", *PATIENT, environment=PRELOAD)
     fail(guest, OPENING_BOARD[call])
-    fault_s = guest.kill(robot.driver(), signal.SIGKILL)
+    fault_s = guest.kill(signal.SIGKILL, robot.driver())
     note(table, f"motor board: {call} fails, driver killed", stands_after(robot, fault_s))
 
 
@@ -303,10 +303,9 @@ def test_board_refuses_everything(guest, drive, table):
 @by_hand
 def test_all_three_are_killed(guest, drive, table):
     robot = drive(*PATIENT)
-    for pid in (robot.guard(), robot.pid, robot.driver()):
-        guest.kill(pid, signal.SIGSTOP)
-    for pid in (robot.guard(), robot.driver(), robot.pid):
-        guest.kill(pid, signal.SIGKILL)
+    pids = robot.guard(), robot.pid, robot.driver()
+    guest.kill(signal.SIGSTOP, *pids)
+    guest.kill(signal.SIGKILL, *pids)
     robot.wait_for_end()
     assert robot.wire() == LEFT
     guest.words("w", "/tmp/garbage.conf", "speed = much\n= =\n[\n")
@@ -326,7 +325,7 @@ def test_all_three_of_the_service(guest, drive, table, number):
     """Nobody of the program is left: systemd's own doing, which has no limit of ours."""
     robot = drive(*PATIENT)
     pids = robot.guard(), robot.driver(), robot.pid
-    fault_s = min(guest.kill(pid, number) for pid in pids)
+    fault_s = guest.kill(number, *pids)
     guest.wait(lambda: robot.wire() == ZERO, SYSTEM_LIMIT_S)
     what = "killed" if number == signal.SIGKILL else "stopped (SIGSTOP)"
     table[f"all three {what}"] = f"{stands_after(robot, fault_s):.2f} s"

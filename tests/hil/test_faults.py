@@ -46,19 +46,19 @@ def wait_for_zero(robot, since_s):
 
 
 def test_kill_9_of_the_driving_process_stops_the_motors(blind):
-    killed_s = blind.rig.kill(blind.driver(), signal.SIGKILL)
+    killed_s = blind.rig.kill(signal.SIGKILL, blind.driver())
     assert blind.wait_for_end().code == 1
     assert wait_for_zero(blind, killed_s) < WATCHDOG_S
 
 
 def test_kill_9_of_the_parent_stops_the_motors(blind):
-    killed_s = blind.rig.kill(blind.pid, signal.SIGKILL)
+    killed_s = blind.rig.kill(signal.SIGKILL, blind.pid)
     assert blind.wait_for_end().code == -signal.SIGKILL
     assert wait_for_zero(blind, killed_s) < WATCHDOG_S
 
 
 def test_hanging_process_is_killed_and_the_motors_stop(blind):
-    stopped_s = blind.rig.kill(blind.driver(), signal.SIGSTOP)
+    stopped_s = blind.rig.kill(signal.SIGSTOP, blind.driver())
     assert blind.wait_for_end().code == 1
     assert wait_for_zero(blind, stopped_s) < WATCHDOG_S + SLACK_S
 
@@ -66,8 +66,7 @@ def test_hanging_process_is_killed_and_the_motors_stop(blind):
 def test_stop_option_stops_what_a_threefold_kill_left(blind):
     pids = (blind.guard(), blind.pid, blind.driver())
     for number in (signal.SIGSTOP, signal.SIGKILL):
-        for pid in pids:
-            blind.rig.kill(pid, number)
+        blind.rig.kill(number, *pids)
     blind.wait_for_end()
     assert blind.wire() == LEFT
     assert blind.rig.run(PROGRAM, *SETTINGS, "--stop").code == 0
@@ -78,7 +77,7 @@ def test_killed_program_gets_its_camera_and_board_back(rig):
     with Robot(rig, "--start", "--set", "restart_ms=100") as robot:
         robot.drive_until(LEFT)
         killed = robot.driver()
-        killed_s = rig.kill(killed, signal.SIGKILL)
+        killed_s = rig.kill(signal.SIGKILL, killed)
         rig.wait(lambda: robot.wire() == ZERO)
         assert robot.stopped_s(killed_s) - killed_s < WATCHDOG_S
         robot.drive_until(LEFT)

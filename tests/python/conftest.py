@@ -2,6 +2,7 @@
 """Fixtures that several test files share."""
 
 import os
+import signal
 import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before numpy is loaded
@@ -152,6 +153,14 @@ class CoastingRobot:
 def coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
     """120 s of a robot with noise that rolls on after each stop; its model knows all but that."""
     return _coasting(tmp_path_factory.mktemp("coasting"), model_text, 120, 0.01)
+
+
+@pytest.fixture(autouse=True)
+def own_ctrl_c():
+    """A program that ends ignores Ctrl-C from then on; the tests are one that goes on."""
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

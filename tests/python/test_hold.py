@@ -39,7 +39,7 @@ def held(monkeypatch):
 
     say(TABLE, stands=False)
     fleet.counter, fleet.held = OWN, {3}
-    robots = Held(fleet, Start(0, [answer], {3: SESSION}, []))
+    robots = Held(fleet, Start(0, [answer], {3: SESSION}))
 
     def words(*arguments, **options) -> str:
         say(*arguments, **options)

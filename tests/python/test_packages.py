@@ -78,6 +78,35 @@ def test_locks_have_the_versions_of_the_lists_and_hashes(name):
         assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
 
 
+def test_every_list_is_installed_by_the_hashes_of_its_lock():
+    """By pip's own rule: with --require-hashes a file that has none of them is refused."""
+    for name in ("Makefile", "scripts/setup"):
+        text = (ROOT / name).read_text(encoding="utf-8").replace("\\\n", " ")
+        installs = re.findall(r".*--requirement .*", text)
+        assert installs
+        for line in installs:
+            assert "--require-hashes" in line and ".lock" in line, line
+
+
+def test_a_file_of_the_same_name_and_version_is_refused_by_the_lock(tmp_path):
+    """Somebody else's wheel, as from a mirror that was broken into; pip judges."""
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    entry = re.search(r"^packaging==(\S+).*(?:\n .*)*", lock, flags=re.MULTILINE)
+    info = f"packaging-{entry[1]}.dist-info"
+    with zipfile.ZipFile(tmp_path / f"packaging-{entry[1]}-py3-none-any.whl", "w") as wheel:
+        wheel.writestr(f"{info}/METADATA", f"Name: packaging\nVersion: {entry[1]}\n")
+        wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nTag: py3-none-any\n")
+        wheel.writestr(f"{info}/RECORD", "")
+    (tmp_path / "packages.lock").write_text(f"{entry[0]}\n")
+    pip = [sys.executable, "-m", "pip", "install", "--no-index", "--find-links", tmp_path]
+    pip += ["--target", tmp_path / "there", "--no-deps"]
+    unasked = subprocess.run([*pip, f"packaging=={entry[1]}"], capture_output=True, text=True)
+    assert unasked.returncode == 0, unasked.stderr
+    asked = [*pip, "--require-hashes", "--requirement", tmp_path / "packages.lock"]
+    refused = subprocess.run([*asked, "--upgrade"], capture_output=True, text=True)
+    assert refused.returncode != 0 and "DO NOT MATCH THE HASHES" in refused.stderr
+
+
 def test_who_installs_the_wheel_gets_nothing_older_than_what_was_tried():
     """Each package has a lower bound, and the version that tests run with is within it."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -154,7 +183,19 @@ def test_a_wheel_has_the_licences_of_what_it_brings(tmp_path):
     packages = {"liblcm1", "libglib2.0-0", "libpcre2-8-0", "libeigen3-dev", "libb2-dev"}
     assert {f"{info}/licenses/debian/{name}.txt" for name in (*packages, "LGPL-2.1")} <= names
     assert "twinmill.libs/libglib-2.0.so.0" in names
-    assert packages <= {component["name"] for component in bill["components"]}
+    parts = {part["name"]: part for part in bill["components"]}
+    assert packages <= set(parts)
+    for name in packages:  # as dpkg says, written by the purl specification
+        form = "${Version} ${Architecture}"
+        said = subprocess.run(
+            ["dpkg-query", "-W", "-f", form, name], capture_output=True, text=True
+        )
+        version, architecture = said.stdout.split()
+        assert parts[name]["version"] == version and parts[name]["type"] == "library"
+        written = version.replace("+", "%2B").replace(":", "%3A")
+        assert parts[name]["purl"] == f"pkg:deb/debian/{name}@{written}?arch={architecture}"
+        assert parts[name]["bom-ref"] in bill["dependencies"][0]["dependsOn"]
+    assert len({part.get("bom-ref") for part in bill["components"]}) == len(bill["components"])
     assert "liblcm1: apt-get source lcm=" in sources
 
 

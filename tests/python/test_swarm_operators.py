@@ -11,7 +11,7 @@ from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
 from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm
 from twinmill_cli.swarm_screen import status_table
-from twinmill_cli.swarm_verdict import of_driving
+from twinmill_cli.swarm_verdict import of_busy
 
 KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
 VERBS = turbopi.signed_command_t
@@ -88,7 +88,7 @@ def test_who_drives_already_is_said_with_who_holds_it():
     held, alone, free = robot(1, DRIVING), robot(2, DRIVING), robot(3, DRIVING, 0)
     fleet = fleet_of(held, alone, free)
     hold(fleet, 1)
-    said = of_driving([held, alone, free])
+    said = of_busy([held, alone, free])
     assert "R01 drives already, held by another operator" in said
     assert "R02 drives already, and no operator is heard who holds it" in said
     assert "R03 drives already, untethered" in said

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from twinmill.robots.countdown import NOT_BEGUN, STOPPED, Dropouts
 from twinmill.robots.fleet import Heard
 from twinmill.robots.hold import (
     BY_BUTTON,
@@ -19,7 +20,15 @@ from twinmill.robots.hold import (
 )
 from twinmill.robots.tell import NEVER_HEARD, Answer, Start
 from twinmill_cli import swarm
-from twinmill_cli.swarm_verdict import Verdict, of_arm, of_end, of_select, of_start, of_stop
+from twinmill_cli.swarm_verdict import (
+    Verdict,
+    of_arm,
+    of_clocks,
+    of_end,
+    of_select,
+    of_start,
+    of_stop,
+)
 
 WELL, ILL = Verdict(True, "well"), Verdict(False, "NOT ALL STAND: ill")
 
@@ -46,8 +55,9 @@ FAULTY = answer(6, mode="fault", alarms=["camera lost"])
 DOUBLE = answer(7, mode="stopped", stands=True, is_double=True)
 
 
-def begun(*answers: Answer, stopped=(), late=(), by_another=()) -> Start:
-    return Start(0, list(answers), {}, list(stopped), list(late), list(by_another))
+def begun(*answers: Answer, stopped=(), late=(), out=None, taken=()) -> Start:
+    dropouts, called_off = Dropouts(out or {}, frozenset(taken)), bool(stopped or out)
+    return Start(0, list(answers), {}, called_off, list(stopped), list(late), dropouts)
 
 
 BY_START = Heard(9, 1, 7, 8, "start milling at 12:00:01")
@@ -85,16 +95,51 @@ SENTENCES = [
         1,
     ),
     (
-        of_start(begun(GOOD, stopped=[STANDS], by_another=[1, 2]), untethered=False),
+        of_start(begun(GOOD, stopped=[STANDS], out={1: STOPPED, 2: STOPPED}), untethered=False),
         "Called off: R01, R02 were stopped by another command. All were told to stop: All stand.",
         1,
     ),
+    (
+        of_start(begun(GOOD, stopped=[STANDS], out={1: NOT_BEGUN}), untethered=False),
+        "Called off: R01 was not driving when the others had begun. All were told to stop: All",
+        1,
+    ),
+    (
+        of_start(begun(GOOD, out={1: "taken over"}, taken=[1], stopped=[STANDS]), untethered=False),
+        "Called off: R01 was taken over. R01: left to that operator. The others were told to stop:"
+        " R02 stands.",
+        1,
+    ),
+    (
+        of_start(begun(GOOD, out={1: "taken over"}, taken=[1]), untethered=False),
+        "Called off: R01 was taken over. R01: left to that operator.",
+        1,
+    ),
+    (
+        of_stop([STANDS, GOOD], 2.5, is_cut_short=True),
+        "NOT ALL STAND: R01: no stop was confirmed. SWITCH OFF BY HAND what still drives. Ended by "
+        "a signal after 2.5 s. R02 confirmed it.",
+        1,
+    ),
+    (of_stop([], 0.4, is_cut_short=True), "No robot was heard in 0.4 s; stop was said all the", 1),
+    (of_stop([STANDS], 0.4, is_cut_short=True), "R02 stands; others may not have been heard", 1),
+    (of_stop([STANDS], 1.4, is_cut_short=True), "All stand.", 0),
+    (of_stop([STANDS], 0.4, is_cut_short=True, is_of_some=True), "R02 stands.", 0),
     (of_end(WELL, {"R01": TAKEN, "R02": DRIVES}, WELL), "All stand; R01 was taken over by", 1),
     (of_end(WELL, {"R01": TAKEN_AND_LOST}, None), "All stand: R01: taken over by another", 1),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),
     (of_end(ILL, {"R01": DRIVES}, WELL), "All stand; not all had started.", 1),
-    (of_end(None, {}, WELL), "All stand; the start was ended before", 1),
+    (
+        of_end(None, {}, WELL),
+        "All stand; the start was ended before it was known to have begun; not",
+        1,
+    ),
+    (
+        of_end(None, {}, WELL, was_confirmed=True),
+        "All stand; the start was ended before it was known to have begun; all had confirmed it.",
+        1,
+    ),
     (of_end(WELL, {"R01": RESTARTED, "R02": DRIVES}, WELL), "All stand; R01 stood before: its", 1),
     (of_end(WELL, {"R01": BY_BUTTON, "R02": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": BY_COMMAND, "R02": BY_BUTTON}, None), "All stand: R01: stopped", 0),
@@ -170,3 +215,44 @@ def test_the_table_of_robots_changes_nothing_of_the_verdict(capsys, verdict, las
 
 def test_a_silent_robot_keeps_the_others_held():
     assert not SILENT.stands and not SILENT.is_meant
+
+
+@pytest.mark.parametrize(
+    ("clock_s", "says"),
+    [
+        ({"R01": 0.01, "R02": -0.02}, []),
+        (
+            {"R01": 0.01, "R02": 86400.0},
+            ["R02's clock is 86400.00 s ahead of this computer's, with which R01 agrees: set its"],
+        ),
+        (
+            {"R01": -3.0, "R02": -3.02},
+            ["this computer's clock is 3.01 s ahead of those of R01, R02, which agree: set this"],
+        ),
+        ({"R01": 7.0}, ["R01's clock is 7.00 s ahead of this computer's: set all (NTP)"]),
+        (
+            {"R01": 7.0, "R02": -9.0},
+            ["R01's clock is 7.00 s ahead of", "R02's clock is 9.00 s behind", "set all (NTP)"],
+        ),
+        ({"R01": float("nan")}, []),  # nothing of it was heard
+    ],
+)
+def test_the_clock_that_is_odd_is_named(clock_s, says):
+    """This computer's where all robots agree with each other, and a robot's where others do not."""
+    told = of_clocks(clock_s, 1.0)
+    assert all(words in told for words in says) and bool(told) == bool(says)
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "then"),
+    [
+        (86400.0, "refuses the start"),  # which is over 2 s ago by its clock
+        (-86400.0, "refuses the start"),  # which is over 600 s ahead
+        (0.3, "starts 0.30 s early"),
+        (-0.3, "starts 0.30 s late"),
+        (2.5, "starts 1.00 s early"),  # at once: no earlier than it is told
+    ],
+)
+def test_what_an_odd_clock_makes_of_a_start_is_what_the_robot_does(ahead_s, then):
+    """fw_command_judge() refuses over FW_START_LATE_US and FW_START_AHEAD_US."""
+    assert of_clocks({"R01": 0.0, "R02": ahead_s}, 1.0).endswith(f"By that, R02 {then}")

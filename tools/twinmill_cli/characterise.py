@@ -48,7 +48,7 @@ if working():  # not for --help
     from twinmill.terminal import progress_bar
     from twinmill_cli.keyboard import any_key
     from twinmill_cli.ros_script import write_script
-    from twinmill_cli.swarm import ended_by_signals, refuse_doubles, warn_of_clocks
+    from twinmill_cli.swarm import check_clocks, ended_by_signals, refuse_doubles
     from twinmill_cli.swarm_verdict import of_stop
     from twinmill_cli.voice import Voice
 
@@ -263,7 +263,7 @@ class Run:
         self._listen()
         tell.find(self.fleet, {self.robot_id})
         self._check_ready("" if end_s is not None else script)
-        warn_of_clocks(self.fleet, {self.robot_id})
+        check_clocks(self.fleet, {self.robot_id}, countdown_s, may_differ=True)
         refuse_doubles(self.fleet, {self.robot_id})
         if self.arm:
             tell.arm(self.fleet, {self.robot_id})
@@ -330,7 +330,8 @@ class Run:
         )
         (answer,) = begun.answers
         if begun.called_off:
-            why = "it was stopped by another command" if begun.by_another else answer.reason
+            out = begun.dropouts.words.get(self.robot_id)
+            why = f"it was {out}" if out else answer.reason
             raise ValueError(f"robot {self.robot_id} does not play {script}: {why}.")
         return Held(self.fleet, begun)
 

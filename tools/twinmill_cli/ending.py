@@ -5,6 +5,7 @@ import errno
 import io
 import os
 import re
+import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,7 +15,14 @@ import typer
 
 from twinmill.extras import MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill_cli.output import STOPPED, begin_telling, has_told, print_object, say
+from twinmill_cli.output import (
+    STOPPED,
+    begin_telling,
+    decided_or,
+    has_told,
+    print_object,
+    say,
+)
 
 STDOUT, STDERR = 1, 2
 QUOTED = 80  # letters of what a sentence quotes
@@ -39,8 +47,9 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
         _check_encoding(words)
         result = run(words)
         code = result if isinstance(result, int) else 0
+        _end_untouched()
     except KeyboardInterrupt:  # before the command, or after it
-        code = STOPPED
+        code = decided_or(STOPPED)
     except (typer.TyperException, ModuleNotFoundError, OSError, ValueError) as error:
         code, sentence = _told(error)
         if sentence:
@@ -49,6 +58,17 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     if code == STOPPED and stopped:
         say(stopped, program)
     sys.exit(code)
+
+
+def _end_untouched() -> None:
+    """All is done: a Ctrl-C that comes while the interpreter ends does not change the exit code.
+
+    What waits for its reader is written before, and whoever does not want to wait may say so.
+    """
+    with suppress(OSError, ValueError):  # it fails again at the end, and is told there
+        sys.stdout.flush()
+    with suppress(ValueError):  # not the main thread
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _take_standard_files() -> None:

@@ -41,11 +41,23 @@ def unstopped() -> Iterator[None]:
 
 
 _told_on: list[TextIO] = []  # where an object was printed
+_decided: list[int] = []  # the exit code of what cannot be undone
 
 
 def begin_telling() -> None:
     """A command begins, and has printed no object."""
     _told_on.clear()
+    _decided.clear()
+
+
+def decide(code: int) -> None:
+    """What became of robots is known and told: no Ctrl-C that comes later changes its exit code."""
+    _decided[:] = [code]
+
+
+def decided_or(code: int) -> int:
+    """The exit code that was decided; another where none was."""
+    return _decided[0] if _decided else code
 
 
 def has_told() -> bool:

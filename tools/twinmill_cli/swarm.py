@@ -8,7 +8,7 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
@@ -18,7 +18,7 @@ import typer
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl, Prefix
-from twinmill_cli.output import AsJson, deliver, print_object, say
+from twinmill_cli.output import AsJson, decide, deliver, print_object, say
 
 if working():  # not for --help
     from rich.console import Group
@@ -29,12 +29,13 @@ if working():  # not for --help
     from twinmill.robots.hold import Held
     from twinmill.robots.key import load, load_or_make
     from twinmill.terminal import PlainConsole
-    from twinmill_cli.swarm_screen import CLOCK_WARN_S, answer_table, status_table
+    from twinmill_cli.swarm_screen import answer_table, status_table
     from twinmill_cli.swarm_verdict import (
         DRIVING,
         Verdict,
         of_arm,
-        of_driving,
+        of_busy,
+        of_clocks,
         of_end,
         of_select,
         of_start,
@@ -72,14 +73,16 @@ def parse_robots(text: str | None) -> set[int]:
     """Robots as a user writes them; none where nothing was written, which means all.
 
     Raises:
-        ValueError: it is no list of numbers in 0..99.
+        typer.BadParameter: it is no list of numbers in 0..99.
     """
     try:
         robots = set() if text is None else {int(word) for word in text.split(",")}
     except ValueError:
         robots = {-1}
     if not robots <= set(range(100)):
-        raise ValueError(f"--robots {text}: must be numbers in 0..99 with commas, as 1,2,5.")
+        raise typer.BadParameter(
+            f"{text}: must be numbers in 0..99 with commas, as 1,2,5.", param_hint="'--robots'"
+        )
     return robots
 
 
@@ -121,27 +124,29 @@ def _start(
     """
     if untethered and link_timeout_s is not None:
         raise ValueError("--untethered and --link-timeout-s: give one of them.")
+    asked = parse_robots(robots)
     fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
-    asked = tell.find(fleet, parse_robots(robots))
+    asked = tell.find(fleet, asked)
     if not partial:
         refuse_unheard(fleet, asked)
     refuse_doubles(fleet, asked)
-    warn_of_clocks(fleet, asked)
-    driving = tell.find_driving(fleet, asked)
-    if driving:
-        say(f"{of_driving(driving)}; this start takes over.")
+    check_clocks(fleet, asked, in_s, may_differ=partial)
+    busy = tell.find_busy(fleet, asked)
+    if busy:
+        say(f"{of_busy(busy)}; this start takes over.")
     if arm:
         tell.arm(fleet, asked)
     timeout_ms = 0 if untethered else round(1e3 * link_timeout_s) if link_timeout_s else -1
     options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
-    data = {"drove_before": [robot.robot_id for robot in driving]}
+    data = {"drove_before": [robot.robot_id for robot in busy if robot.drives]}
     code, voice = 1, Voice()
-    try:
-        with ended_by_signals(fleet, voice.check):
+    with ended_by_signals(fleet, voice.check) as asked_to_end:
+        try:
             verdict = _drive(fleet, asked, behavior, voice, data=data, as_json=as_json, **options)
-        code = verdict.code
-    finally:
-        voice.end(code)
+            code = verdict.code
+        finally:
+            voice.end(code, asked_to_end)
+            decide(code)
     voice.check()
     return code
 
@@ -173,7 +178,9 @@ def _drive(
         begun, held = of_start(started, options["link_timeout_ms"] == 0), Held(fleet, started)
         data |= {"start_utime_us": started.utime_us, "called_off": started.called_off}
         voice.tell(lambda: _finish("start", started.answers, begun, data, as_json=as_json))
-        if started.called_off or not held.robots or options["link_timeout_ms"] == 0:
+        if started.called_off or not held.robots:
+            return begun
+        if options["link_timeout_ms"] == 0:
             while not voice.is_idle:
                 fleet.listen(0.1)
             fleet.watch()  # the last that ends it, while robots drive on
@@ -182,7 +189,8 @@ def _drive(
         ended = of_end(begun, held.states, None).beside(_driving(fleet, asked))
     except BaseException as error:
         given = tell.stop(fleet, asked)
-        ended = of_end(begun, held.states if held else {}, of_stop(given))
+        states, known = held.states if held else {}, tell.have_confirmed(fleet, asked)
+        ended = of_end(begun, states, of_stop(given), was_confirmed=known)
         ended = ended.beside(_driving(fleet, asked))
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
@@ -208,31 +216,40 @@ def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
 
 
 @contextmanager
-def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[None]:
+def counting_signals() -> Iterator[list[int]]:
+    """Signals that ask for the end do nothing but stand in a list."""
+    asked: list[int] = []
+    before = [signal.signal(number, lambda n, _: asked.append(n)) for number in ENDING]
+    try:
+        yield asked
+    finally:
+        for number, handler in zip(ENDING, before, strict=True):
+            signal.signal(number, handler)
+
+
+@contextmanager
+def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[Sequence[int]]:
     """Signals that ask for the end raise KeyboardInterrupt where the fleet listens, only there.
 
     So nothing can be cut short but waiting, and a stop not even by a second signal. What kills,
-    robots notice by themselves.
+    robots notice by themselves. Gives the signals that came.
 
     Args:
         fleet: whose watch it is.
         check: raises what else is to end it.
     """
-    asked: list[int] = []
+    with counting_signals() as asked:
 
-    def look() -> None:
-        if asked:
-            raise KeyboardInterrupt
-        check()
+        def look() -> None:
+            if asked:
+                raise KeyboardInterrupt
+            check()
 
-    before = [signal.signal(number, lambda n, _: asked.append(n)) for number in ENDING]
-    watch, fleet.watch = fleet.watch, look
-    try:
-        yield
-    finally:
-        fleet.watch = watch
-        for number, handler in zip(ENDING, before, strict=True):
-            signal.signal(number, handler)
+        watch, fleet.watch = fleet.watch, look
+        try:
+            yield asked
+        finally:
+            fleet.watch = watch
 
 
 def _arm(
@@ -247,12 +264,13 @@ def _arm(
 
     Example: twinmill swarm arm
     """
+    asked = parse_robots(robots)
     fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
-    asked = tell.find(fleet, parse_robots(robots))
+    asked = tell.find(fleet, asked)
     refuse_doubles(fleet, asked)
-    driving = tell.find_driving(fleet, asked)
-    if driving:
-        say(f"{of_driving(driving)}.")
+    busy = tell.find_busy(fleet, asked)
+    if busy:
+        say(f"{of_busy(busy)}.")
     given = tell.arm(fleet, asked)
     return _finish("arm", given, of_arm(given), {}, as_json=as_json)
 
@@ -283,37 +301,48 @@ def _stop(
     """
     asked = parse_robots(robots or None)  # an empty list is no reason to stop nobody
     operator_key, fault = _key_if_there(key)
-    with outliving_its_terminal(), saying_nothing() as say:
-        hosts, fleet = tell.Hosts(host or ()), Fleet(lcm_url, channel_prefix, key=operator_key)
-        given = tell.stop(
-            fleet,
-            asked,
-            timeout_s,
-            hosts=hosts,
-            waiting=lambda left: say(_waiting_words(left, hosts.unheard(fleet), timeout_s)),
-        )
-        if asked:
-            fleet.listen(tell.OTHERS_S)
-    verdict = of_stop(given, timeout_s, is_of_some=bool(asked), unheard=hosts.unheard(fleet))
-    _tell_fault(fault)
-    verdict = verdict.beside(_driving(fleet, asked))
-    return _finish("stop", given, verdict, {}, as_json=as_json)
+    voice = Voice()
+    with counting_signals() as signals:
+        with saying_nothing() as say:
+            hosts, fleet = tell.Hosts(host or ()), Fleet(lcm_url, channel_prefix, key=operator_key)
+            begin_s = time.monotonic()
+            given = tell.stop(
+                fleet,
+                asked,
+                timeout_s,
+                hosts=hosts,
+                waiting=lambda left: say(_waiting_words(left, hosts.unheard(fleet), timeout_s)),
+                enough=lambda: _ends_a_stop(signals),
+            )
+            passed_s = time.monotonic() - begin_s
+            if asked:
+                fleet.listen(tell.OTHERS_S)
+        is_cut_short = _ends_a_stop(signals) and passed_s < timeout_s
+        verdict = of_stop(
+            given,
+            passed_s if is_cut_short else timeout_s,
+            is_of_some=bool(asked),
+            unheard=hosts.unheard(fleet),
+            is_cut_short=is_cut_short,
+        ).beside(_driving(fleet, asked))
+        if fault:
+            voice.say(fault)
+        voice.tell(lambda: _finish("stop", given, verdict, {}, as_json=as_json))
+        decide(verdict.code)
+        voice.end(verdict.code, signals)
+    voice.check()
+    return verdict.code
+
+
+def _ends_a_stop(signals: Sequence[int]) -> bool:
+    """A person or program gave up waiting; a lost terminal ends no stop."""
+    return any(number != signal.SIGHUP for number in signals)
 
 
 def _driving(fleet: Fleet, asked: set[int]) -> list[str]:
     """Robots that drive and were not asked; nobody was asked where all were."""
     others = [fleet.robots[i] for i in sorted(set(fleet.robots) - asked)] if asked else []
     return [f"R{r.robot_id:02d}" for r in others if r.mode in DRIVING and r.is_here]
-
-
-@contextmanager
-def outliving_its_terminal() -> Iterator[None]:
-    """A closed terminal or a lost ssh connection ends nothing before the robots have signed."""
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGHUP, before)
 
 
 @contextmanager
@@ -348,11 +377,6 @@ def _key_if_there(path: Path | None) -> tuple[bytes | None, str]:
         return None, str(error)
 
 
-def _tell_fault(fault: str) -> None:
-    if fault:
-        say(fault)
-
-
 def _waiting_words(left: set[int], unheard: list[str], timeout_s: float) -> str:
     """Reason why a stop still waits."""
     names = _names(left)
@@ -374,8 +398,9 @@ def _select(
 
     Example: twinmill swarm select diffusing --robots 1,2
     """
+    asked = parse_robots(robots)
     fleet = Fleet(lcm_url, channel_prefix, key=load_or_make(key))
-    asked = tell.find(fleet, parse_robots(robots))
+    asked = tell.find(fleet, asked)
     command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
     given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
     return _finish("select", given, of_select(given, behavior), {}, as_json=as_json)
@@ -414,15 +439,24 @@ def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
             )
 
 
-def warn_of_clocks(fleet: Fleet, robots: set[int]) -> None:
-    """Says on stderr which robots' clocks would make the start no common one."""
-    for robot_id in sorted(robots & set(fleet.robots)):
-        clock_s = fleet.robots[robot_id].clock_s
-        if abs(clock_s) > CLOCK_WARN_S:
-            say(
-                f"robot {robot_id}: its clock is {clock_s:+.2f} s from this one, and so will be "
-                "its start; set it (NTP)."
-            )
+def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: bool) -> None:
+    """Says on stderr whose clock would make the start no common one.
+
+    Args:
+        fleet: where they are.
+        robots: whom to start.
+        ahead_s: from now to the start.
+        may_differ: it is no reason to refuse.
+
+    Raises:
+        ValueError: they could not all have begun soon after the instant.
+    """
+    clocks_s = {i: fleet.robots[i].clock_s for i in sorted(robots & set(fleet.robots))}
+    told = of_clocks({f"R{i:02d}": s for i, s in clocks_s.items()}, ahead_s)
+    if any(abs(s) > tell.BEGUN_S for s in clocks_s.values()) and not may_differ:
+        raise ValueError(f"nothing was started: {told}; --partial starts those that do not refuse.")
+    if told:
+        say(f"{told}.")
 
 
 def _finish(
@@ -453,7 +487,8 @@ def _status(
     Example: twinmill swarm status
     """
     operator_key, fault = _key_if_there(key)
-    _tell_fault(fault)
+    if fault:
+        say(fault)
     fleet = Fleet(lcm_url, channel_prefix, key=operator_key)
     if once or as_json or not sys.stdout.isatty():
         fleet.listen(1.0)

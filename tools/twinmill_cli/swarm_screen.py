@@ -12,8 +12,7 @@ from rich.text import Text
 from twinmill.robots.fleet import Robot
 from twinmill.robots.tell import Answer
 from twinmill.terminal import Fitting
-
-CLOCK_WARN_S = 0.05
+from twinmill_cli.swarm_verdict import CLOCK_WARN_S
 
 
 def answer_table(given: list[Answer]) -> Fitting:

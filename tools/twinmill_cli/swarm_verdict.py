@@ -7,11 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from twinmill.robots.countdown import STOPPED
 from twinmill.robots.fleet import Robot
 from twinmill.robots.hold import State
-from twinmill.robots.tell import NEVER_HEARD, Answer, Start
+from twinmill.robots.tell import AHEAD_S, LATE_S, NEVER_HEARD, STOP_LEAST_S, Answer, Start
 
 DRIVING = ("running", "script")
+CLOCK_WARN_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,7 @@ def of_stop(
     *,
     is_of_some: bool = False,
     unheard: Sequence[str] = (),
+    is_cut_short: bool = False,
 ) -> Verdict:
     """All stand, or which robots must be stopped by hand.
 
@@ -53,42 +56,92 @@ def of_stop(
         timeout_s: for how long it was said.
         is_of_some: these alone were asked, and others may be there.
         unheard: machines that were told by name, and from which no robot spoke.
+        is_cut_short: a signal ended it after that time.
     """
     hint = "Where the network carries no multicast, give a robot's address: swarm stop --host."
     if unheard:
         hint = f"Nothing was heard from {', '.join(unheard)}: is the name or address right?"
+    cut = f"Ended by a signal after {timeout_s:.1f} s." if is_cut_short else ""
     if not given:
-        words = f"No robot was heard in {timeout_s:g} s; stop was said all the time. {hint}"
-        return Verdict(False, words)
+        words = f"No robot was heard in {round(timeout_s, 1):g} s; stop was said all the time."
+        return Verdict(False, _joined(words, cut, hint))
     double = [a for a in given if a.is_double]
     unconfirmed = [a for a in given if not ((a.accepted and a.signed and a.stands) or a.is_double)]
+    verb = "stands" if len(given) == 1 else "stand"
     if not double and not unconfirmed:
         if unheard:
-            return Verdict(False, f"NOT ALL STAND: {hint} Whoever was heard stands.")
-        verb = "stands" if len(given) == 1 else "stand"
+            words = f"NOT ALL STAND: {hint} Whoever was heard stands."
+            return Verdict(False, _joined(words, cut))
+        if is_cut_short and not is_of_some and timeout_s < STOP_LEAST_S:
+            words = f"{_names(given)} {verb}; others may not have been heard yet."
+            return Verdict(False, _joined(words, cut))
         return Verdict(True, f"{_names(given)} {verb}." if is_of_some else "All stand.")
     told = [f"{_names(unconfirmed)}: no stop was confirmed"] if unconfirmed else []
     told += [f"{_names(double)}: two robots have this number, one may drive"] if double else []
     words = f"NOT ALL STAND: {'; '.join(told)}. SWITCH OFF BY HAND what still drives."
     silent = [a for a in unconfirmed if a.reason == NEVER_HEARD]
     words += f" {_names(silent)}: {NEVER_HEARD}." if silent else ""
-    return Verdict(False, f"{words} {hint}" if silent or unheard else words)
+    sure = [a for a in given if a not in unconfirmed and a not in double]
+    cut += f" {_names(sure)} confirmed it." if cut and sure else ""
+    return Verdict(False, _joined(words, cut, hint if silent or unheard else ""))
 
 
-def of_driving(driving: list[Robot]) -> str:
-    """That robots drive already, and who has them in hand; empty where none drives."""
-    by: dict[str, list[str]] = {}
-    for robot in driving:
+def _joined(*sentences: str) -> str:
+    return " ".join(filter(None, sentences))
+
+
+def of_busy(busy: list[Robot]) -> str:
+    """That robots drive already or are about to, and by whom; empty where none does."""
+    by: dict[tuple[str, str], list[str]] = {}
+    for robot in busy:
         who = {
-            None: "untethered",
-            True: "held by another operator",
-            False: "and no operator is heard who holds it",
+            None: "already, untethered",
+            True: "already, held by another operator",
+            False: "already, and no operator is heard who holds it",
         }[robot.is_held]
-        by.setdefault(who, []).append(f"R{robot.robot_id:02d}")
+        if not robot.drives:
+            who = "still, held by another operator who may be counting down to a start"
+        by.setdefault(("drive" if robot.drives else "stand", who), []).append(
+            f"R{robot.robot_id:02d}"
+        )
     return "; ".join(
-        f"{', '.join(names)} {'drives' if len(names) == 1 else 'drive'} already, {who}"
-        for who, names in by.items()
+        f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
+        for (verb, who), names in by.items()
     )
+
+
+def of_clocks(clock_s: dict[str, float], ahead_s: float) -> str:
+    """Whose clock is odd, by how much, and what that makes of a common start; empty if none is.
+
+    Args:
+        clock_s: how far that of each robot is ahead of this computer's.
+        ahead_s: from now to the start by this computer's clock.
+    """
+    off = {name: s for name, s in clock_s.items() if abs(s) > CLOCK_WARN_S}
+    right = [name for name in clock_s if name not in off]
+    if not off:
+        return ""
+    if len(off) > 1 and not right and max(off.values()) - min(off.values()) < 2 * CLOCK_WARN_S:
+        middle_s = sum(off.values()) / len(off)
+        told = f"this computer's clock is {_off(-middle_s)} those of {', '.join(off)}, which agree"
+        whose = "this computer's"
+    else:
+        told = "; ".join(f"{name}'s clock is {_off(s)} this computer's" for name, s in off.items())
+        told += f", with which {', '.join(right)} agree{'s' * (len(right) == 1)}" if right else ""
+        whose = ("its" if len(off) == 1 else "theirs") if right else "all"
+    then = ", ".join(f"{name} {_then(s, ahead_s)}" for name, s in off.items())
+    return f"{told}: set {whose} (NTP). By that, {then}"
+
+
+def _off(s: float) -> str:
+    return f"{abs(s):.2f} s {'ahead of' if s > 0 else 'behind'}"
+
+
+def _then(s: float, ahead_s: float) -> str:
+    """A robot's start, given how far its clock is ahead."""
+    if not -LATE_S < ahead_s - s < AHEAD_S:
+        return "refuses the start"
+    return f"starts {min(s, ahead_s):.2f} s early" if s > 0 else f"starts {-s:.2f} s late"
 
 
 def of_arm(given: list[Answer]) -> Verdict:
@@ -112,13 +165,7 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     """Who drives."""
     given = begun.answers
     if begun.called_off:
-        told = f"All were told to stop: {of_stop(begun.stopped).sentence}"
-        more = "" if begun.by_another else "; --partial starts some"
-        return Verdict(
-            False,
-            f"Called off: {_why_called_off(begun)}. {told} They must be armed before they start "
-            f"(--arm){more}.",
-        )
+        return _of_called_off(begun)
     going_on = "They drive on by themselves." if untethered else "Ctrl-C stops them."
     at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
     faulty = [a for a in given if a.mode == "fault"]
@@ -143,6 +190,21 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     return Verdict(False, words)
 
 
+def _of_called_off(begun: Start) -> Verdict:
+    """Why nobody starts, and what became of those that had accepted."""
+    taken = [a for a in begun.answers if a.robot_id in begun.dropouts.taken]
+    words = f"Called off: {_why_called_off(begun)}."
+    if taken:
+        words += f" {_names(taken)}: left to that operator."
+    if begun.stopped:
+        whom = "The others" if taken else "All"
+        stopped = of_stop(begun.stopped, is_of_some=bool(taken)).sentence
+        more = "" if STOPPED in begun.dropouts.words.values() else "; --partial starts some"
+        words += f" {whom} were told to stop: {stopped} They must be armed before they start"
+        words += f" (--arm){more}."
+    return Verdict(False, words)
+
+
 def _of_nobody(begun: Start, at: str) -> str:
     """Why none drives though its instant has come."""
     if begun.late:
@@ -153,13 +215,20 @@ def _of_nobody(begun: Start, at: str) -> str:
     return f"NOBODY DRIVES, though it is {at}: see above. Ctrl-C stops them."
 
 
-def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | None) -> Verdict:
+def of_end(
+    begun: Verdict | None,
+    states: dict[str, State],
+    stopped: Verdict | None,
+    *,
+    was_confirmed: bool = False,
+) -> Verdict:
     """Outcome for robots that were held.
 
     Args:
         begun: what came of their start; None: nobody knows, it was ended before.
         states: what was seen of each last, before they were stopped.
         stopped: what came of the stop; None: all stood by themselves before.
+        was_confirmed: all had confirmed a start that was ended.
     """
     if stopped and not stopped.ok:
         return stopped
@@ -169,7 +238,8 @@ def of_end(begun: Verdict | None, states: dict[str, State], stopped: Verdict | N
             early.setdefault(state, []).append(name)
     told = [_told_early(names, state, bool(stopped)) for state, names in early.items()]
     if begun is None:
-        told.append("the start was ended before all had confirmed it")
+        known = "all had confirmed it" if was_confirmed else "not all had confirmed it"
+        told.append(f"the start was ended before it was known to have begun; {known}")
     elif not begun.ok:
         told.append("not all had started")
     ok = begun is not None and begun.ok and all(state.is_meant for state in early)
@@ -194,10 +264,14 @@ def _names(given: list[Answer]) -> str:
 
 
 def _why_called_off(begun: Start) -> str:
-    if not begun.by_another:
-        return _why(begun.answers)
-    names = ", ".join(f"R{i:02d}" for i in begun.by_another)
-    return f"{names} {'was' if len(begun.by_another) == 1 else 'were'} stopped by another command"
+    by: dict[str, list[str]] = {}
+    for robot_id, words in sorted(begun.dropouts.words.items()):
+        by.setdefault(words, []).append(f"R{robot_id:02d}")
+    told = [
+        f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {words}"
+        for words, names in by.items()
+    ]
+    return "; ".join(told) or _why(begun.answers)
 
 
 def _why(given: list[Answer]) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from queue import Queue
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 SHOW_PERIOD_S = 0.25
+JOIN_S = 0.05
+LAST_WORD_S = 0.5  # in which a terminal that takes anything has taken the last sentence
 
 
 class Voice:
@@ -106,14 +108,20 @@ class Voice:
         if self.failure:
             raise ValueError(f"what is to be told cannot be: {self.failure}") from self.failure
 
-    def end(self, code: int) -> None:
+    def end(self, code: int, signals: Sequence[int] = ()) -> None:
         """Waits until all is written. Who does not want to wait any more (Ctrl-C) need not.
 
         Args:
             code: with which the program then ends at once.
+            signals: one more that stands there asks for that.
         """
         self._waiting.put(None)
+        before = len(signals)
         try:
-            self._thread.join()
+            while self._thread.is_alive() and len(signals) == before:
+                self._thread.join(JOIN_S)
         except KeyboardInterrupt:
-            os._exit(code)  # the thread may hold what the interpreter would wait for
+            pass
+        self._thread.join(LAST_WORD_S)
+        if self._thread.is_alive():
+            os._exit(code)  # it may hold what the interpreter would wait for

@@ -67,6 +67,12 @@ class Heard:
     counter: int
     words: str
 
+    @property
+    def starts(self) -> bool:
+        """It makes a robot drive."""
+        command = turbopi.swarm_command_t
+        return self.verb in (command.VERB_START, command.VERB_SCRIPT)
+
 
 @dataclass
 class Robot:
@@ -167,7 +173,12 @@ class Robot:
     @property
     def is_held(self) -> bool | None:
         """An operator is heard who holds it; None if it needs none."""
-        return time.monotonic() - self.hold_s < GONE_S if self.is_tethered else None
+        return self.hears_operator if self.is_tethered else None
+
+    @property
+    def hears_operator(self) -> bool:
+        """Somebody says that he is there for it, be it that it drives or that it is to."""
+        return time.monotonic() - self.hold_s < GONE_S
 
     @property
     def is_double(self) -> bool:
@@ -341,6 +352,27 @@ class Fleet:
             robot.commands[sealed.counter] = Heard(
                 command.seq, command.verb, sealed.session, sealed.counter, words
             )
+
+    def others(self, robot: Robot, session: int) -> list[Heard]:
+        """Commands of other operators that a robot has obeyed since it was told from here.
+
+        Args:
+            robot: it must have a link.
+            session: in which it was told; all that it obeyed in a later one came after that.
+
+        Returns:
+            The newest first.
+        """
+        since = self.counter if robot.link.session == session else 0
+        heard = sorted(robot.commands.values(), key=lambda c: c.counter, reverse=True)
+        return [
+            c
+            for c in heard
+            if c.seq not in self.said
+            and c.session == robot.link.session
+            and c.counter > since
+            and robot.has_obeyed(c)
+        ]
 
     def listen(self, duration_s: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Takes in what robots say for some time, or until that is enough.

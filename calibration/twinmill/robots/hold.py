@@ -5,12 +5,11 @@ import time
 from dataclasses import dataclass
 
 from twinmill.robots.fleet import MAY_MOVE, TELEMETRY, Fleet, Heard, Robot
-from twinmill.robots.tell import VERBS, Start
+from twinmill.robots.tell import Start
 
 # A robot signs ten times a second; without a word for as long as it would wait for its operator,
 # nobody knows what it does.
 SILENT_S = 2.0
-STARTING = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 SETTLE_S = 0.3  # a state that lasts is told; a camera that stutters would be a flood of words
 
 
@@ -126,7 +125,7 @@ class Held:
 
     def _taken(self, robot: Robot) -> Heard | None:
         """The start of another operator that it obeyed last."""
-        return next((c for c in self._others(robot) if c.verb in STARTING), None)
+        return next((c for c in self._others(robot) if c.starts), None)
 
     def _drives(self, robot: Robot) -> State:
         """As was told from here, or as another operator told it."""
@@ -138,18 +137,7 @@ class Held:
         return DRIVES_AS_UNHEARD if is_own and link.counter > known else DRIVES
 
     def _others(self, robot: Robot) -> list[Heard]:
-        """Commands of other operators that it has obeyed since it was started; newest first."""
-        session = robot.link.session
-        since = self._fleet.counter if session == self._sessions[robot.robot_id] else 0
-        heard = sorted(robot.commands.values(), key=lambda c: c.counter, reverse=True)
-        return [
-            c
-            for c in heard
-            if c.seq not in self._fleet.said
-            and c.session == session
-            and c.counter > since
-            and robot.has_obeyed(c)
-        ]
+        return self._fleet.others(robot, self._sessions[robot.robot_id])
 
     def news(self) -> list[str]:
         """A sentence of each robot that has for a while been in another state than was told."""

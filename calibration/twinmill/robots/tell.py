@@ -17,6 +17,7 @@ from typing import Any
 import turbopi
 
 from twinmill.arguments import option
+from twinmill.robots.countdown import NOT_BEGUN, Dropouts, find_dropouts, stopped_by_another
 from twinmill.robots.fleet import Fleet, Robot
 
 REPEAT_S = 0.03
@@ -27,6 +28,7 @@ CALL_OFF_S = 0.3
 OTHERS_S = 0.3  # in which who was not asked is heard: robots speak 10 times a second or more
 BEGUN_S = 0.5  # after the instant: all that start have said that they drive
 LATE_S = 2.0  # the same where nobody goes on watching; as late a start robots still obey
+AHEAD_S = 600.0  # robots obey no start that is further ahead by their clocks
 TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
@@ -112,14 +114,15 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     return fleet.here()
 
 
-def find_driving(fleet: Fleet, robots: set[int]) -> list[Robot]:
-    """Those of some robots that drive already; who holds them is heard by then.
+def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
+    """Those of some robots that drive already, or that an operator holds who counts to their start.
 
-    To be asked before this program holds any.
+    Who holds them is heard by then. To be asked before this program holds any.
     """
-    driving = [r for i in sorted(robots) if (r := fleet.robots.get(i)) and r.drives]
-    fleet.listen(FIND_S, lambda: all(robot.is_held is not False for robot in driving))
-    return driving
+    known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
+    fleet.listen(OTHERS_S, lambda: all(robot.hears_operator for robot in known))
+    fleet.listen(FIND_S, lambda: all(r.is_held is not False for r in known if r.drives))
+    return [robot for robot in known if robot.drives or robot.hears_operator]
 
 
 def all_linked(fleet: Fleet, robots: set[int]) -> bool:
@@ -165,7 +168,8 @@ def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
         return
     if not order.counter:
         known = [r.link.counter for r in fleet.robots.values() if r.link]
-        order.counter = max(time.time_ns() // 1000, *(counter + 1 for counter in known))
+        # Its last link may be older than what was said from here since.
+        order.counter = max(time.time_ns() // 1000, *(n + 1 for n in [fleet.counter, *known]))
     session = order.sessions.setdefault(robot_id, robot.link.session)
     if session == robot.link.session:
         fleet.send_signed(
@@ -186,6 +190,7 @@ def stop(
     *,
     hosts: "Hosts | None" = None,
     waiting: Callable[[set[int]], None] = lambda _: None,
+    enough: Callable[[], object] = lambda: False,
 ) -> list[Answer]:
     """Says stop until all robots have signed that they stand.
 
@@ -200,6 +205,7 @@ def stop(
         hosts: machines to be told besides; each has to be heard.
         waiting: told once, soon after stop was first said, which of the robots that were asked or
             heard have not signed; it must not block.
+        enough: what else ends it, once it was said.
 
     Returns:
         What each answered.
@@ -208,7 +214,8 @@ def stop(
         OSError: it could never be said.
     """
     with fleet.unwatched():
-        return _stop(fleet, robots, timeout_s, hosts or Hosts(()), waiting=waiting)
+        hosts = hosts or Hosts(())
+        return _stop(fleet, robots, timeout_s, hosts, waiting=waiting, enough=enough)
 
 
 def _stop(
@@ -218,6 +225,7 @@ def _stop(
     hosts: "Hosts",
     *,
     waiting: Callable[[set[int]], None],
+    enough: Callable[[], object],
 ) -> list[Answer]:
     command = make_command(VERBS.VERB_STOP)
     fleet.held -= robots or set(fleet.held)
@@ -249,6 +257,8 @@ def _stop(
             error = failure
         _say_to_hosts(fleet, command, robots, hosts.addresses)
         fleet.listen(REPEAT_S)
+        if enough():
+            break
     if error and not was_said:
         raise error
     return answers(fleet, command, robots or set(fleet.robots))
@@ -303,24 +313,20 @@ class Start:
         utime_us: the instant.
         answers: of each robot; of a start that was called off, those for which it was.
         sessions: that the start was meant for, by robot; of those that have signed it.
-        stopped: what they answered to the stop where the start was called off, as not all had
-            acknowledged in time; else empty.
+        called_off: nobody was to start, or to drive on.
+        stopped: what they answered to the stop where it was called off.
         late: what those answered to a stop that had accepted, were to drive on by themselves, and
             had not begun.
-        by_another: robots that somebody stopped once they had accepted, before the instant.
+        dropouts: robots that had accepted, and for which it was called off.
     """
 
     utime_us: int
     answers: list[Answer]
     sessions: dict[int, int]
-    stopped: list[Answer]
+    called_off: bool = False
+    stopped: list[Answer] = field(default_factory=list)
     late: list[Answer] = field(default_factory=list)
-    by_another: list[int] = field(default_factory=list)
-
-    @property
-    def called_off(self) -> bool:
-        """Nobody was to start."""
-        return bool(self.stopped)
+    dropouts: Dropouts = field(default_factory=Dropouts)
 
 
 def start(
@@ -335,17 +341,21 @@ def start(
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
-    From then on they are held: as long as the fleet listens, they hear that the operator is there.
-    Where this raises, as the fleet's watch does, they may drive: who calls it stops them. One that
-    is to drive on by itself, and does not begin with the others, is stopped: by a clock that is
-    behind it would begin when nobody expects it.
+    Up to the instant a robot may drop out that has accepted: it starts anew, is not heard any more,
+    is stopped by another or told something else. Then all others are told to stop, and if one does
+    not begin with them, too. Robots that another operator is to start instead are left to him.
+
+    From the instant on they are held: as long as the fleet listens, they hear that the operator is
+    there. Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
+    One of a partial start that is to drive on by itself, and does not begin, is stopped: by a clock
+    that is behind it would begin when nobody expects it.
 
     Args:
         fleet: where they are.
         robots: whom to start.
         behavior: to select first, or the script to play; empty: as they are.
         ahead_s: from now to the instant.
-        partial: start though some do not answer or refuse.
+        partial: start though some do not answer, refuse, or drop out; not if one is stopped.
         verb: start, or play script.
         link_timeout_ms: as of tell().
     """
@@ -354,8 +364,8 @@ def start(
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
 
-    def stoppers() -> list[int]:
-        return _stopped_by_another(fleet, robots, command.seq)
+    def dropouts() -> Dropouts:
+        return find_dropouts(fleet, robots, command.seq, only_stopped=partial)
 
     given = tell(
         fleet,
@@ -363,75 +373,54 @@ def start(
         robots,
         until_s=instant_s - CALL_OFF_S,
         link_timeout_ms=link_timeout_ms,
-        enough=stoppers,
+        enough=dropouts,
     )
     agreed = partial or all(a.accepted and a.signed for a in given)
     if agreed:
-        fleet.listen(instant_s - time.monotonic(), stoppers)
-    by_another = stoppers()
-    stopped: list[Answer] = []
-    late: list[Answer] = []
-    if agreed and not by_another:
-        late = _begin(fleet, given, is_held=link_timeout_ms != 0)
-    else:
-        stopped = stop(fleet, robots)
-        told = _stopped_by_another(fleet, robots, command.seq, was_told=True)
-        by_another = sorted({*by_another, *told})
+        fleet.listen(instant_s - time.monotonic(), dropouts)
+    if dropouts().taken:  # that operator may be about to tell more of them
+        fleet.listen(min(OTHERS_S, instant_s - CALL_OFF_S - time.monotonic()))
+    out, stopped, late = dropouts(), [], []
+    if agreed and not out:
+        patience_s = LATE_S if partial and not link_timeout_ms else BEGUN_S
+        waiting = _not_begun(fleet, given, patience_s)
+        waiting -= find_dropouts(fleet, robots, command.seq, only_stopped=False).taken
+        if waiting and not partial:
+            out = dropouts().beside(dict.fromkeys(waiting, NOT_BEGUN))
+        elif waiting and not link_timeout_ms:
+            late = stop(fleet, waiting)
+    called_off = bool(out) or not agreed
+    if called_off:
+        fleet.held -= out.taken
+        stopped = stop(fleet, robots - out.taken) if robots - out.taken else []
+        out = out.beside(stopped_by_another(fleet, robots - out.taken, command.seq))
     sessions = {
         i: robot.signed_acks[command.seq].session
         for i in robots
         if (robot := fleet.robots.get(i)) and command.seq in robot.signed_acks
     }
     # An answer that came after the start was called off does not tell why it was.
-    final = given if stopped else answers(fleet, command, robots)
-    return Start(command.start_utime_us, final, sessions, stopped, late, by_another)
+    final = given if called_off else answers(fleet, command, robots)
+    return Start(command.start_utime_us, final, sessions, called_off, stopped, late, out)
 
 
-def _stopped_by_another(
-    fleet: Fleet, robots: set[int], seq: int, *, was_told: bool = False
-) -> list[int]:
-    """Those that have accepted a command, and signed since that they obeyed another's stop.
-
-    Args:
-        fleet: where they are.
-        robots: of whom it is asked.
-        seq: the command's number.
-        was_told: a stop was said from here, too: that one is not armed shows no other's.
-    """
-    known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
-    accepted = [
-        (robot, ack) for robot in known if (ack := robot.signed_acks.get(seq)) and ack.accepted
-    ]
-    return [
-        robot.robot_id
-        for robot, ack in accepted
-        if _obeyed_a_stop(fleet, robot, ack) or (not was_told and _was_disarmed(robot, ack))
-    ]
-
-
-def _was_disarmed(robot: Robot, since) -> bool:
-    """After this signed_ack_t, as it has signed."""
-    link = robot.link
-    is_later = link.session == since.session and link.session_us > since.session_us
-    return is_later and not link.armed
-
-
-def _obeyed_a_stop(fleet: Fleet, robot: Robot, since) -> bool:
-    """Of somebody else, after this signed_ack_t."""
-    return any(
-        ack.verb == VERBS.VERB_STOP and ack.accepted and ack.session_us > since.session_us
-        for seq, ack in robot.signed_acks.items()
-        if seq not in fleet.said and ack.session == since.session
+def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
+    """All of some robots have signed that they obey a start that was said from here."""
+    return all(
+        i in fleet.robots
+        and any(
+            ack.accepted and ack.verb in (VERBS.VERB_START, VERBS.VERB_SCRIPT) and seq in fleet.said
+            for seq, ack in fleet.robots[i].signed_acks.items()
+        )
+        for i in robots
     )
 
 
-def _begin(fleet: Fleet, given: list[Answer], *, is_held: bool) -> list[Answer]:
-    """Waits until those that have accepted drive; of those that nobody holds, stops the others."""
+def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]:
+    """Waits until those that have accepted drive. Returns those that do not."""
     accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-    patience_s = BEGUN_S if is_held else LATE_S
     fleet.listen(patience_s, lambda: not any(robot.mode == "stopped" for robot in accepted))
-    waiting = {robot.robot_id for robot in accepted if robot.mode == "stopped"}
-    return stop(fleet, waiting) if waiting and not is_held else []
+    return {robot.robot_id for robot in accepted if robot.mode == "stopped"}
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:

@@ -183,6 +183,25 @@ static int write_text(const char *path, const char *text)
     return file != NULL && fclose(file) != 0 ? -1 : result;
 }
 
+// A signal, and the processes that get it, one right after the other. Whoever saw another end may
+// be done before its own signal comes.
+// @return how many got it, or -1 and errno.
+static long signal_all(char **word, int count)
+{
+    const int number = atoi(word[0]);
+    long reached = 0;
+    for (int i = 1; i < count; ++i)
+    {
+        const bool got_it = kill(atoi(word[i]), number) == 0;
+        if (!got_it && errno != ESRCH)
+        {
+            return -1;
+        }
+        reached += got_it;
+    }
+    return reached;
+}
+
 // Commands of words: their number follows from what they are.
 static long obey_words(uint8_t type, char **word, int count)
 {
@@ -192,7 +211,7 @@ static long obey_words(uint8_t type, char **word, int count)
         case 'y': return count > 0 ? spawn(word, full_pipe()) : -1;
         case 'n': return count == 1 ? take_number(word[0]) : -1;
         case 'w': return count == 2 ? write_text(word[0], word[1]) : -1;
-        case 'k': return count == 2 ? kill(atoi(word[0]), atoi(word[1])) : -1;
+        case 'k': return count > 1 ? signal_all(word, count) : -1;
         case 'd': return count == 2 ? child_of(word[0], word[1]) : -1;
         case 'o': return count == 3 ? camera_open(word[0], atoi(word[1]), atoi(word[2])) : -1;
         case 'c': return count == 3 ? camera_control(word[0], word[1], word[2]) : -1;

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who drops out of a start that he has accepted: by what he signs, or by silence."""
+
+import time
+
+import pytest
+import turbopi
+
+from twinmill.robots import tell
+from twinmill.robots.countdown import STOPPED, find_dropouts
+from twinmill.robots.fleet import GONE_S, TELEMETRY, Fleet, Heard, Robot
+
+KEY, SESSION, SEQ, OWN = bytes(range(32)), 7, 5, 1000
+VERBS, ARM = turbopi.swarm_command_t, turbopi.signed_command_t.VERB_ARM
+
+
+class Bus:
+    """A network of which nothing comes, and that keeps what is signed."""
+
+    def __init__(self):
+        self.counters = []
+
+    def subscribe(self, *_):
+        pass
+
+    def handle_timeout(self, timeout_ms):
+        time.sleep(timeout_ms / 1e3)
+        return False
+
+    def publish(self, _, data):
+        self.counters.append(turbopi.signed_command_t.decode(data).counter)
+
+
+def link(**fields):
+    """One of a moment after the start was accepted, which speaks for it."""
+    said = turbopi.link_t()
+    usual = {"session": SESSION, "session_us": 2_000_000, "armed": True, "counter": OWN}
+    for name, value in (usual | fields).items():
+        setattr(said, name, value)
+    return said
+
+
+@pytest.fixture
+def accepted():
+    """A fleet of one robot that has accepted a start from here."""
+    fleet = Fleet("", connect=lambda _: Bus(), key=KEY)
+    now_s, robot = time.monotonic(), Robot(1)
+    robot.link, robot.link_s, robot.heard_s, robot.telemetry = link(), now_s, now_s, TELEMETRY()
+    ack = turbopi.signed_ack_t()
+    ack.session, ack.session_us, ack.accepted, ack.verb = SESSION, 1_000_000, True, VERBS.VERB_START
+    robot.signed_acks = {SEQ: ack}
+    fleet.robots, fleet.said, fleet.counter = {1: robot}, {SEQ}, OWN
+    return fleet, robot
+
+
+def dropouts(fleet, **options):
+    return find_dropouts(fleet, {1}, SEQ, **({"only_stopped": False} | options))
+
+
+def test_who_signs_that_the_start_is_what_it_was_told_last_stays(accepted):
+    fleet, _ = accepted
+    assert not dropouts(fleet)
+
+
+@pytest.mark.parametrize(
+    ("says", "words"),
+    [
+        ({"session": SESSION + 1, "session_us": 0}, "started anew"),
+        ({"armed": False}, STOPPED),
+        ({"status_flags": TELEMETRY.STATUS_LINK_LOST}, "without word from this command"),
+        ({"counter": OWN + 1}, "another operator who was not heard"),
+    ],
+)
+def test_who_signs_something_else_since_drops_out(accepted, says, words):
+    fleet, robot = accepted
+    robot.link = link(**says)
+    out = dropouts(fleet)
+    assert words in out.words[1] and not out.taken
+    assert bool(dropouts(fleet, only_stopped=True)) == (words == STOPPED)
+
+
+def test_what_was_signed_before_the_start_speaks_against_nothing(accepted):
+    """A link that came before the answer: armed and started since."""
+    fleet, robot = accepted
+    robot.link = link(session_us=900_000, armed=False, counter=OWN - 1)
+    assert not dropouts(fleet)
+
+
+@pytest.mark.parametrize("silent", ["heard_s", "link_s"])
+def test_who_is_not_heard_any_more_drops_out(accepted, silent):
+    fleet, robot = accepted
+    setattr(robot, silent, time.monotonic() - GONE_S - 1.5)
+    assert "not heard any more" in dropouts(fleet).words[1]
+
+
+@pytest.mark.parametrize(
+    ("verb", "is_taken"), [(VERBS.VERB_START, True), (VERBS.VERB_SELECT, False)]
+)
+def test_the_start_of_another_operator_takes_a_robot_and_no_other_command_does(
+    accepted, verb, is_taken
+):
+    fleet, robot = accepted
+    robot.link = link(counter=OWN + 9)
+    robot.commands = {OWN + 9: Heard(6, verb, SESSION, OWN + 9, "start milling at 12:00:01")}
+    assert (dropouts(fleet).taken == {1}) == is_taken == bool(dropouts(fleet))
+
+
+def test_a_command_is_above_what_was_said_before_though_no_link_has_come_since(accepted):
+    """A robot obeys a counter once; after a laptop that was a day ahead all of them are ahead."""
+    fleet, robot = accepted
+    robot.link = link(counter=2 * time.time_ns() // 1000)
+    for verb in (ARM, VERBS.VERB_SELECT):
+        tell.tell(fleet, tell.make_command(verb), {1}, until_s=time.monotonic() + 0.05)
+    arm, select = sorted(set(fleet.bus.counters))
+    assert robot.link.counter < arm < select
+    assert fleet.bus.counters == sorted(fleet.bus.counters)
