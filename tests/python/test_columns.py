@@ -232,8 +232,8 @@ def test_rows_out_of_order_and_repeated_stamps_are_put_right_and_said(imported):
         "t_s,robot_id,x_m,y_m,theta_rad\n1,4,1,0,0\n0,4,0,0,0\n1,4,9,0,0\n-0.5,4,-1,0,0\n"
     )
     np.testing.assert_allclose(robot.pose[:, 0], [-1, 0, 9])
-    assert any("2 rows are earlier" in w for w in warnings)
-    assert any("1 rows repeat a stamp" in w for w in warnings)
+    assert any("2 rows earlier" in w for w in warnings)
+    assert any("1 row repeats a stamp" in w for w in warnings)
 
 
 STAMPS_S = np.round(0.02 * np.arange(200), 2)  # of poses; a command is told each half second

@@ -353,7 +353,7 @@ def test_messages_that_are_exchanged_are_sorted_and_that_is_said(tmp_path):
     swapped = _poses(stamp_of=lambda k, t: START_S + TIMES_S[k ^ 1 if k < 20 else k])
     robots, warnings = _import(_written(tmp_path / "x.mcap", swapped, _twists()), robot_id=1)
     assert len(robots[1].pose_t_s) == 60
-    assert "/pose: 10 messages are earlier than the one before; sorted." in warnings
+    assert "/pose: 10 messages earlier than the one before; sorted." in warnings
 
 
 def test_a_clock_that_began_at_zero_is_refused_with_the_remedy(tmp_path):

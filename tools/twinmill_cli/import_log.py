@@ -16,6 +16,7 @@ from twinmill_cli.output import print_object
 from twinmill_cli.spelling import typed
 
 if working():  # not for --help
+    from twinmill.counted import counted
     from twinmill.data.importers.columns import Guess, is_usual, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
     from twinmill.data.importers.plain import KNOWN
@@ -487,7 +488,8 @@ def _print(summary: dict) -> None:
     if any("detections" in robot for robot in summary["robots"]):
         columns["detections"] = "detections"
     table = Table(
-        f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s",
+        f"{summary['out']}: {counted(summary['messages'], 'message')}, "
+        f"{summary['duration_s']:.1f} s",
         list(columns.values()),
         [
             [Cell("-" if robot.get(key) is None else str(robot[key])) for key in columns]
