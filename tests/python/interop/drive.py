@@ -63,6 +63,17 @@ def export(folder: Path, to: str, name: str) -> None:
     tm.load(write_log(folder)).export(folder / name, to=to)
 
 
+def told_at(log_path: Path) -> bool:
+    """Whether each command of a file that was imported is at the time of its frame."""
+    import numpy as np
+
+    from twinmill.data.log import read_log
+
+    robot = read_log(log_path).robots[ROBOT]
+    due_s = robot.pose_t_s[0] + np.arange(COUNT) * STEP_US * 1e-6
+    return len(robot.command_t_s) == COUNT and np.allclose(robot.command_t_s, due_s, atol=2e-6)
+
+
 def told_of_import(log_path: Path, kind: str) -> dict[str, bool]:
     """What came of a file that was imported: times, places, gaps and commands."""
     import numpy as np

@@ -13,25 +13,35 @@ from interop.cells import Cell, Told, reads, writes
 BAG, LOG = "bag", "read.lcmlog"
 POSE, TWIST = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Twist"
 ROS2 = ("ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-geometry-msgs==5.3.6")
-TOPICS = {"/r01/pose": POSE, "/r01/cmd_vel": TWIST}
+STAMPED = "geometry_msgs/msg/TwistStamped"  # what ros2_control's wheels are told, from Jazzy on
+TOPICS = {"/r01/pose": POSE, "/r01/cmd_vel": TWIST, "/r01/reference": STAMPED}
+LATE_NS, BARE = 30_000_000, 10  # stamped commands are recorded late; this one has no stamp
 FILES = {"foxglove": "bag.mcap", "ros2": "bag_db3", "rclpy": "ros.mcap", "ros1": "drive.bag"}
 LINE = "=" * 80 + "\n"
+HEADER = [
+    "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+    "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+]
+VECTORS = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"
+VECTOR = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
 DEFINITIONS = {  # as `ros2 bag record` puts them into a file
     POSE: LINE.join(
         [
             "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
-            "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
-            "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+            *HEADER,
             "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\n"
             "geometry_msgs/Quaternion orientation\n",
             "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n",
             "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
         ]
     ),
-    TWIST: LINE.join(
+    TWIST: LINE.join([VECTORS, VECTOR]),
+    STAMPED: LINE.join(
         [
-            "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
-            "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
+            "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
+            *HEADER,
+            f"MSG: geometry_msgs/Twist\n{VECTORS}",
+            VECTOR,
         ]
     ),
 }
@@ -167,10 +177,16 @@ def _reads(name: str):
     def ours(folder: Path) -> Told:
         import twinmill as tm
 
-        pose, command = TOPICS
-        log = tm.import_log(bag=folder / FILES[name], pose=[pose], command=[command], robot_id=1)
-        log.save(folder / LOG)
-        return drive.told_of_import(folder / LOG, "twist")
+        pose, *commands = TOPICS
+        told = []
+        for command in commands:
+            bag = folder / FILES[name]
+            log = tm.import_log(bag=bag, pose=[pose], command=[command], robot_id=1)
+            log.save(folder / LOG, force=True)
+            told.append(drive.told_of_import(folder / LOG, "twist"))
+        plain, stamped = told
+        by_their_stamps = stamped["commands as twist"] and drive.told_at(folder / LOG)
+        return plain | {"commands as stamped twist, by their stamps": by_their_stamps}
 
     return ours
 
@@ -193,7 +209,20 @@ def foxglove_writes(folder: Path) -> None:
                 "angular": _vector(0),
             }
             writer.write_message("/r01/cmd_vel", schemas["/r01/cmd_vel"], twist, at_ns, at_ns)
+            stamped, late_ns = {"header": _header(_stamp(k)), "twist": twist}, at_ns + LATE_NS
+            writer.write_message(
+                "/r01/reference", schemas["/r01/reference"], stamped, late_ns, late_ns
+            )
         writer.finish()
+
+
+def _stamp(k: int) -> tuple[int, int]:
+    """Of a stamped command, s and ns; all are of their frame but one, which has none."""
+    return divmod(1000 * (drive.START_US + k * drive.STEP_US) * (k != BARE), 10**9)
+
+
+def _header(stamp: tuple[int, int], frame: str = "") -> dict:
+    return {"stamp": dict(zip(("sec", "nanosec"), stamp, strict=True)), "frame_id": frame}
 
 
 def _vector(x: float) -> dict:
@@ -201,10 +230,10 @@ def _vector(x: float) -> dict:
 
 
 def _pose(k: int) -> dict:
-    sec, nanosec = divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9)
+    stamp = divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9)
     x_m = drive.x_m(k) if drive.seen(k) else float("nan")
     return {
-        "header": {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": "map"},
+        "header": _header(stamp, "map"),
         "pose": {"position": _vector(x_m), "orientation": _vector(0) | {"w": 1.0}},
     }
 
@@ -225,7 +254,7 @@ def rosbags_writes(folder: Path) -> None:
 @reads("rosbag2", "ROS 2 Jazzy, its messages", *ROS2, "mcap==1.6.0", ours=_reads("rclpy"))
 def ros2_writes(folder: Path) -> None:
     """Bytes that a node would send; the file around them is written by Foxglove's library."""
-    from geometry_msgs.msg import PoseStamped, Twist
+    from geometry_msgs.msg import PoseStamped, TwistStamped
     from mcap.writer import Writer
     from rclpy.serialization import serialize_message
 
@@ -239,11 +268,15 @@ def ros2_writes(folder: Path) -> None:
             for topic, kind in TOPICS.items()
         }
         for k in range(drive.COUNT):
-            pose, told, at_ns = PoseStamped(), Twist(), 1000 * (drive.START_US + k * drive.STEP_US)
+            pose, stamped = PoseStamped(), TwistStamped()
+            at_ns = 1000 * (drive.START_US + k * drive.STEP_US)
             pose.header.stamp.sec, pose.header.stamp.nanosec = divmod(at_ns, 10**9)
-            _fill(k, pose, told)
-            for topic, message in zip(TOPICS, (pose, told), strict=True):
-                writer.add_message(channels[topic], at_ns, serialize_message(message), at_ns)
+            stamped.header.stamp.sec, stamped.header.stamp.nanosec = _stamp(k)
+            _fill(k, pose, stamped.twist)
+            messages = (pose, at_ns), (stamped.twist, at_ns), (stamped, at_ns + LATE_NS)
+            for topic, (message, received_ns) in zip(TOPICS, messages, strict=True):
+                raw = serialize_message(message)
+                writer.add_message(channels[topic], received_ns, raw, received_ns)
         writer.finish()
 
 
@@ -279,17 +312,18 @@ def ros_writes(folder: Path) -> None:
 def by_ros(path: str) -> None:
     """The drive, each message written as a node would."""
     import rosbag
-    from geometry_msgs.msg import PoseStamped, Twist
-    from rospy import Time
+    from geometry_msgs.msg import PoseStamped, TwistStamped
+    from rospy import Duration, Time
 
     with rosbag.Bag(path, "w") as bag:
         for k in range(drive.COUNT):
             at = Time(*divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9))
-            pose, told = PoseStamped(), Twist()
-            pose.header.stamp = at
-            _fill(k, pose, told)
+            pose, stamped = PoseStamped(), TwistStamped()
+            pose.header.stamp, stamped.header.stamp = at, Time(*_stamp(k))
+            _fill(k, pose, stamped.twist)
             bag.write("/r01/pose", pose, at)
-            bag.write("/r01/cmd_vel", told, at)
+            bag.write("/r01/cmd_vel", stamped.twist, at)
+            bag.write("/r01/reference", stamped, at + Duration(0, LATE_NS))
 
 
 def _messages(types: dict, **header):
@@ -305,11 +339,11 @@ def _messages(types: dict, **header):
         place = types["geometry_msgs/msg/Pose"](point(x_m, 0.0, 0.0), turn(0.0, 0.0, 0.0, 1.0))
         yield at_ns, "/r01/pose", types[POSE](head, place)
         speed_mps = drive.SPEED_MPS * (k >= drive.STANDS)
-        yield (
-            at_ns,
-            "/r01/cmd_vel",
-            types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0)),
-        )
+        twist = types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+        yield at_ns, "/r01/cmd_vel", twist
+        stamp = types["builtin_interfaces/msg/Time"](*_stamp(k))
+        head = types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **header)
+        yield at_ns + LATE_NS, "/r01/reference", types[STAMPED](head, twist)
 
 
 NOT_RUN = [
