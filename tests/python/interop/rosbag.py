@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from interop import drive
@@ -24,6 +25,7 @@ HEADER = [
 ]
 VECTORS = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"
 VECTOR = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+VELOCITY, SPEEDS = (0.2, -0.1, 0.5), (1.0, 2.0, 3.0, 4.0)  # m/s and rad/s; rad/s of four wheels
 DEFINITIONS = {  # as `ros2 bag record` puts them into a file
     POSE: LINE.join(
         [
@@ -48,7 +50,23 @@ DEFINITIONS = {  # as `ros2 bag record` puts them into a file
 
 
 def _write(folder: Path) -> None:
-    drive.export(folder, "rosbag2", BAG)
+    drive.export(folder, "rosbag2", BAG, _driven_otherwise())
+
+
+def _driven_otherwise() -> Iterator[drive.Event]:
+    """A robot that is told velocities, and one whose wheel speeds are known."""
+    import turbopi
+
+    at_us = drive.START_US + drive.COUNT * drive.STEP_US
+    kinds = {
+        2: (turbopi.drive_t.KIND_TWIST, VELOCITY),
+        3: (turbopi.drive_t.KIND_WHEEL_SPEED, SPEEDS),
+    }
+    for robot, (kind, values) in kinds.items():
+        told = turbopi.drive_t()
+        told.utime_us, told.robot_id, told.kind = at_us, robot, kind
+        told.value = [*values, 0.0][:4]
+        yield at_us, f"R{robot:02d}_DRIVE", told.encode()
 
 
 def _told(rows: dict[str, list]) -> Told:
@@ -68,15 +86,25 @@ def _told(rows: dict[str, list]) -> Told:
     }
 
 
+def _stamped(rows: dict[str, list]) -> Told:
+    """The one command of the robot that is told velocities."""
+    ((at_ns, message),) = rows["/r02/cmd_vel"]
+    twist, stamp = message.twist, message.header.stamp
+    same = stamp.sec * 10**9 + stamp.nanosec == at_ns
+    told = twist.linear.x, twist.linear.y, twist.angular.z
+    return {"velocities, as TwistStamped": same and told == VELOCITY}
+
+
 def _frames(rows: dict[str, list]) -> Told:
-    """What `/tf` has beside them."""
+    """What `/tf` has beside them, and wheels."""
     frames = [message.transforms[0] for _, message in rows["/tf"]]
     here = [k for k in range(drive.COUNT) if drive.seen(k)]
     return {
         "frames of tf": all(
             abs(one.transform.translation.x - drive.x_m(k)) < 1e-9
             for k, one in zip(here, frames, strict=True)
-        )
+        ),
+        "wheels, as JointState": tuple(rows["/r03/wheels"][0][1].velocity) == SPEEDS,
     }
 
 
@@ -92,7 +120,7 @@ def foxglove(folder: Path) -> Told:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         for _, channel, message, decoded in reader.iter_decoded_messages():
             rows.setdefault(channel.topic, []).append((message.log_time, decoded))
-    return _told(rows) | _frames(rows)
+    return _told(rows) | _stamped(rows) | _frames(rows)
 
 
 @writes("rosbag2", "rosbags", "rosbags==0.11.9", ours=_write)
@@ -105,19 +133,19 @@ def rosbags(folder: Path) -> Told:
         for connection, at_ns, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             rows.setdefault(connection.topic, []).append((at_ns, message))
-    return _told(rows) | _frames(rows)
+    return _told(rows) | _stamped(rows) | _frames(rows)
 
 
 @writes("rosbag2", "ROS 2 Jazzy, its messages", *ROS2, "mcap==1.6.0", ours=_write)
 def ros2(folder: Path) -> Told:
     """ROS's own messages out of the file's bytes; the file around them is opened by Foxglove's."""
     import yaml
-    from geometry_msgs.msg import PoseStamped
+    from geometry_msgs.msg import PoseStamped, TwistStamped
     from mcap.reader import make_reader
     from rclpy.serialization import deserialize_message
     from std_msgs.msg import Float64, Float64MultiArray, Int8
 
-    known = {f"geometry_msgs/msg/{PoseStamped.__name__}": PoseStamped}
+    known = {POSE: PoseStamped, STAMPED: TwistStamped}
     known |= {f"std_msgs/msg/{kind.__name__}": kind for kind in (Float64, Float64MultiArray, Int8)}
     rows: dict[str, list] = {}
     with (folder / BAG / f"{BAG}.mcap").open("rb") as stream:
@@ -131,7 +159,11 @@ def ros2(folder: Path) -> Told:
         for topic in information["rosbag2_bagfile_information"]["topics_with_message_count"]
     ]
     hashes = {topic["type"]: topic["type_description_hash"] for topic in of_topics}
-    return _told(rows) | {"hashes of types": all(hashes[kind] == _hash(kind) for kind in known)}
+    return (
+        _told(rows)
+        | _stamped(rows)
+        | {"hashes of types": all(hashes[kind] == _hash(kind) for kind in known)}
+    )
 
 
 def _hash(kind: str) -> str:
@@ -170,6 +202,8 @@ def plotjuggler(folder: Path) -> Told:
         "places": all(abs(x_m - drive.x_m(k)) < 1e-9 for k, x_m in places),
         "duties": [50 * (k >= drive.STANDS) for k in range(drive.COUNT)]
         == curves["/r01/duty_pct/data[3]"],
+        "velocities, as TwistStamped": curves["/r02/cmd_vel/twist/linear/y"] == [VELOCITY[1]],
+        "wheels, as JointState": curves["/r03/wheels/velocity[1]"] == [SPEEDS[1]],
     }
 
 
