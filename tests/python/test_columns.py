@@ -5,6 +5,7 @@ import re
 import shlex
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -446,3 +447,20 @@ def test_columns_with_numbers_that_are_no_robots_stay(imported):
         robot, warnings = imported(commands=table)
         np.testing.assert_allclose(robot.command[0], [1, 2, 3, 4])
         assert not any("side by side" in w for w in warnings)
+
+
+def test_an_index_that_pandas_writes_without_a_name_is_the_time_if_it_holds_dates(imported):
+    """`DataFrame.to_csv` of rows by a DatetimeIndex; rows by numbers say nothing of time."""
+    stamps = pd.date_range("2026-01-05 10:00:30", periods=3, freq="20ms", tz="Europe/Berlin")
+    frame = pd.DataFrame({"x_m": [0.0, 0.1, 0.2], "y_m": 0.0, "theta_rad": 0.0, "robot_id": 4})
+    told = COMMANDS.replace("\n0,4", "\n2026-01-05T09:00:30Z,4")
+    robot, said = imported(frame.set_index(stamps).to_csv(), told)
+    np.testing.assert_allclose(np.diff(robot.pose_t_s), 0.02, atol=2e-6)
+    assert any("first column has no name; taken for the time" in w for w in said)
+    for index in (frame.index, stamps):  # beside a time of its own
+        robot, _ = imported(frame.assign(t_s=[0.0, 0.5, 1.0]).set_index(index).to_csv())
+        np.testing.assert_allclose(np.diff(robot.pose_t_s), 0.5, atol=2e-6)
+    with pytest.raises(
+        LogError, match=r"column t_s is missing.*that Unnamed: 0 holds it: .*Unnamed"
+    ):
+        imported(frame.set_index(pd.Index([0.0, 0.1, 0.2])).to_csv())
