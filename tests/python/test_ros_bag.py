@@ -110,6 +110,8 @@ def test_odometry_is_said_and_what_others_measured_is_guessed_before_it(tmp_path
     bag = _bag(tmp_path / "bag", StoragePlugin.SQLITE3)
     topics = [*list_topics(bag), Topic("/r03/odom", "nav_msgs/msg/Odometry", 1000, "pose")]
     assert guess_pairs(topics) == [("/r03/pose", "/r03/cmd_vel")]
+    stamped = Topic("/r03/reference", "geometry_msgs/msg/TwistStamped", 200, "command")
+    assert guess_pairs([*topics, stamped]) == [("/r03/pose", "/r03/reference")]
     with Writer(tmp_path / "odom", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         kinds = {"/odom": "nav_msgs/msg/Odometry", "/cmd_vel": "geometry_msgs/msg/Twist"}
         of = {t: writer.add_connection(t, kind, typestore=STORE) for t, kind in kinds.items()}

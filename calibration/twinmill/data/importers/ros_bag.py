@@ -183,7 +183,7 @@ def _parts(kind: str, message: object) -> Iterator[str]:
 
 
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
-    """Pose and command topic of each robot: of one name; the one with most messages.
+    """Pose and command topic of each robot: of one name; the one with most messages, or stamped.
 
     Where nothing is a command, what odometry measured stands in, beside its own poses if there are
     no others. Poses without either have an empty name as their command.
@@ -209,7 +209,8 @@ def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
         ]
         if poses:
             best = max(poses, key=lambda t: (t.robot == robot, *_likely(t)))
-            pairs.append((best.name, max(commands, key=lambda t: t.count).name))
+            told = max(commands, key=lambda t: (t.count, t.kind.endswith("Stamped")))
+            pairs.append((best.name, told.name))
     return pairs
 
 
