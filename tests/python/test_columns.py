@@ -464,3 +464,18 @@ def test_an_index_that_pandas_writes_without_a_name_is_the_time_if_it_holds_date
         LogError, match=r"column t_s is missing.*that Unnamed: 0 holds it: .*Unnamed"
     ):
         imported(frame.set_index(pd.Index([0.0, 0.1, 0.2])).to_csv())
+
+
+def test_a_robot_that_stops_when_it_hears_nothing_stands_until_the_next_command(imported):
+    """As diff_drive_controller does by its `cmd_vel_timeout`: driven by hand, key by key."""
+    rows = ((0, 0.2), (0.3, 0.1), (1.4, -0.2))
+    told = "t_s,robot_id,vx_mps,vy_mps,omega_radps\n"
+    told += "".join(f"{t_s},4,{vx_mps},0,0\n" for t_s, vx_mps in rows)
+    robot, said = imported(commands=told, command_timeout_s=0.5)
+    np.testing.assert_allclose(robot.command_t_s, [0, 0.3, 0.8, 1.4, 1.9], atol=2e-6)
+    np.testing.assert_allclose(robot.command[:, 0], [0.2, 0.1, 0, -0.2, 0])
+    assert any("robot 4: stopped 2 times, 0.5 s after" in words for words in said)
+    held, _ = imported(commands=told)
+    np.testing.assert_allclose(held.command[:, 0], [0.2, 0.1, -0.2])
+    with pytest.raises(LogError, match=r"command_timeout_s=0: must be a time above 0 s"):
+        imported(commands=told, command_timeout_s=0)

@@ -184,6 +184,13 @@ def _command(
             "rad/s of the wheels."
         ),
     ] = None,
+    command_timeout_s: Annotated[
+        float | None,
+        typer.Option(
+            help="Of a robot that stops by itself when it hears no command for so long, as "
+            "ros2_control's do after 0.5 s; else each command holds until the next."
+        ),
+    ] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option(
@@ -317,6 +324,7 @@ def _command(
         wheelbase_m=wheelbase_m,
         full_duty=full_duty,
         wheel_factor=wheel_factor,
+        command_timeout_s=command_timeout_s,
         robot_id=robot_id,
         rename=renames.pop(None, {}),
         own_renames=renames,

@@ -110,7 +110,7 @@ def pinocchio(folder: Path) -> Told:
     wheel = model.inertias[model.getJointId("fl_wheel_joint")]
     return {
         "mass": math.isclose(pinocchio.computeTotalMass(model), MASS_KG),
-        "wheels' joints": JOINTS <= set(model.names),
+        "wheels' joints": set(model.names) >= JOINTS,
         "top speed of wheels": all(abs(top / TOP_RADPS - 1) < 1e-4 for top in tops_radps),
         "inertia": math.isclose(wheel.inertia.max(), 0.5 * wheel.mass * WHEEL_RADIUS_M**2),
         "camera's frame": model.existFrame("camera_link"),
@@ -133,7 +133,7 @@ def newton(folder: Path) -> Told:
     masses_kg = model.body_mass.numpy()
     return {
         "mass": math.isclose(masses_kg.sum(), MASS_KG, rel_tol=1e-5),
-        "wheels' joints": JOINTS <= set(names),
+        "wheels' joints": set(names) >= JOINTS,
         "top speed of wheels": all(abs(top / TOP_RADPS - 1) < 1e-4 for top in tops_radps),
         "camera's frame": any(label.endswith("camera_link") for label in model.body_label),
     }
