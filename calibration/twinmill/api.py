@@ -138,6 +138,7 @@ IMPORT_OPTIONS: dict[str, tuple[str, Any, str]] = {
     "wheelbase_m": ("wheelbase_m", *NUMBER),
     "full_duty": ("full_duty", *NUMBER),
     "wheel_factor": ("wheel_factor", *NUMBER),
+    "command_timeout_s": ("command_timeout_s", *NUMBER),
 }
 Form = TypeVar("Form", bound=StrEnum)
 Told = TypeVar("Told", bound="Shown")
@@ -2057,7 +2058,7 @@ def import_log(
             `pose_shift_s` and `pose_clock_ppm`, numbers, or dictionaries by robot;
             `heading_from_path`, `same_clock`; of a bag `pose` and `command` (lists of
             topics), `receive_stamps`, `wheelbase_m`, `full_duty`; of wheel speeds
-            `wheel_factor`.
+            `wheel_factor`; `command_timeout_s`, after which a robot stops that hears nothing.
 
     Returns:
         A log; it is in no file unless it is saved.

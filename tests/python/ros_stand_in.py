@@ -10,14 +10,21 @@ START_S = 1_700_000_000  # of its clock, since the Unix epoch
 class StandIn:
     """As much of rclpy as a publisher needs; its clock runs a tick at a time."""
 
-    def __init__(self, monkeypatch, stop_after=10**9, listens_at_s=0.0):
-        self.said, self.now_s, self.stop_after = [], 0.0, stop_after
+    def __init__(self, monkeypatch, stop_after=10**9, listens_at_s=0.0, **parameters):
+        self.said, self.stamps_s, self.now_s, self.stop_after = [], [], 0.0, stop_after
         self.listens_at_s = listens_at_s
         stand_in = self
 
         class Node:
             def __init__(self, name):
                 pass
+
+            def declare_parameter(self, name, value):
+                return types.SimpleNamespace(value=parameters.get(name, value))
+
+            def get_clock(self):
+                stamp = types.SimpleNamespace(to_msg=lambda: START_S + stand_in.now_s)
+                return types.SimpleNamespace(now=lambda: stamp)
 
             def create_publisher(self, kind, topic, depth):
                 return types.SimpleNamespace(
@@ -38,6 +45,9 @@ class StandIn:
         def twist():
             return types.SimpleNamespace(linear=vector(), angular=vector())
 
+        def twist_stamped():
+            return types.SimpleNamespace(header=types.SimpleNamespace(stamp=0), twist=twist())
+
         rclpy = types.ModuleType("rclpy")
         rclpy.init, rclpy.spin = lambda **_: None, self.spin
         rclpy.shutdown = lambda: None
@@ -48,12 +58,15 @@ class StandIn:
                 SignalHandlerOptions=types.SimpleNamespace(NO=0)
             ),
             "geometry_msgs": types.ModuleType("geometry_msgs"),
-            "geometry_msgs.msg": types.SimpleNamespace(Twist=twist),
+            "geometry_msgs.msg": types.SimpleNamespace(Twist=twist, TwistStamped=twist_stamped),
         }
         for name, module in modules.items():
             monkeypatch.setitem(__import__("sys").modules, name, module)
 
-    def hear(self, twist):
+    def hear(self, message):
+        twist = getattr(message, "twist", message)
+        if twist is not message:
+            self.stamps_s.append(message.header.stamp - START_S)
         self.said.append((self.now_s, twist.linear.x, twist.linear.y, twist.angular.z))
 
     def spin(self, node):

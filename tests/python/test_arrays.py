@@ -96,6 +96,20 @@ def test_stamps_of_pandas_are_the_epochs():
     assert log.duration_s == pytest.approx(T_S[-1])
 
 
+def test_stamps_with_a_zone_are_the_epochs_and_an_index_of_stamps_is_said():
+    """Noon in UTC is two o'clock in a summer of Berlin."""
+    local = pd.to_datetime("2026-05-04T14:00:00").tz_localize("Europe/Berlin")
+    stamps = local + pd.to_timedelta(T_S, unit="s")
+    poses = pd.DataFrame(POSE, columns=["x_m", "y_m", "theta_rad"]).assign(t_s=stamps)
+    told = pd.DataFrame({"t_s": stamps, "vx_mps": 0.2, "vy_mps": 0.0, "omega_radps": 0.4})
+    log = tm.Log.from_frames(poses, told)
+    assert log.measurements()[0].recorded_utime_us == 1_777_896_000_000_000
+    indexed = poses.set_index("t_s")
+    with pytest.raises(tm.LogError, match=r"no column t_s.*frame.reset_index\(names='t_s'\)"):
+        tm.Log.from_frames(indexed, told)
+    tm.Log.from_frames(indexed.reset_index(names="t_s"), told)
+
+
 def test_steering_turns_as_a_bicycle():
     angle_rad = np.arctan(0.25 * OMEGA_RADPS / COMMANDS[0, 0])
     told = np.column_stack([COMMANDS[:, 0], np.full(len(COMMANDS), angle_rad)])

@@ -5,6 +5,7 @@ import re
 import shlex
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -232,8 +233,8 @@ def test_rows_out_of_order_and_repeated_stamps_are_put_right_and_said(imported):
         "t_s,robot_id,x_m,y_m,theta_rad\n1,4,1,0,0\n0,4,0,0,0\n1,4,9,0,0\n-0.5,4,-1,0,0\n"
     )
     np.testing.assert_allclose(robot.pose[:, 0], [-1, 0, 9])
-    assert any("2 rows are earlier" in w for w in warnings)
-    assert any("1 rows repeat a stamp" in w for w in warnings)
+    assert any("2 rows earlier" in w for w in warnings)
+    assert any("1 row repeats a stamp" in w for w in warnings)
 
 
 STAMPS_S = np.round(0.02 * np.arange(200), 2)  # of poses; a command is told each half second
@@ -446,3 +447,35 @@ def test_columns_with_numbers_that_are_no_robots_stay(imported):
         robot, warnings = imported(commands=table)
         np.testing.assert_allclose(robot.command[0], [1, 2, 3, 4])
         assert not any("side by side" in w for w in warnings)
+
+
+def test_an_index_that_pandas_writes_without_a_name_is_the_time_if_it_holds_dates(imported):
+    """`DataFrame.to_csv` of rows by a DatetimeIndex; rows by numbers say nothing of time."""
+    stamps = pd.date_range("2026-01-05 10:00:30", periods=3, freq="20ms", tz="Europe/Berlin")
+    frame = pd.DataFrame({"x_m": [0.0, 0.1, 0.2], "y_m": 0.0, "theta_rad": 0.0, "robot_id": 4})
+    told = COMMANDS.replace("\n0,4", "\n2026-01-05T09:00:30Z,4")
+    robot, said = imported(frame.set_index(stamps).to_csv(), told)
+    np.testing.assert_allclose(np.diff(robot.pose_t_s), 0.02, atol=2e-6)
+    assert any("first column has no name; taken for the time" in w for w in said)
+    for index in (frame.index, stamps):  # beside a time of its own
+        robot, _ = imported(frame.assign(t_s=[0.0, 0.5, 1.0]).set_index(index).to_csv())
+        np.testing.assert_allclose(np.diff(robot.pose_t_s), 0.5, atol=2e-6)
+    with pytest.raises(
+        LogError, match=r"column t_s is missing.*that Unnamed: 0 holds it: .*Unnamed"
+    ):
+        imported(frame.set_index(pd.Index([0.0, 0.1, 0.2])).to_csv())
+
+
+def test_a_robot_that_stops_when_it_hears_nothing_stands_until_the_next_command(imported):
+    """As diff_drive_controller does by its `cmd_vel_timeout`: driven by hand, key by key."""
+    rows = ((0, 0.2), (0.3, 0.1), (1.4, -0.2))
+    told = "t_s,robot_id,vx_mps,vy_mps,omega_radps\n"
+    told += "".join(f"{t_s},4,{vx_mps},0,0\n" for t_s, vx_mps in rows)
+    robot, said = imported(commands=told, command_timeout_s=0.5)
+    np.testing.assert_allclose(robot.command_t_s, [0, 0.3, 0.8, 1.4, 1.9], atol=2e-6)
+    np.testing.assert_allclose(robot.command[:, 0], [0.2, 0.1, 0, -0.2, 0])
+    assert any("robot 4: stopped 2 times, 0.5 s after" in words for words in said)
+    held, _ = imported(commands=told)
+    np.testing.assert_allclose(held.command[:, 0], [0.2, 0.1, -0.2])
+    with pytest.raises(LogError, match=r"command_timeout_s=0: must be a time above 0 s"):
+        imported(commands=told, command_timeout_s=0)

@@ -17,6 +17,7 @@ import pyarrow.csv
 import pyarrow.parquet as pq
 import pytest
 import turbopi
+import yaml
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -203,7 +204,7 @@ def test_a_log_that_breaks_off_is_read_up_to_there(log, tmp_path, capsys):
     broken.write_bytes(log.read_bytes()[:-5])
     run(["export", str(broken), "--to", "mcap", "-o", str(tmp_path / "o.mcap"), "--json"])
     said = json.loads(capsys.readouterr().out)
-    assert said["messages"] == 85
+    assert said["log_messages"] == 85
     assert "breaks off" in said["warnings"][0]
     found = [m for m in mcap_messages(tmp_path / "o.mcap") if m.schema.name.startswith("turbopi.")]
     assert len(found) == 85
@@ -352,6 +353,10 @@ def test_what_is_said_to_be_written_is_what_mcaps_own_reader_counts(log, tmp_pat
         told = make_reader(stream).get_summary()
     counts = told.statistics.channel_message_counts
     assert said["written"] == {told.channels[k].topic: n for k, n in counts.items()}
+    assert said["messages"] == told.statistics.message_count
+    if to == "rosbag2":
+        listed = yaml.safe_load((tmp_path / "o/metadata.yaml").read_text())
+        assert said["messages"] == listed["rosbag2_bagfile_information"]["message_count"]
     run(["export", str(log), "--to", to, "-o", str(tmp_path / "o"), "--force"])
     words = f"{sum(counts.values())} messages in {len(counts)} topics: "
     assert capsys.readouterr().out.startswith(words)

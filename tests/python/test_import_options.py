@@ -201,6 +201,7 @@ ASKED = {
     "--wheelbase-m": ["--wheelbase-m", "0.3"],
     "--full-duty": ["--full-duty", "255"],
     "--wheel-factor": ["--wheel-factor", "0.1"],
+    "--command-timeout-s": ["--command-timeout-s", "0.004"],
     "--pose": ["--pose", "/r2/pose"],
     "--command": ["--command", "/r2/cmd_vel"],
 }

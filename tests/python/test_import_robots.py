@@ -106,7 +106,7 @@ def test_shifts_of_all_and_of_one_robot_add_up(imports):
         ("x_m", "lost", slice(700, 701), "row 2702: x_m is 'lost', not a number"),
         ("t_s", np.nan, slice(0, None), "row 2002: t_s is nan, but must be a finite number"),
         ("vx_mps", np.inf, slice(3, 4), "vx_mps is inf, but must be a finite number"),
-        ("vx_mps", np.nan, slice(0, None), "rows have an empty cell or NaN"),
+        ("vx_mps", np.nan, slice(0, None), "rows with an empty cell or NaN"),
     ],
     ids=["a word", "no time", "infinity", "no commands"],
 )
@@ -161,7 +161,7 @@ def test_rows_without_a_robot_are_left_out_and_counted(imports):
     poses, commands = pd.concat([p1, p2]).astype(object), pd.concat([c1, c2]).astype(object)
     poses.iloc[[100, 101, 2500], poses.columns.get_loc("robot_id")] = ""
     robots, said = imports([poses], [commands])
-    assert "p.csv: 3 rows have no robot_id (the first is row 102); left out." in said
+    assert "p.csv: 3 rows without robot_id (the first is row 102); left out." in said
     for number, gone in ((1, [100, 101]), (2, [500])):
         assert np.array_equal(robots[number].pose, np.delete(right[number].pose, gone, axis=0))
         np.testing.assert_array_equal(robots[number].command, right[number].command)

@@ -200,7 +200,7 @@ def test_numbers_that_no_pose_has_are_lost_poses(write_log, message):
     ]
     log = read_log(write_log(*[("R07_POSE", pose) for pose in poses]))
     assert log.robots[7].valid.tolist() == [False, False, True]
-    assert any("2 poses are marked valid but hold no position" in w for w in log.warnings)
+    assert any("2 poses marked valid without position" in w for w in log.warnings)
 
 
 def test_many_messages_of_another_type_are_no_damage(hundred):
@@ -249,7 +249,7 @@ def test_duties_beyond_full_are_clamped_and_told(write_log, message):
     )
     log = read_log(path)
     np.testing.assert_array_equal(log.robots[7].command, [[-1, 0.5, 1, 1]])
-    assert any("1 commands have a duty outside" in w for w in log.warnings)
+    assert any("1 command has a duty outside" in w for w in log.warnings)
     assert any("no poses" in w for w in log.warnings)
 
 
@@ -270,7 +270,7 @@ def test_valid_pose_without_unit_quaternion_is_lost(write_log, message):
     log = read_log(path)
     assert log.robots[7].valid.tolist() == [False, True]
     assert np.isnan(log.robots[7].pose[0]).all()
-    assert any("1 poses are marked valid" in w for w in log.warnings)
+    assert any("1 pose marked valid" in w for w in log.warnings)
 
 
 @pytest.mark.parametrize("name", ["telemetry_t", "pose_t", "drive_t", "truth_t"])

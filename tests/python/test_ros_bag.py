@@ -110,6 +110,8 @@ def test_odometry_is_said_and_what_others_measured_is_guessed_before_it(tmp_path
     bag = _bag(tmp_path / "bag", StoragePlugin.SQLITE3)
     topics = [*list_topics(bag), Topic("/r03/odom", "nav_msgs/msg/Odometry", 1000, "pose")]
     assert guess_pairs(topics) == [("/r03/pose", "/r03/cmd_vel")]
+    stamped = Topic("/r03/reference", "geometry_msgs/msg/TwistStamped", 200, "command")
+    assert guess_pairs([*topics, stamped]) == [("/r03/pose", "/r03/reference")]
     with Writer(tmp_path / "odom", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         kinds = {"/odom": "nav_msgs/msg/Odometry", "/cmd_vel": "geometry_msgs/msg/Twist"}
         of = {t: writer.add_connection(t, kind, typestore=STORE) for t, kind in kinds.items()}
@@ -353,7 +355,7 @@ def test_messages_that_are_exchanged_are_sorted_and_that_is_said(tmp_path):
     swapped = _poses(stamp_of=lambda k, t: START_S + TIMES_S[k ^ 1 if k < 20 else k])
     robots, warnings = _import(_written(tmp_path / "x.mcap", swapped, _twists()), robot_id=1)
     assert len(robots[1].pose_t_s) == 60
-    assert "/pose: 10 messages are earlier than the one before; sorted." in warnings
+    assert "/pose: 10 messages earlier than the one before; sorted." in warnings
 
 
 def test_a_clock_that_began_at_zero_is_refused_with_the_remedy(tmp_path):

@@ -67,6 +67,16 @@ def test_a_publisher_says_the_script_and_then_stops(folder, monkeypatch):
     np.testing.assert_allclose(np.diff(sent[:, 0]), 1, atol=0.06)
 
 
+def test_a_publisher_stamps_what_it_says_for_controllers_that_want_it(folder, monkeypatch):
+    assert convert("publisher", "p.py") == 0
+    stand_in = StandIn(monkeypatch, stamped=True)
+    stand_in.run(folder / "p.py", monkeypatch)
+    said = np.array(stand_in.said)
+    np.testing.assert_allclose(stand_in.stamps_s, said[:, 0], atol=1e-6)
+    np.testing.assert_allclose(said[np.argmin(np.abs(said[:, 0] - 1.5)), 1:], WANTED[1], atol=1e-5)
+    assert not said[-5:, 1:].any()
+
+
 def test_a_script_of_velocities_is_published_as_it_is(folder, monkeypatch):
     rows = [(0, 0, 0, 0), (1, 0.2, -0.1, 0), (2, 0, 0, 1.5), (3, 0, 0, 0)]
     text = "".join(f"{t},{x},{y},{w}\n" for t, x, y, w in rows)

@@ -267,7 +267,7 @@ def test_an_empty_cell_of_a_command_holds_the_one_before(imported):
     gaps = COMMANDS.assign(vx_mps=COMMANDS.vx_mps.where(COMMANDS.index % 50 != 20))
     robots, warnings = imported(commands=gaps)
     np.testing.assert_allclose(robots[4].command_t_s, gaps.t_s[gaps.vx_mps.notna()], atol=2e-6)
-    assert any("6 rows have an empty cell or NaN (the first is row 22)" in w for w in warnings)
+    assert any("6 rows with an empty cell or NaN (the first is row 22)" in w for w in warnings)
 
 
 @pytest.mark.parametrize("cut", [5, 25])
@@ -315,4 +315,4 @@ def test_detections_say_seen_in_words_and_have_no_range_of_nothing(imported, tmp
     files = tmp_path / "p.csv", tmp_path / "c.csv"
     summary = import_log(*files, tmp_path / "d.lcmlog", detections=tmp_path / "d.csv")
     np.testing.assert_array_equal(read_log(tmp_path / "d.lcmlog").robots[4].seen, seen)
-    assert any("30 rows give range_m though seen is 0" in w for w in summary["warnings"])
+    assert any("30 rows with range_m though seen is 0" in w for w in summary["warnings"])

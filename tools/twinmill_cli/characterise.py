@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from twinmill.counted import counted
 from twinmill.defaults import DEFAULT_MODEL, URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import (
@@ -136,7 +137,7 @@ def _characterise(
         why = f"played to its end, but the end of the log is lost: {recorder.failed}"
     ended = why or "played to its end"
     data = {"log": str(out), "events": recorder.events, "ok": not why, "ended": ended}
-    deliver(data, f"{ended}\n{out}: {recorder.events} messages", as_json)
+    deliver(data, f"{ended}\n{out}: {counted(recorder.events, 'message')}", as_json)
     return 1 if why else 0
 
 

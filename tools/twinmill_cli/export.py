@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from twinmill.counted import counted
 from twinmill.defaults import DEFAULT_MODEL, LogFormat
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Model
@@ -60,12 +61,12 @@ def _export(
         done = export_log(
             *(log, to, out or default_name(log, to)), model=robots, command=command, force=force
         )
-    words = ("messages", "topics") if to in BY_TOPIC else ("rows", "tables")
+    words = ("message", "topic") if to in BY_TOPIC else ("row", "table")
     deliver(done.to_json(), _text(done, *words), as_json)
     return done.to_json()
 
 
 def _text(done: ExportedLog, what: str, where: str) -> str:
     count, files = sum(done.written.values()), ", ".join(map(str, done.files))
-    told = [f"{count} {what} in {len(done.written)} {where}: {files}"]
+    told = [f"{counted(count, what)} in {counted(len(done.written), where)}: {files}"]
     return "\n".join([*told, *(f"! {warning}" for warning in done.warnings)])

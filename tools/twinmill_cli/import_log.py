@@ -16,6 +16,7 @@ from twinmill_cli.output import print_object
 from twinmill_cli.spelling import typed
 
 if working():  # not for --help
+    from twinmill.counted import counted
     from twinmill.data.importers.columns import Guess, is_usual, to_toml
     from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
     from twinmill.data.importers.plain import KNOWN
@@ -183,6 +184,13 @@ def _command(
             "rad/s of the wheels."
         ),
     ] = None,
+    command_timeout_s: Annotated[
+        float | None,
+        typer.Option(
+            help="Of a robot that stops by itself when it hears no command for so long, as "
+            "ros2_control's do after 0.5 s; else each command holds until the next."
+        ),
+    ] = None,
     robot: Annotated[
         list[str] | None,
         typer.Option(
@@ -316,6 +324,7 @@ def _command(
         wheelbase_m=wheelbase_m,
         full_duty=full_duty,
         wheel_factor=wheel_factor,
+        command_timeout_s=command_timeout_s,
         robot_id=robot_id,
         rename=renames.pop(None, {}),
         own_renames=renames,
@@ -487,7 +496,8 @@ def _print(summary: dict) -> None:
     if any("detections" in robot for robot in summary["robots"]):
         columns["detections"] = "detections"
     table = Table(
-        f"{summary['out']}: {summary['messages']} messages, {summary['duration_s']:.1f} s",
+        f"{summary['out']}: {counted(summary['messages'], 'message')}, "
+        f"{summary['duration_s']:.1f} s",
         list(columns.values()),
         [
             [Cell("-" if robot.get(key) is None else str(robot[key])) for key in columns]

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from twinmill.counted import counted
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import LcmUrl
@@ -130,7 +131,7 @@ def _deliver(robots: Robots, as_json: bool) -> int:
         "checks": [asdict(check) for check in checks],
     }
     rows = [[Cell(c.what), Cell(_mark(c), _tone(c)), Cell(c.words)] for c in checks]
-    table = Table(f"{robots.frames} frames", ["", "", ""], rows, words=(0, 1, 2))
+    table = Table(counted(robots.frames, "frame"), ["", "", ""], rows, words=(0, 1, 2))
     deliver(data, show.table(table), as_json)
     return 1 if any(check.ok is False for check in checks) else 0
 

@@ -12,6 +12,7 @@ from twinmill_cli.lazy import working
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
+    from twinmill.counted import counted
     from twinmill.files import check_holds, check_new_folder
     from twinmill.swarm.forecast.choose import choose
     from twinmill.swarm.forecast.draws import forecast, knows_errors, out_of_bounds
@@ -55,7 +56,7 @@ def _predict_floor(
     """
     request, table = read_sweep(sweep)
     if cells > len(request.points):
-        raise ValueError(f"--cells {cells}: the sweep has {len(request.points)} cells.")
+        raise ValueError(f"--cells {cells}: the sweep has {counted(len(request.points), 'cell')}.")
     check_new_folder(output)
     if (output / SEALED).exists():
         raise ValueError(
@@ -107,8 +108,8 @@ def _predict_floor(
     if data["draws"]:
         data["draws_out_of_bounds"], data["truncated"] = out_of_bounds(request, draws, seed)
     lines = [
-        f"{len(order)} runs of {cells} cells are planned; together they are worth {bits[-1]:.1f} "
-        "bit.",
+        f"Planned: {counted(len(order), 'run')} of {counted(cells, 'cell')}, together worth "
+        f"{bits[-1]:.1f} bit.",
         f"Sealed: {output / SEALED}, SHA-256 {digest}",
     ]
     if not data["draws"]:

@@ -23,6 +23,7 @@ if working():  # not for --help
     from rich.table import Table
     from rich.text import Text
 
+    from twinmill.counted import counted
     from twinmill.data.bus import open_bus
     from twinmill.data.importers.plain import Columns, read_commands, read_poses
     from twinmill.files import check_new_file
@@ -395,7 +396,8 @@ def _text(out: Path, paths: list[RobotPath], quality: Quality, notes: list[str])
             f"{1e3 * robot.position_noise_m:.2f} mm",
             f"{np.degrees(robot.heading_noise_rad):.2f}°",
         )
-    head = f"{out}: {len(paths)} robots, {len(paths[0].t_s)} frames at {quality.rate_hz:.1f} Hz"
+    robots, frames = counted(len(paths), "robot"), counted(len(paths[0].t_s), "frame")
+    head = f"{out}: {robots}, {frames} at {quality.rate_hz:.1f} Hz"
     return Group(Text(head), Fitting(table), *map(Text, [*notes, quality.sentence]))
 
 
@@ -448,7 +450,9 @@ def _live(
         "floor_error_px": max(view.error_px for view in views),
     }
     told = ", ".join(f"{robot}: {n}" for robot, n in sorted(count.poses.items())) or "none"
-    deliver(data, f"{count.frames} frames at {data['rate_hz']:.0f} Hz; poses {told}", as_json)
+    deliver(
+        data, f"{counted(count.frames, 'frame')} at {data['rate_hz']:.0f} Hz; poses {told}", as_json
+    )
     return data
 
 

@@ -9,6 +9,7 @@ import typer
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill.arguments import spelled
+from twinmill.counted import counted
 from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill_cli.ending import leave
 from twinmill_cli.options import SpreadM, Start
@@ -25,7 +26,8 @@ app = typer.Typer(
 
 def _text(data: dict) -> str:
     classes = ", ".join(f"{name} {count}" for name, count in data["classes"].items())
-    lines = [f"{data['worlds']} worlds in {data['cells']} cells, {data['wall_s']:.1f} s: {classes}"]
+    worlds = f"{counted(data['worlds'], 'world')} in {counted(data['cells'], 'cell')}"
+    lines = [f"{worlds}, {data['wall_s']:.1f} s: {classes}"]
     if data["why_full"]:
         lines.append(f"Every robot ran its firmware and plant, slowly: {data['why_full']}.")
     lines.append(f"{data['file']}\nPicture: twinmill phase {shlex.quote(str(data['out']))}")

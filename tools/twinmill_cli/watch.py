@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from twinmill.counted import counted
 from twinmill.defaults import DEFAULT_MODEL, FOREVER_S, URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import DurationS, LcmUrl, Model
@@ -117,7 +118,7 @@ def _text(show, save: Path | None, warnings: list[str]) -> str:
     told = f"score of the last {WINDOW_S:g} s: {scores}"
     return "\n".join(
         [
-            f"{show.messages} messages of {len(show.shown)} robots"
+            f"{counted(show.messages, 'message')} of {counted(len(show.shown), 'robot')}"
             + (f": {save}; look at it with: rerun {save}" if save else ""),
             told if scores else "no score: too little was heard",
             *(f"! {warning}" for warning in warnings),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.log import RobotLog
 
 GAP_S = 0.05  # four frames at 100 Hz, in which a TurboPi moves at most 20 mm
@@ -152,8 +153,8 @@ def _excursions(
     outlier[np.setdiff1d(index, index[_longest_way(_links(robot, index, limits))])] = True
     if outlier.any():
         notes.append(
-            f"{np.count_nonzero(outlier)} poses from {robot.pose_t_s[outlier][0]:.3f} s "
-            "on jump away and back; left out."
+            f"{counted(np.count_nonzero(outlier), 'pose')} from {robot.pose_t_s[outlier][0]:.3f} s "
+            "on, away and back in a jump; left out."
         )
     return outlier
 

@@ -14,6 +14,7 @@ import numpy as np
 import turbopi
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.lcm_log import (
     Events,
     LogError,
@@ -234,7 +235,7 @@ def _robot_channels(
     if found and unknown:
         count = sum(len(by_channel[name]) for name in unknown)
         warnings.append(
-            f"{count} messages on {len(unknown)} other channels were ignored "
+            f"{counted(count, 'message')} on {counted(len(unknown), 'other channel')} ignored "
             f"({', '.join(sorted(unknown)[:5])})."
         )
     return {
@@ -348,7 +349,8 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
     foreign = int(np.count_nonzero(messages["robot_id"] != robot_id))
     if foreign:
         warnings.append(
-            f"{channel}: {foreign} messages carry another robot_id; the channel's number was used."
+            f"{channel}: {counted(foreign, 'message has', 'messages have')} another robot_id; the "
+            "channel's number was used."
         )
     stamps = messages["utime_us"].astype(np.int64)
     steps = np.diff(stamps)
@@ -356,14 +358,12 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
         return messages
     late = int(np.count_nonzero(steps < 0))
     if late:
-        warnings.append(f"{channel}: {late} stamps lie before the one in front of them; sorted.")
+        warnings.append(f"{channel}: {counted(late, 'stamp')} earlier than the one before; sorted.")
     order = np.argsort(stamps, kind="stable")
     last = np.append(np.diff(stamps[order]) > 0, True)
     if not last.all():
-        warnings.append(
-            f"{channel}: {np.count_nonzero(~last)} messages repeat a stamp; the last "
-            "one of each was kept."
-        )
+        double = counted(int(np.count_nonzero(~last)), "message repeats", "messages repeat")
+        warnings.append(f"{channel}: {double} a stamp; the last one of each was kept.")
     return messages[order[last]]
 
 
@@ -463,8 +463,8 @@ def _duty_fraction(duty_pct: np.ndarray, robot_id: int, warnings: list[str]) -> 
     outside = int(np.count_nonzero((np.abs(duty_pct) > 100).any(axis=1)))
     if outside:
         warnings.append(
-            f"R{robot_id:02d}: {outside} commands have a duty outside -100..100 "
-            "percent; clamped, as the motor board does."
+            f"R{robot_id:02d}: {counted(outside, 'command has', 'commands have')} a duty outside "
+            "-100..100 percent; clamped, as the motor board does."
         )
     return np.clip(duty_pct, -100, 100) / 100
 
@@ -489,9 +489,10 @@ def _pose_series(
     has_heading = not seen.any() or not np.isnan(quaternion[seen]).all()
     valid = seen & turned if has_heading else seen
     if (stated & ~valid).any():
+        wrong = counted(int(np.count_nonzero(stated & ~valid)), "pose")
         warnings.append(
-            f"R{robot_id:02d}_POSE: {np.count_nonzero(stated & ~valid)} poses are "
-            "marked valid but hold no position or no unit quaternion; taken as lost."
+            f"R{robot_id:02d}_POSE: {wrong} marked valid "
+            "without position or unit quaternion; taken as lost."
         )
     pose = np.full((len(messages), 3), np.nan)
     pose[valid, :2] = position_m[valid, :2]

@@ -7,6 +7,7 @@ again and again while it holds does not, so that a gap in its beat is a loss.
 
 import numpy as np
 
+from twinmill.counted import counted
 from twinmill.data.log import RobotLog
 
 EVEN, FEWEST = 0.5, 30  # of the usual step: on the beat; commands from which a beat is told
@@ -62,7 +63,7 @@ def words(robot: RobotLog, lost_s: np.ndarray) -> str:
     """When commands are missing, and how often they come."""
     beat_ms = 1000 * float(np.median(np.diff(robot.command_t_s)))
     stretches = [f"from {begin_s:.2f} to {end_s:.2f} s" for begin_s, end_s in lost_s[:3]]
-    more = f" and {len(lost_s) - 3} times more" if len(lost_s) > 3 else ""
+    more = f" and {counted(len(lost_s) - 3, 'time')} more" if len(lost_s) > 3 else ""
     return f"no commands {', '.join(stretches)}{more}; they come every {beat_ms:.0f} ms"
 
 

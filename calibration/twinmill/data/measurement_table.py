@@ -42,6 +42,8 @@ DAYS = ("date", "day", "datum", "fecha")  # names of columns that hold no time o
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 LOST = ("", "nan", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost one
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
+TIMES = ("t", "time", "timestamp", "stamp", "secs", "frame_time", "__time")  # as people name it
+OF_PANDAS = "Unnamed: 0"  # what pandas calls such a first column, the rows' index
 UNNAMED = "column_{}"  # what columns are called in a file that does not name them
 BEGINNING_BYTES = 65536  # tell the encoding
 MOSTLY = 0.9
@@ -291,10 +293,9 @@ class Table:
         near = difflib.get_close_matches(column, same, n=1, cutoff=0.0)
         near = near or difflib.get_close_matches(column, open_names, n=1, cutoff=NEAR)
         if not near:
-            which = (
-                f", or say which of {', '.join(self.strange)} holds it: "
-                f"{option('rename', {'NAME': column})}"
-            )
+            only = self.strange[0] if len(self.strange) == 1 else ""
+            which = f"that {only}" if only else f"which of {', '.join(self.strange)}"
+            which = f", or say {which} holds it: {option('rename', {only or 'NAME': column})}"
             return LogError(
                 f"{self.name}: column {column} is missing; add it{which if self.strange else ''}."
             )
@@ -355,8 +356,8 @@ def read_header(path: Path) -> list[str]:
     with open_text(path) as text:
         lines, _, delimiter, _ = _begin(text)
         reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
-        header = _names(next(reader, []))
-        return _with_units(header, next(reader, [])) or header
+        header, first = _names(next(reader, [])), next(reader, [])
+        return _with_index(_with_units(header, first) or header, first)
 
 
 def read_table(path: Path, known: frozenset[str]) -> Table:
@@ -391,6 +392,10 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
                 header = named
                 notes.append(f"{path.name}: the row under the names is taken for their units.")
                 continue
+            if not rows and not header[0]:
+                header = _with_index(header, row)
+                if header[0] in TIMES:
+                    notes.append(f"{path.name}: its first column has no name; taken for the time.")
             if len(row) == len(header) + 1 and not row[-1].strip():
                 row.pop()  # a separator at the end of the line parts nothing
             if len(row) != len(header):
@@ -489,6 +494,15 @@ def _refuse_transposed(name: str, header: list[str], rows: PackedRows) -> None:
 
 def _names(header: list[str]) -> list[str]:
     return whole([cell.strip() for cell in header])
+
+
+def _with_index(header: list[str], row: list[str]) -> list[str]:
+    """Names with one for a first column that has none, as pandas writes the rows' index."""
+    if not header or header[0]:
+        return header
+    dated = bool(row) and _is_value(row[0].strip()) and not is_number(row[0])
+    timed = any(name.lower() in TIMES or _quantity(name) == "s" for name in header)
+    return ["timestamp" if dated and not timed else OF_PANDAS, *header[1:]]
 
 
 def _with_units(header: list[str], row: list[str]) -> list[str] | None:

@@ -10,6 +10,7 @@ import turbopi
 from natnet import DataFrame
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.importers.motive import number_of
 from twinmill.data.importers.series import multiply, with_z_up
 from twinmill.data.natnet_stream import Stream
@@ -134,8 +135,8 @@ class Robots:
                 Check(
                     "packets",
                     False,
-                    f"{self.stream.broken} packets cannot be read: another program sends to this "
-                    f"port, or NatNet {server.protocol} is not one of 3.0 to 4.2",
+                    f"{counted(self.stream.broken, 'packet')} cannot be read: another program "
+                    f"sends to this port, or NatNet {server.protocol} is not one of 3.0 to 4.2",
                 )
             )
         return found + (self._bodies() if self.frames else [])
@@ -143,7 +144,7 @@ class Robots:
     def _frames(self, how: str) -> Check:
         server = self.stream.server
         if self.frames:
-            return Check("frames", True, f"{self.frames} frames")
+            return Check("frames", True, counted(self.frames, "frame"))
         if others := sorted(self.stream.strangers):
             mend = f"give {option('server', others[0])}: that is who streams here"
         elif not self.stream.multicast:
@@ -202,7 +203,8 @@ class Robots:
         if axis == self.view.up:
             return Check("up axis", True, f"{axis}: bodies turn about it")
         words = (
-            f"bodies turn about {axis} ({count} frames), but {self.view.up} is taken to be up: "
+            f"bodies turn about {axis} ({counted(count, 'frame')}), but {self.view.up} is taken to "
+            "be up: "
             + (
                 f"say {option('up', axis)}"
                 if axis in "yz"

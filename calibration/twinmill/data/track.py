@@ -7,6 +7,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.cuts import USUAL_MPS, USUAL_RADPS, find_segments
 from twinmill.data.log import CommandKind, LogError, RobotLog
 from twinmill.data.lost_commands import lost_commands, words
@@ -187,8 +188,8 @@ def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndar
         )
     if lifted.any():
         notes.append(
-            f"{np.count_nonzero(lifted)} poses from {robot.pose_t_s[lifted][0]:.3f} s on "
-            "are off the floor; left out."
+            f"{counted(np.count_nonzero(lifted), 'pose')} from {robot.pose_t_s[lifted][0]:.3f} s "
+            "on off the floor; left out."
         )
     silent = _silent(robot)
     lost = np.zeros(len(silent), bool)
@@ -196,12 +197,12 @@ def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndar
         lost |= (robot.pose_t_s > begin_s) & (robot.pose_t_s < end_s + AFTER_S)
     if (lost & robot.valid).any():
         count = np.count_nonzero(lost & robot.valid)
-        notes.append(f"{words(robot, lost_s)}; {count} poses left out.")
+        notes.append(f"{words(robot, lost_s)}; {counted(count, 'pose')} left out.")
     if (silent & robot.valid).any():
         first = robot.pose_t_s[silent & robot.valid][0]
         ended = f"; the last is at {robot.command_t_s[-1]:.3f} s" if silent[-1] else ""
         notes.append(
-            f"{np.count_nonzero(silent & robot.valid)} poses from {first:.3f} s on were "
+            f"{counted(np.count_nonzero(silent & robot.valid), 'pose')} from {first:.3f} s on, "
             f"taken while no commands are in the log{ended}; left out."
         )
     return robot.valid & ~lifted & ~silent & ~lost

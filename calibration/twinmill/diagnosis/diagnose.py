@@ -27,6 +27,7 @@ from twinmill.diagnosis.doubts import (
 )
 from twinmill.diagnosis.finding import Finding, doubted, of_all, part_of_all
 from twinmill.diagnosis.findings import (
+    beside_the_base,
     findings_of,
     lateness,
     ranking_of,
@@ -426,6 +427,7 @@ def _concluded(
         rest = replace(rest, proven=None)
     findings.sort(key=lambda f: -f.share)  # where no order of the chain has falling shares
     steps = [(None, start.held_score), *steps_of(findings, chain, done.start, last)]
+    findings = beside_the_base(findings, first.model, told=model_file.lag_std_s(hashes) > 0)
     rest = rest.with_findings(findings)
     usual = model_file.usual_score(hashes)
     events = rest.moments or rest.events.later
@@ -439,7 +441,8 @@ def _concluded(
     named = {name for f in findings for name in (f.effect, *(f.group or ()))}
     faint = [(name, why) for name, why in done.faint if name not in named]
     faint_names = [name for name, _ in faint]
-    hidden = [*faint, *unseen.items()]
+    of_base = [(name, why) for name, why in done.in_the_base if name not in named]
+    hidden = [*faint, *of_base, *unseen.items()]
     refit = _refit(done, findings)
     own = apart(known, last, before)
     weighed = VerdictInputs(

@@ -25,6 +25,7 @@ class Finding:
         wrong_form: something of another form stands behind it.
         depends_on: what that depends on, where the doubt tells it; else empty.
         within_told: it is no more than numbers that other logs told may be wrong by.
+        beside: in words, the number of the base that it adds to; empty if there is none.
     """
 
     effect: str
@@ -37,6 +38,7 @@ class Finding:
     wrong_form: bool = False
     depends_on: str = ""
     within_told: bool = False
+    beside: str = ""
 
     @property
     def passes(self) -> bool:

@@ -225,6 +225,17 @@ def _does_as_much(this: Round, trial: Trial) -> bool:
     return before - trial.held_score**2 > SETTINGS.rival * (before - this.accepted.held_score**2)
 
 
+def beside_the_base(
+    findings: Sequence[Finding], model: native.Model, *, told: bool
+) -> list[Finding]:
+    """With the base's own lag in words, where one adds to it; `told`: other logs told that lag."""
+    lag_s = model.get(LAG)
+    words = f"adds to the base's own {lag_s:.3g} s{'' if told else ', which no log told'}"
+    return [
+        replace(f, beside=words) if f.effect == LAG_EFFECT and lag_s > 0 else f for f in findings
+    ]
+
+
 def _late_s(model: native.Model) -> float:
     """How late a model is by its lags and delays."""
     own = [(i, late_part(catalogue_name(i))) for i in effect_names(model)]

@@ -8,7 +8,7 @@ import numpy as np
 from twinmill.diagnosis.screening import Screened
 from twinmill.diagnosis.settings import Settings
 from twinmill.diagnosis.trials import REFIT, State, Trial
-from twinmill.model.parameters import catalogue_name
+from twinmill.model.parameters import LAG, LAG_EFFECT, catalogue_name
 
 
 @dataclass
@@ -72,7 +72,15 @@ class Search:
         Beside a slew limit that is in the model, another one does nothing: so it has no trace.
         """
         had = {catalogue_name(name) for name in self.last.state.model.effects}
+        had |= {name for name, _ in self.in_the_base}
         return [(name, why) for name, why in self.without_trace if name not in had]
+
+    @property
+    def in_the_base(self) -> list[tuple[str, str]]:
+        """Effects without a trace since a free number of the base does the same, and which."""
+        free = {p.name for p in self.last.state.free}
+        why = f"in the model already, as {LAG}: a log tells their sum alone"
+        return [(n, why) for n, _ in self.without_trace if n == LAG_EFFECT and LAG in free]
 
     @property
     def without_trace(self) -> list[tuple[str, str]]:

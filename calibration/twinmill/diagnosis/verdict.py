@@ -508,7 +508,8 @@ def _named(finding: Finding) -> str:
     if finding.group:
         name = f"one of {' or '.join(finding.group)}, which these logs cannot tell apart"
     doubt = ", doubtful" if finding.certainty == "doubtful" else ""
-    return f"{name} ({takes}{doubt})"
+    beside = f"; {finding.beside}" if finding.beside else ""
+    return f"{name} ({takes}{doubt}{beside})"
 
 
 def _values(stale: Finding) -> str:

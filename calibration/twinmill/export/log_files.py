@@ -42,7 +42,8 @@ class ExportedLog:
         return {
             "out": str(self.out),
             "files": [str(file) for file in self.files],
-            "messages": sum(self.channels.values()),
+            "messages": sum(self.written.values()),
+            "log_messages": sum(self.channels.values()),
             "channels": self.channels,
             "written": self.written,
             "warnings": self.warnings,

@@ -8,6 +8,7 @@ import twinmill_native as native
 from matplotlib.axes import Axes
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.report import Figure, Section
 from twinmill.report.canvas import draw
 from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, paint_paths
@@ -54,7 +55,7 @@ def section(
         ],
         verdict=f"Of {tried} swarms, {len(found)} differ. {len(offered)} were what they are called "
         f"in most of {shown[0].confirmed} fresh runs{twins}, and are offered: {listed}. The names "
-        f"of {sum(not entry.holds for entry in found)} others were taken back{untried}.",
+        f"of {counted(sum(not entry.holds for entry in found), 'other')} were taken back{untried}.",
         facts=[
             ("model", hunt.request.model_name),
             ("robots", str(hunt.n)),

@@ -5,6 +5,7 @@ from collections import defaultdict
 
 import numpy as np
 
+from twinmill.counted import counted
 from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.report.canvas import MEASURED, draw, legend_above
 from twinmill.report.html import Figure
@@ -35,10 +36,11 @@ def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, st
     sheet = robots[0].measurement
     numbers = ", ".join(str(r.measurement.robot_id) for r in robots)
     runs = sum(int(r.measurement.runs.sum()) for r in robots)
+    inputs = sum(len(r.errors) for r in robots)
     kind = robots[0].floor.kind
     return [
         ("table", f"{sheet.log_name}, robot{'s' * (len(robots) > 1)} {numbers}"),
-        ("holds", f"{runs} runs at {sum(len(r.errors) for r in robots)} steady inputs"),
+        ("holds", f"{counted(runs, 'run')} at {counted(inputs, 'steady input')}"),
         ("model", model_name),
         ("scatter", "; ".join(_scatter(robots[0], c) for c in _measured(robots))),
         (

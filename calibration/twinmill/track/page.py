@@ -20,6 +20,7 @@ from starlette.responses import HTMLResponse, JSONResponse, StreamingResponse
 from starlette.routing import Mount, Route
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.track.detect import ROBOTS
 from twinmill.track.live import FrameDetections
 
@@ -192,7 +193,7 @@ def drawn(sight: FrameDetections, rate_hz: float) -> bytes:
                 picture, middle.astype(int).tolist(), tip.tolist(), colour, LINE_PX, cv2.LINE_AA
             )
         _write(picture, str(number), square.max(axis=0) + 2, colour)
-    head = f"camera {sight.camera}  {rate_hz:.0f} Hz  {len(sight.poses)} robots"
+    head = f"camera {sight.camera}  {rate_hz:.0f} Hz  {counted(len(sight.poses), 'robot')}"
     _write(picture, head, (10, 28), FOLLOWED if len(sight.numbers) else LOST)
     if sight.lost:
         _write(picture, f"lost: {', '.join(map(str, sight.lost))}", (10, 58), LOST)

@@ -666,6 +666,21 @@ def test_an_effect_that_the_model_has_is_not_said_to_be_hidden(
     assert "slew_limit" not in again.sentence
 
 
+def test_the_lag_of_the_base_is_in_the_model_and_what_adds_to_it_says_so(
+    tanh_robot, measure, model_file, true_model, tmp_path
+):
+    """Beside a lag that is fitted to the same log another one has no trace: it is not hidden."""
+    log, later = measure(tanh_robot(), 41, 30.0), measure(tanh_robot(lag_s=0.2), 42, 30.0)
+    fit([log], model_file(), tmp_path / "own.toml", "")
+    own = ModelFile.load(str(tmp_path / "own.toml"))
+    why = dict(diagnose([log], own).not_identifiable)["motor_lag"]
+    assert why.startswith("in the model already, as base.motor_lag_s")
+    lag_s = own.model.get("base.motor_lag_s")
+    assert f"; adds to the base's own {lag_s:.3g} s)" in diagnose([later], own).sentence
+    guessed = diagnose([later], true_model).sentence
+    assert "; adds to the base's own 0.09 s, which no log told" in guessed
+
+
 def test_a_weakness_that_comes_again_is_told_to_depend_on_time(tanh_robot, measure, fitted):
     """A quarter of the speed is gone from 12 to 20 s, and from 35 to 43 s: no effect is so."""
 

@@ -5,7 +5,7 @@ A robot stands for 2 s and then drives along x at SPEED_MPS; three poses of fift
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 LOG = "drive.lcmlog"
@@ -14,6 +14,7 @@ COUNT, STEP_US = 400, 10_000
 SPEED_MPS, STANDS = 0.3, 200
 LOST = 24
 ROBOT = 1
+Event = tuple[int, str, bytes]
 
 
 def x_m(k: int) -> float:
@@ -26,19 +27,19 @@ def seen(k: int) -> bool:
     return k % 50 < 47
 
 
-def write_log(folder: Path) -> Path:
-    """The drive as a log, by LCM's own writer for Python."""
+def write_log(folder: Path, more: Iterable[Event] = ()) -> Path:
+    """The drive as a log, and `more` after it, by LCM's own writer for Python."""
     import lcm
 
     path = folder / LOG
     log = lcm.EventLog(str(path), "w", overwrite=True)
-    for event in events():
+    for event in (*events(), *more):
         log.write_event(*event)
     log.close()
     return path
 
 
-def events() -> Iterator[tuple[int, str, bytes]]:
+def events() -> Iterator[Event]:
     """Stamp in us, channel and message of each; the messages' code is what lcm-gen makes."""
     import turbopi
 
@@ -56,11 +57,22 @@ def events() -> Iterator[tuple[int, str, bytes]]:
         yield told.utime_us, f"R{ROBOT:02d}_TELEMETRY", told.encode()
 
 
-def export(folder: Path, to: str, name: str) -> None:
+def export(folder: Path, to: str, name: str, more: Iterable[Event] = ()) -> None:
     """What `twinmill export` makes of it."""
     import twinmill as tm
 
-    tm.load(write_log(folder)).export(folder / name, to=to)
+    tm.load(write_log(folder, more)).export(folder / name, to=to)
+
+
+def told_at(log_path: Path) -> bool:
+    """Whether each command of a file that was imported is at the time of its frame."""
+    import numpy as np
+
+    from twinmill.data.log import read_log
+
+    robot = read_log(log_path).robots[ROBOT]
+    due_s = robot.pose_t_s[0] + np.arange(COUNT) * STEP_US * 1e-6
+    return len(robot.command_t_s) == COUNT and np.allclose(robot.command_t_s, due_s, atol=2e-6)
 
 
 def told_of_import(log_path: Path, kind: str) -> dict[str, bool]:

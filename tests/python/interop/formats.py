@@ -11,6 +11,7 @@ from interop import (
     ros2_control,
     ros_node,
     rosbag,
+    script_bag,
     sdf,
     tables,
     tags,
@@ -18,6 +19,6 @@ from interop import (
 )
 from interop.cells import cells_of
 
-MODULES = (mjcf, urdf, ros2_control, ros_node, sdf, rosbag, mcap_file, lcm_log, tables)
-MODULES += (rerun_file, films, tags, capture)
+MODULES = (mjcf, urdf, ros2_control, ros_node, sdf, rosbag, script_bag, mcap_file, lcm_log)
+MODULES += (tables, rerun_file, films, tags, capture)
 CELLS = [cell for module in MODULES for cell in cells_of(module)]

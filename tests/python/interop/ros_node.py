@@ -15,6 +15,7 @@ from interop.robot import TEXT
 from interop.rosbag import ROS2
 
 NODE, TOPIC, HEARD = "drive.py", "r03/cmd_vel", "heard.json"
+PLAIN, STAMPED = "Twist", "TwistStamped"
 SCRIPT = "t_s,vx_mps,vy_mps,omega_radps\n0,0.1,0,0\n1,0.2,-0.1,0\n2,0,0,1.5\n3,0,0,0\n"
 ROWS = [(0.1, 0, 0), (0.2, -0.1, 0), (0, 0, 1.5)]
 NETWORK = 'ip link set lo up multicast on && ip route add 224.0.0.0/4 dev lo && exec "$@"'
@@ -36,21 +37,32 @@ def _write(folder: Path) -> None:
 
 @writes("ROS 2 node", "ROS 2 Jazzy, `rclpy`", *ROS2, ours=_write)
 def rclpy(folder: Path) -> Told:
-    """A node that hears it drive the script to its end, and once more until Ctrl-C."""
-    whole, stopped = (_heard(folder, stop_s) for stop_s in (0, 1.5))
+    """A node that hears it drive the script to its end, and twice until Ctrl-C."""
+    whole, stopped, stamped = (
+        _heard(folder, *how) for how in ((PLAIN, 0), (PLAIN, 1.5), (STAMPED, 1.5))
+    )
     begin_s = whole[0][0]
-    at = [next(s - begin_s for s, *told in whole if tuple(told) == row) for row in ROWS]
+    at = [next(s - begin_s for s, _, *told in whole if tuple(told) == row) for row in ROWS]
     return {
         "rows, from the first on": all(abs(s - k) < LATE_S for k, s in enumerate(at)),
-        "stands at the end": all(not any(told) for _, *told in whole[-3:]),
-        "stands after Ctrl-C": tuple(stopped[-10][1:]) == ROWS[1] and not any(stopped[-1][1:]),
+        "stands at the end": all(not any(told) for _, _, *told in whole[-3:]),
+        "stands after Ctrl-C": _stands(stopped),
+        "as TwistStamped": _stands(stamped) and all(0 <= late < LATE_S for _, late, *_ in stamped),
     }
 
 
-def _heard(folder: Path, stop_s: float) -> list[list[float]]:
-    """Times in s and velocities that arrive, from a process in a network without a way out."""
+def _stands(heard: list[list[float]]) -> bool:
+    """Whether it drove the second row and then stood."""
+    return tuple(heard[-10][2:]) == ROWS[1] and not any(heard[-1][2:])
+
+
+def _heard(folder: Path, kind: str, stop_s: float) -> list[list[float]]:
+    """Time in s, lateness against its stamp, and velocities of each message that arrives.
+
+    From a process in a network without a way out.
+    """
     command = [*_alone(), "sh", "-c", NETWORK, "sh", sys.executable, "-m", "interop.ros_node"]
-    command += [str(folder), str(stop_s)]
+    command += [str(folder), kind, str(stop_s)]
     home = {"ROS_LOG_DIR": str(folder / "log")}
     subprocess.run(command, env=os.environ | home, check=True, timeout=120)
     return json.loads((folder / HEARD).read_text())
@@ -61,19 +73,25 @@ def _alone() -> list[str]:
     return ["unshare", "--net", *([] if os.geteuid() == 0 else ["--map-root-user"])]
 
 
-def _listen(folder: Path, stop_s: float) -> None:
+def _listen(folder: Path, kind: str, stop_s: float) -> None:
     """Hears the node to its end; after `stop_s`, if that is not 0, it gets a Ctrl-C."""
     import rclpy
-    from geometry_msgs.msg import Twist
+    from geometry_msgs import msg
 
     rclpy.init()
     ear, heard = rclpy.create_node("ear"), []
 
-    def hear(twist: Twist) -> None:
-        heard.append([time.monotonic(), twist.linear.x, twist.linear.y, twist.angular.z])
+    def hear(message) -> None:
+        late_s, twist = 0.0, message
+        if kind == STAMPED:
+            stamp, twist = message.header.stamp, message.twist
+            late_s = time.time() - stamp.sec - 1e-9 * stamp.nanosec
+        told = twist.linear.x, twist.linear.y, twist.angular.z
+        heard.append([time.monotonic(), late_s, *told])
 
-    ear.create_subscription(Twist, TOPIC, hear, 100)
+    ear.create_subscription(getattr(msg, kind), TOPIC, hear, 100)
     words = [sys.executable, str(folder / NODE), "--ros-args", "-r", f"cmd_vel:=/{TOPIC}"]
+    words += ["-p", "stamped:=true"] if kind == STAMPED else []
     with subprocess.Popen(words) as node:
         while node.poll() is None:
             rclpy.spin_once(ear, timeout_sec=0.01)
@@ -85,4 +103,4 @@ def _listen(folder: Path, stop_s: float) -> None:
 
 
 if __name__ == "__main__":
-    _listen(Path(sys.argv[1]), float(sys.argv[2]))
+    _listen(Path(sys.argv[1]), sys.argv[2], float(sys.argv[3]))

@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from interop import drive
@@ -13,32 +14,59 @@ from interop.cells import Cell, Told, reads, writes
 BAG, LOG = "bag", "read.lcmlog"
 POSE, TWIST = "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/Twist"
 ROS2 = ("ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-geometry-msgs==5.3.6")
-TOPICS = {"/r01/pose": POSE, "/r01/cmd_vel": TWIST}
+STAMPED = "geometry_msgs/msg/TwistStamped"  # what ros2_control's wheels are told, from Jazzy on
+TOPICS = {"/r01/pose": POSE, "/r01/cmd_vel": TWIST, "/r01/reference": STAMPED}
+LATE_NS, BARE = 30_000_000, 10  # stamped commands are recorded late; this one has no stamp
 FILES = {"foxglove": "bag.mcap", "ros2": "bag_db3", "rclpy": "ros.mcap", "ros1": "drive.bag"}
 LINE = "=" * 80 + "\n"
+HEADER = [
+    "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+    "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+]
+VECTORS = "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"
+VECTOR = "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+VELOCITY, SPEEDS = (0.2, -0.1, 0.5), (1.0, 2.0, 3.0, 4.0)  # m/s and rad/s; rad/s of four wheels
 DEFINITIONS = {  # as `ros2 bag record` puts them into a file
     POSE: LINE.join(
         [
             "std_msgs/Header header\ngeometry_msgs/Pose pose\n",
-            "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
-            "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+            *HEADER,
             "MSG: geometry_msgs/Pose\ngeometry_msgs/Point position\n"
             "geometry_msgs/Quaternion orientation\n",
             "MSG: geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n",
             "MSG: geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w\n",
         ]
     ),
-    TWIST: LINE.join(
+    TWIST: LINE.join([VECTORS, VECTOR]),
+    STAMPED: LINE.join(
         [
-            "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n",
-            "MSG: geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n",
+            "std_msgs/Header header\ngeometry_msgs/Twist twist\n",
+            *HEADER,
+            f"MSG: geometry_msgs/Twist\n{VECTORS}",
+            VECTOR,
         ]
     ),
 }
 
 
 def _write(folder: Path) -> None:
-    drive.export(folder, "rosbag2", BAG)
+    drive.export(folder, "rosbag2", BAG, _driven_otherwise())
+
+
+def _driven_otherwise() -> Iterator[drive.Event]:
+    """A robot that is told velocities, and one whose wheel speeds are known."""
+    import turbopi
+
+    at_us = drive.START_US + drive.COUNT * drive.STEP_US
+    kinds = {
+        2: (turbopi.drive_t.KIND_TWIST, VELOCITY),
+        3: (turbopi.drive_t.KIND_WHEEL_SPEED, SPEEDS),
+    }
+    for robot, (kind, values) in kinds.items():
+        told = turbopi.drive_t()
+        told.utime_us, told.robot_id, told.kind = at_us, robot, kind
+        told.value = [*values, 0.0][:4]
+        yield at_us, f"R{robot:02d}_DRIVE", told.encode()
 
 
 def _told(rows: dict[str, list]) -> Told:
@@ -58,15 +86,25 @@ def _told(rows: dict[str, list]) -> Told:
     }
 
 
+def _stamped(rows: dict[str, list]) -> Told:
+    """The one command of the robot that is told velocities."""
+    ((at_ns, message),) = rows["/r02/cmd_vel"]
+    twist, stamp = message.twist, message.header.stamp
+    same = stamp.sec * 10**9 + stamp.nanosec == at_ns
+    told = twist.linear.x, twist.linear.y, twist.angular.z
+    return {"velocities, as TwistStamped": same and told == VELOCITY}
+
+
 def _frames(rows: dict[str, list]) -> Told:
-    """What `/tf` has beside them."""
+    """What `/tf` has beside them, and wheels."""
     frames = [message.transforms[0] for _, message in rows["/tf"]]
     here = [k for k in range(drive.COUNT) if drive.seen(k)]
     return {
         "frames of tf": all(
             abs(one.transform.translation.x - drive.x_m(k)) < 1e-9
             for k, one in zip(here, frames, strict=True)
-        )
+        ),
+        "wheels, as JointState": tuple(rows["/r03/wheels"][0][1].velocity) == SPEEDS,
     }
 
 
@@ -82,7 +120,7 @@ def foxglove(folder: Path) -> Told:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         for _, channel, message, decoded in reader.iter_decoded_messages():
             rows.setdefault(channel.topic, []).append((message.log_time, decoded))
-    return _told(rows) | _frames(rows)
+    return _told(rows) | _stamped(rows) | _frames(rows)
 
 
 @writes("rosbag2", "rosbags", "rosbags==0.11.9", ours=_write)
@@ -95,19 +133,19 @@ def rosbags(folder: Path) -> Told:
         for connection, at_ns, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
             rows.setdefault(connection.topic, []).append((at_ns, message))
-    return _told(rows) | _frames(rows)
+    return _told(rows) | _stamped(rows) | _frames(rows)
 
 
 @writes("rosbag2", "ROS 2 Jazzy, its messages", *ROS2, "mcap==1.6.0", ours=_write)
 def ros2(folder: Path) -> Told:
     """ROS's own messages out of the file's bytes; the file around them is opened by Foxglove's."""
     import yaml
-    from geometry_msgs.msg import PoseStamped
+    from geometry_msgs.msg import PoseStamped, TwistStamped
     from mcap.reader import make_reader
     from rclpy.serialization import deserialize_message
     from std_msgs.msg import Float64, Float64MultiArray, Int8
 
-    known = {f"geometry_msgs/msg/{PoseStamped.__name__}": PoseStamped}
+    known = {POSE: PoseStamped, STAMPED: TwistStamped}
     known |= {f"std_msgs/msg/{kind.__name__}": kind for kind in (Float64, Float64MultiArray, Int8)}
     rows: dict[str, list] = {}
     with (folder / BAG / f"{BAG}.mcap").open("rb") as stream:
@@ -121,7 +159,11 @@ def ros2(folder: Path) -> Told:
         for topic in information["rosbag2_bagfile_information"]["topics_with_message_count"]
     ]
     hashes = {topic["type"]: topic["type_description_hash"] for topic in of_topics}
-    return _told(rows) | {"hashes of types": all(hashes[kind] == _hash(kind) for kind in known)}
+    return (
+        _told(rows)
+        | _stamped(rows)
+        | {"hashes of types": all(hashes[kind] == _hash(kind) for kind in known)}
+    )
 
 
 def _hash(kind: str) -> str:
@@ -160,6 +202,8 @@ def plotjuggler(folder: Path) -> Told:
         "places": all(abs(x_m - drive.x_m(k)) < 1e-9 for k, x_m in places),
         "duties": [50 * (k >= drive.STANDS) for k in range(drive.COUNT)]
         == curves["/r01/duty_pct/data[3]"],
+        "velocities, as TwistStamped": curves["/r02/cmd_vel/twist/linear/y"] == [VELOCITY[1]],
+        "wheels, as JointState": curves["/r03/wheels/velocity[1]"] == [SPEEDS[1]],
     }
 
 
@@ -167,10 +211,16 @@ def _reads(name: str):
     def ours(folder: Path) -> Told:
         import twinmill as tm
 
-        pose, command = TOPICS
-        log = tm.import_log(bag=folder / FILES[name], pose=[pose], command=[command], robot_id=1)
-        log.save(folder / LOG)
-        return drive.told_of_import(folder / LOG, "twist")
+        pose, *commands = TOPICS
+        told = []
+        for command in commands:
+            bag = folder / FILES[name]
+            log = tm.import_log(bag=bag, pose=[pose], command=[command], robot_id=1)
+            log.save(folder / LOG, force=True)
+            told.append(drive.told_of_import(folder / LOG, "twist"))
+        plain, stamped = told
+        by_their_stamps = stamped["commands as twist"] and drive.told_at(folder / LOG)
+        return plain | {"commands as stamped twist, by their stamps": by_their_stamps}
 
     return ours
 
@@ -193,7 +243,20 @@ def foxglove_writes(folder: Path) -> None:
                 "angular": _vector(0),
             }
             writer.write_message("/r01/cmd_vel", schemas["/r01/cmd_vel"], twist, at_ns, at_ns)
+            stamped, late_ns = {"header": _header(_stamp(k)), "twist": twist}, at_ns + LATE_NS
+            writer.write_message(
+                "/r01/reference", schemas["/r01/reference"], stamped, late_ns, late_ns
+            )
         writer.finish()
+
+
+def _stamp(k: int) -> tuple[int, int]:
+    """Of a stamped command, s and ns; all are of their frame but one, which has none."""
+    return divmod(1000 * (drive.START_US + k * drive.STEP_US) * (k != BARE), 10**9)
+
+
+def _header(stamp: tuple[int, int], frame: str = "") -> dict:
+    return {"stamp": dict(zip(("sec", "nanosec"), stamp, strict=True)), "frame_id": frame}
 
 
 def _vector(x: float) -> dict:
@@ -201,10 +264,10 @@ def _vector(x: float) -> dict:
 
 
 def _pose(k: int) -> dict:
-    sec, nanosec = divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9)
+    stamp = divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9)
     x_m = drive.x_m(k) if drive.seen(k) else float("nan")
     return {
-        "header": {"stamp": {"sec": sec, "nanosec": nanosec}, "frame_id": "map"},
+        "header": _header(stamp, "map"),
         "pose": {"position": _vector(x_m), "orientation": _vector(0) | {"w": 1.0}},
     }
 
@@ -225,7 +288,7 @@ def rosbags_writes(folder: Path) -> None:
 @reads("rosbag2", "ROS 2 Jazzy, its messages", *ROS2, "mcap==1.6.0", ours=_reads("rclpy"))
 def ros2_writes(folder: Path) -> None:
     """Bytes that a node would send; the file around them is written by Foxglove's library."""
-    from geometry_msgs.msg import PoseStamped, Twist
+    from geometry_msgs.msg import PoseStamped, TwistStamped
     from mcap.writer import Writer
     from rclpy.serialization import serialize_message
 
@@ -239,11 +302,15 @@ def ros2_writes(folder: Path) -> None:
             for topic, kind in TOPICS.items()
         }
         for k in range(drive.COUNT):
-            pose, told, at_ns = PoseStamped(), Twist(), 1000 * (drive.START_US + k * drive.STEP_US)
+            pose, stamped = PoseStamped(), TwistStamped()
+            at_ns = 1000 * (drive.START_US + k * drive.STEP_US)
             pose.header.stamp.sec, pose.header.stamp.nanosec = divmod(at_ns, 10**9)
-            _fill(k, pose, told)
-            for topic, message in zip(TOPICS, (pose, told), strict=True):
-                writer.add_message(channels[topic], at_ns, serialize_message(message), at_ns)
+            stamped.header.stamp.sec, stamped.header.stamp.nanosec = _stamp(k)
+            _fill(k, pose, stamped.twist)
+            messages = (pose, at_ns), (stamped.twist, at_ns), (stamped, at_ns + LATE_NS)
+            for topic, (message, received_ns) in zip(TOPICS, messages, strict=True):
+                raw = serialize_message(message)
+                writer.add_message(channels[topic], received_ns, raw, received_ns)
         writer.finish()
 
 
@@ -279,17 +346,18 @@ def ros_writes(folder: Path) -> None:
 def by_ros(path: str) -> None:
     """The drive, each message written as a node would."""
     import rosbag
-    from geometry_msgs.msg import PoseStamped, Twist
-    from rospy import Time
+    from geometry_msgs.msg import PoseStamped, TwistStamped
+    from rospy import Duration, Time
 
     with rosbag.Bag(path, "w") as bag:
         for k in range(drive.COUNT):
             at = Time(*divmod(1000 * (drive.START_US + k * drive.STEP_US), 10**9))
-            pose, told = PoseStamped(), Twist()
-            pose.header.stamp = at
-            _fill(k, pose, told)
+            pose, stamped = PoseStamped(), TwistStamped()
+            pose.header.stamp, stamped.header.stamp = at, Time(*_stamp(k))
+            _fill(k, pose, stamped.twist)
             bag.write("/r01/pose", pose, at)
-            bag.write("/r01/cmd_vel", told, at)
+            bag.write("/r01/cmd_vel", stamped.twist, at)
+            bag.write("/r01/reference", stamped, at + Duration(0, LATE_NS))
 
 
 def _messages(types: dict, **header):
@@ -305,11 +373,11 @@ def _messages(types: dict, **header):
         place = types["geometry_msgs/msg/Pose"](point(x_m, 0.0, 0.0), turn(0.0, 0.0, 0.0, 1.0))
         yield at_ns, "/r01/pose", types[POSE](head, place)
         speed_mps = drive.SPEED_MPS * (k >= drive.STANDS)
-        yield (
-            at_ns,
-            "/r01/cmd_vel",
-            types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0)),
-        )
+        twist = types[TWIST](vector(speed_mps, 0.0, 0.0), vector(0.0, 0.0, 0.0))
+        yield at_ns, "/r01/cmd_vel", twist
+        stamp = types["builtin_interfaces/msg/Time"](*_stamp(k))
+        head = types["std_msgs/msg/Header"](stamp=stamp, frame_id="", **header)
+        yield at_ns + LATE_NS, "/r01/reference", types[STAMPED](head, twist)
 
 
 NOT_RUN = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""URDF: ROS's own parser, and the readers of MuJoCo, sdformat, Bullet and Drake."""
+"""URDF: ROS's own parser, and the readers of MuJoCo, sdformat and other simulators."""
 
 import math
 import subprocess
@@ -7,7 +7,15 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from interop.cells import Told, writes
-from interop.robot import DRAKE, MASS_KG, WHEEL_RADIUS_M, WHEELS, held_by_drake, write
+from interop.robot import (
+    DRAKE,
+    MASS_KG,
+    TOP_RADPS,
+    WHEEL_RADIUS_M,
+    WHEELS,
+    held_by_drake,
+    write,
+)
 from interop.sdf import held_by_sdformat
 
 FILE = "robot.urdf"
@@ -90,3 +98,42 @@ def bullet(folder: Path) -> Told:
 def drake(folder: Path) -> Told:
     """Its own parser, which makes motors of `<transmission>` alone."""
     return held_by_drake(folder / FILE)
+
+
+@writes("URDF", "Pinocchio", "pin==4.1.0", ours=_write)
+def pinocchio(folder: Path) -> Told:
+    """Rigid bodies for control, by urdfdom inside; its root is given a free joint."""
+    import pinocchio
+
+    model = pinocchio.buildModelFromUrdf(str(folder / FILE), pinocchio.JointModelFreeFlyer())
+    tops_radps = model.velocityLimit[-len(WHEELS) :]
+    wheel = model.inertias[model.getJointId("fl_wheel_joint")]
+    return {
+        "mass": math.isclose(pinocchio.computeTotalMass(model), MASS_KG),
+        "wheels' joints": set(model.names) >= JOINTS,
+        "top speed of wheels": all(abs(top / TOP_RADPS - 1) < 1e-4 for top in tops_radps),
+        "inertia": math.isclose(wheel.inertia.max(), 0.5 * wheel.mass * WHEEL_RADIUS_M**2),
+        "camera's frame": model.existFrame("camera_link"),
+    }
+
+
+@writes("URDF", "Newton", "newton==1.8.0", "warp-lang==1.19.0", ours=_write)
+def newton(folder: Path) -> Told:
+    """NVIDIA's and DeepMind's engine on Warp, in single precision; here on a CPU."""
+    import newton
+    import warp
+
+    warp.config.quiet = True
+    warp.set_device("cpu")
+    builder = newton.ModelBuilder()
+    builder.add_urdf(str(folder / FILE), floating=True)
+    model = builder.finalize()
+    names = [label.rpartition("/")[2] for label in model.joint_label]
+    tops_radps = model.joint_velocity_limit.numpy()[-len(WHEELS) :]
+    masses_kg = model.body_mass.numpy()
+    return {
+        "mass": math.isclose(masses_kg.sum(), MASS_KG, rel_tol=1e-5),
+        "wheels' joints": set(names) >= JOINTS,
+        "top speed of wheels": all(abs(top / TOP_RADPS - 1) < 1e-4 for top in tops_radps),
+        "camera's frame": any(label.endswith("camera_link") for label in model.body_label),
+    }

@@ -19,7 +19,7 @@ from twinmill.arguments import option
 from twinmill.data.importers.ros_messages import STAND_IN
 from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.log import LogError
-from twinmill.data.measurement_table import Table, is_number
+from twinmill.data.measurement_table import TIMES, Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
 
 
@@ -180,9 +180,7 @@ ALWAYS = frozenset((*ROBOT, *UNITS_OF_ONE))  # need no unit
 WHEELS = {"left": (1, 3), "right": (2, 4), "fl": (1,), "fr": (2,), "rl": (3,), "rr": (4,)}
 # Usual names without a unit: what they mean, and how their values tell the unit.
 USUAL: dict[str, tuple[tuple[str, ...], Callable[[np.ndarray], tuple[float, str]]]] = {
-    **dict.fromkeys(
-        ("t", "time", "timestamp", "stamp", "secs", "frame_time", "__time"), (("t_s",), _time)
-    ),
+    **dict.fromkeys(TIMES, (("t_s",), _time)),
     **dict.fromkeys((*ROBOT, "id"), (("robot_id",), _plain)),
     **dict.fromkeys(("x", "pos_x", "position_x", "px", "translation_x"), (("x_m",), _length)),
     **dict.fromkeys(("y", "pos_y", "position_y", "py", "translation_y"), (("y_m",), _length)),

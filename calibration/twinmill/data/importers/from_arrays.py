@@ -2,6 +2,7 @@
 """Logs of numbers in memory: numpy arrays, or the columns of a data frame, without a file."""
 
 from collections.abc import Iterable, Iterator
+from datetime import datetime
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -186,7 +187,10 @@ def _kind_of(frame: Any) -> Kind:
 
 def _times(frame: Any, what: str) -> np.ndarray:
     if "t_s" not in frame:
-        raise LogError(f"{what}: has no column t_s, the times in s.")
+        remedy = "; of times as pandas' index: frame.reset_index(names='t_s')"
+        raise LogError(
+            f"{what}: has no column t_s, times in s or dates{remedy * hasattr(frame, 'index')}."
+        )
     return np.asarray(frame["t_s"])
 
 
@@ -216,6 +220,10 @@ def _stamps_us(name: str, t_s: Any) -> np.ndarray:
     stamps = np.asarray(t_s)
     if stamps.ndim != 1 or len(stamps) < 2:
         raise LogError(f"{name}: has shape {stamps.shape}, and must be a row of two times or more.")
+    if stamps.dtype.kind == "O" and isinstance(stamps[0], datetime):  # with a zone, of pandas
+        import pandas as pd  # slow to import
+
+        stamps = pd.to_datetime(stamps, utc=True).tz_convert(None).to_numpy()
     if stamps.dtype.kind == "M":
         utime_us = stamps.astype("datetime64[us]").astype(np.int64)
     else:

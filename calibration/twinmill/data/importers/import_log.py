@@ -55,6 +55,7 @@ from twinmill.data.importers.series import (
     PoseSeries,
     in_body_frame,
     multiply,
+    stopped_when_silent,
 )
 from twinmill.data.importers.vicon import read_vicon
 from twinmill.data.log import Log, LogError, RobotLog, read_log
@@ -182,6 +183,8 @@ def _read(given: Sources, options: ImportOptions) -> tuple[list[PoseSeries], lis
         )
     if options.wheel_factor is not None:
         commands = _geared(commands, options.wheel_factor)
+    if options.command_timeout_s is not None:
+        commands = _with_timeout(commands, options.command_timeout_s)
     check_numbered(options, poses, commands)
     return corrected(poses, commands, given, options)
 
@@ -241,6 +244,13 @@ def _read_tables(
         return read(path, replace(columns, robot_id=number, lacks_robot=lacks))
 
     return read_each(paths, of_files, of, kind)
+
+
+def _with_timeout(commands: list[CommandSeries], timeout_s: float) -> list[CommandSeries]:
+    """Commands that end by themselves, of each robot."""
+    if not (np.isfinite(timeout_s) and timeout_s > 0):
+        raise LogError(f"{option('command_timeout_s', timeout_s)}: must be a time above 0 s.")
+    return [stopped_when_silent(own, timeout_s) for own in commands]
 
 
 def _geared(commands: list[CommandSeries], factor: float) -> list[CommandSeries]:
@@ -593,6 +603,7 @@ def _provenance(sources: list[Path], options: ImportOptions) -> str:
                 "wheelbase_m": options.wheelbase_m or 0.0,
                 "full_duty": options.full_duty or 0.0,
                 "wheel_factor": 1.0 if options.wheel_factor is None else options.wheel_factor,
+                "command_timeout_s": options.command_timeout_s or 0.0,
                 "mapping": options.mapping.read_text() if options.mapping else "",
                 "flips": _flips_in_toml(options.flips),
                 "heading_offset_rad": _in_toml(options.heading_offset_rad),

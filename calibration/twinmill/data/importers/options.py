@@ -41,6 +41,7 @@ class ImportOptions:
         wheelbase_m: of a robot that is told steering angles.
         full_duty: of a ROS bag with duties, the number that stands for full duty.
         wheel_factor: by which wheel speeds are multiplied to be those of the wheels in rad/s.
+        command_timeout_s: of a robot that stands once it has heard no command for so long.
         force: replace an output that exists.
     """
 
@@ -63,6 +64,7 @@ class ImportOptions:
     wheelbase_m: float | None = None
     full_duty: float | None = None
     wheel_factor: float | None = None
+    command_timeout_s: float | None = None
     force: bool = False
 
 
@@ -112,6 +114,7 @@ USES = {
     ),
     "wheelbase_m": (("bag", "commands"), "it is for commands that are steering angles"),
     "wheel_factor": (("told",), "it is for commands that are wheel speeds"),
+    "command_timeout_s": (("told",), "it ends commands"),
     "same_clock": (("told",), "without commands there is one clock alone"),
     "heading_from_path": (("told",), "the commands tell along which axis a robot goes"),
 }
@@ -149,6 +152,7 @@ def check_sources(given: Sources, options: ImportOptions) -> None:
         "full_duty": options.full_duty is not None,
         "wheelbase_m": options.wheelbase_m is not None,
         "wheel_factor": options.wheel_factor is not None,
+        "command_timeout_s": options.command_timeout_s is not None,
         "same_clock": options.same_clock,
         "heading_from_path": options.path_heading,
     }

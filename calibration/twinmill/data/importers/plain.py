@@ -11,6 +11,7 @@ import numpy as np
 import turbopi
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.bench_table import is_bench
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.columns import Mapping
@@ -217,8 +218,8 @@ def _seen(table: Table, columns: Columns) -> list[DetectionSeries]:
         if idle.any():
             notes = [
                 *notes,
-                f"{table.name}: {np.count_nonzero(idle)} rows give {name} though seen is 0 (the "
-                f"first is row {table.line[int(idle.argmax())]}); it is left out there.",
+                f"{table.name}: {counted(np.count_nonzero(idle), 'row')} with {name} though seen "
+                f"is 0 (the first is row {table.line[int(idle.argmax())]}); it is left out there.",
             ]
             values[idle] = np.nan
     return [
@@ -295,8 +296,8 @@ def _with_robots(table: Table) -> Table:
     if told.all() or not told.any():
         return table
     note = (
-        f"{table.name}: {np.count_nonzero(~told)} rows have no robot_id (the first is row "
-        f"{table.line[int((~told).argmax())]}); left out."
+        f"{table.name}: {counted(np.count_nonzero(~told), 'row')} without robot_id (the first is "
+        f"row {table.line[int((~told).argmax())]}); left out."
     )
     return replace(table.where(told), notes=[*table.notes, note])
 
@@ -348,9 +349,9 @@ def _complete(table: Table, kind: CommandKind) -> Table:
     if whole.all() or not whole.any():
         return table
     note = (
-        f"{table.name}: {np.count_nonzero(~whole)} rows have an empty cell or NaN (the first is "
-        f"row {table.line[int((~whole).argmax())]}); left out: the command before is held, if "
-        "there is one."
+        f"{table.name}: {counted(np.count_nonzero(~whole), 'row')} with an empty cell or NaN (the "
+        f"first is row {table.line[int((~whole).argmax())]}); left out: the command before is held"
+        ", if there is one."
     )
     return replace(table.where(whole), notes=[*table.notes, note])
 
@@ -489,10 +490,12 @@ def _by_robot(
         rows = rows[np.argsort(stamps, kind="stable")]
         last = np.append(np.diff(utime_us[rows]) > 0, True)
         where = f"{table.name}: robot {number}: "
-        notes = [f"{where}{late} rows are earlier than the row before; sorted."] if late else []
+        notes = (
+            [f"{where}{counted(late, 'row')} earlier than the row before; sorted."] if late else []
+        )
         if not last.all():
-            double = np.count_nonzero(~last)
-            notes.append(f"{where}{double} rows repeat a stamp; the last of each was kept.")
+            double = counted(np.count_nonzero(~last), "row repeats", "rows repeat")
+            notes.append(f"{where}{double} a stamp; the last of each was kept.")
         called = "" if named is None else table.rows[rows[0]][named].strip()
         yield number, rows[last], said + notes, called
         said = []

@@ -21,6 +21,7 @@ import numpy as np
 import turbopi
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.importers.beat import at_even_beat
 from twinmill.data.importers.ros_cut import check_chunks, is_cut, write_whole
 from twinmill.data.importers.ros_frames import Frames, on_floor
@@ -182,7 +183,7 @@ def _parts(kind: str, message: object) -> Iterator[str]:
 
 
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
-    """Pose and command topic of each robot: of one name; the one with most messages.
+    """Pose and command topic of each robot: of one name; the one with most messages, or stamped.
 
     Where nothing is a command, what odometry measured stands in, beside its own poses if there are
     no others. Poses without either have an empty name as their command.
@@ -208,7 +209,8 @@ def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
         ]
         if poses:
             best = max(poses, key=lambda t: (t.robot == robot, *_likely(t)))
-            pairs.append((best.name, max(commands, key=lambda t: t.count).name))
+            told = max(commands, key=lambda t: (t.count, t.kind.endswith("Stamped")))
+            pairs.append((best.name, told.name))
     return pairs
 
 
@@ -495,7 +497,7 @@ class _Rows:
     @classmethod
     def of(cls, topic: str, role: str, messages: _Messages, receive: bool) -> "_Rows":
         """Those that are kept, on the clock that is taken."""
-        stamps_ns, kept, notes = _stamps(topic, messages, receive)
+        stamps_ns, kept, notes = _stamps(topic, role, messages, receive)
         if messages.lost:
             notes.append(
                 f"{topic}: {messages.lost} of {len(messages) + messages.lost} messages "
@@ -542,8 +544,8 @@ class _Rows:
         last = np.append(np.diff(self.utime_us[rows]) > 0, True)
         if last.all():
             return rows, self.notes
-        repeated = np.count_nonzero(~last)
-        note = f"{self.topic}: {repeated} messages repeat a stamp; the last of each was kept."
+        repeated = counted(np.count_nonzero(~last), "message repeats", "messages repeat")
+        note = f"{self.topic}: {repeated} a stamp; the last of each was kept."
         return rows[last], [*self.notes, note]
 
 
@@ -672,9 +674,11 @@ def _put(
 
 
 def _stamps(
-    topic: str, messages: _Messages, receive: bool
+    topic: str, role: str, messages: _Messages, receive: bool
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """(N,) ns, (N,) bool which to keep, remarks.
+
+    A command without a stamp is one: ros2_control takes it when it comes. A pose is left out.
 
     Raises:
         LogError: the clock of the headers was set while it recorded.
@@ -697,8 +701,13 @@ def _stamps(
         return received, everything, notes
     kept = everything
     if not stamped.all() and header[stamped].min() > CLOCK_FROM_ZERO_S * 1e9:
-        kept = stamped
-        notes.append(f"{topic}: {np.count_nonzero(~stamped)} messages have no stamp; left out.")
+        bare = f"{topic}: {counted(np.count_nonzero(~stamped), 'message')} without a stamp"
+        if role == "command":
+            header = np.where(stamped, header, received - round(late_ms * 1e6))
+            notes.append(f"{bare}, taken for sent {late_ms:.1f} ms before receipt, as the others.")
+        else:
+            kept = stamped
+            notes.append(f"{bare}, left out.")
     steps_s = np.diff(header[kept]) * 1e-9
     back = steps_s < 0
     if back.any() and -steps_s.min() > STEP_BACK_S:
@@ -709,7 +718,8 @@ def _stamps(
         )
     if back.any():
         notes.append(
-            f"{topic}: {np.count_nonzero(back)} messages are earlier than the one before; sorted."
+            f"{topic}: {counted(np.count_nonzero(back), 'message')} earlier than the one before; "
+            "sorted."
         )
     return header, kept, notes
 

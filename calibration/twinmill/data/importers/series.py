@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.data.log import CommandKind, LogError, heading_rad
 
 TURNED_RAD = 0.02  # turns a velocity by 2 % of itself
@@ -65,6 +66,25 @@ class CommandSeries:
     world: bool = False
     called: str = ""
     mixed: bool = False
+
+
+def stopped_when_silent(series: CommandSeries, timeout_s: float) -> CommandSeries:
+    """Commands of a robot that stands once it has heard none for so long, until the next."""
+    timeout_us = round(1e6 * timeout_s)
+    pauses_us = np.append(np.diff(series.utime_us), np.iinfo(np.int64).max)
+    silent = np.flatnonzero((pauses_us > timeout_us) & series.value.any(axis=1))
+    if not len(silent):
+        return series
+    after = silent + 1
+    note = f"stopped {counted(len(silent), 'time')}, {timeout_s:g} s after the last command before"
+    return replace(
+        series,
+        utime_us=np.insert(series.utime_us, after, series.utime_us[silent] + timeout_us),
+        value=np.insert(series.value, after, 0.0, axis=0),
+        inputs=np.insert(series.inputs, after, 0.0 * series.inputs[silent], axis=0),
+        detected=np.insert(series.detected, after, series.detected[silent], axis=0),
+        warnings=[*series.warnings, f"robot {series.robot_id}: {note}."],
+    )
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from twinmill.counted import counted
 from twinmill.data.log import ALONE
 from twinmill.data.measurement_table import Table
 
@@ -33,9 +34,10 @@ def sound_rows(table: Table, t_s: np.ndarray, ids: np.ndarray) -> tuple[Table, n
         twice = _written_twice(table, t_s, rows[kept[rows]])
         kept[twice] = False
         if len(twice):
+            repeated = counted(len(twice), "row repeats", "rows repeat")
             notes.append(
-                f"{table.name}: robot {number}: {len(twice)} rows repeat another's stamp and "
-                "values; each was taken once."
+                f"{table.name}: robot {number}: {repeated} another's stamp and values; each was "
+                "taken once."
             )
     if kept.all():
         return table, kept

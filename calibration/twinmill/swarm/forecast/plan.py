@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import twinmill_native as native
 
+from twinmill.counted import counted
 from twinmill.data.log import read_log
 from twinmill.data.unpacking import Gunzip, unpack
 from twinmill.files import replacing
@@ -263,8 +264,8 @@ def _class_of_log(place: Path, log: str, plan: Plan, point: tuple[float, ...]) -
     wanted = plan.request.robots(point)
     if len(found.robots) != wanted:
         raise ValueError(
-            f"log '{log}' has {len(found.robots)} robots, but the plan's run has {wanted}; give "
-            "the log of that run."
+            f"log '{log}' has {counted(len(found.robots), 'robot')}, but the plan's run has "
+            f"{wanted}; give the log of that run."
         )
     seconds = float(found.t_s[-1] - found.t_s[0])
     if seconds < plan.request.duration_s - SHORT_S:

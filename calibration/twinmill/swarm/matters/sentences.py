@@ -4,6 +4,7 @@
 from collections.abc import Sequence
 
 from twinmill.arguments import option
+from twinmill.counted import counted
 from twinmill.listing import listed
 from twinmill.swarm.matters.differences import Difference
 from twinmill.swarm.matters.sensitivity import (
@@ -97,7 +98,8 @@ def next_step(found: Sensitivity) -> str:
     unsure = found.of(UNSURE)
     if unsure:
         text += (
-            f"{len(unsure)} answers are open after {found.request.seeds} runs; {option('seeds')} "
+            f"{counted(len(unsure), 'answer is', 'answers are')} open after "
+            f"{counted(found.request.seeds, 'run')}; {option('seeds')} "
             f"{4 * found.request.seeds} halves their intervals."
         )
     return text.strip()
