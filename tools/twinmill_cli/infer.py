@@ -20,8 +20,10 @@ if working():  # not for --help
     from threadpoolctl import threadpool_limits
 
     from twinmill.files import check_new_file
+    from twinmill.inference.answer import Answer
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
+    from twinmill.model.parameters import with_role
     from twinmill_cli.frame import command_line, load, open_model, provenance, told
 
 
@@ -97,11 +99,32 @@ def _infer(
         with_kept(model_file, results[0].always, keep, source.command).write(force)
     each = [result.to_json() for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
-    data = {**data, **told(measurements), **source.to_json()}
+    commands = _mending(results[0].answer, logs, model) if len(results) == 1 else []
+    lines = [command for _, command in commands]
+    data = {**data, "commands": lines, **told(measurements), **source.to_json()}
     if as_json:
         deliver(data, None, as_json)
     else:
         from twinmill.report.inference import terminal_of_robots  # slow, and JSON needs none
 
-        deliver(data, terminal_of_robots(results), as_json)
+        deliver(data, terminal_of_robots(results, commands), as_json)
     return results
+
+
+def _mending(answer: Answer, logs: list[Path], model: str) -> list[tuple[str, str]]:
+    """Reason and command for each step to the model that has what is missing beyond doubt.
+
+    What is of a moment of these logs is added to none.
+    """
+    if answer.verdict == "refit_enough":
+        fitted = Path(f"{Path(model).stem}_fitted.toml")
+        return [("To refit the base", command_line("fit", logs, model, fitted))]
+    steps, given = [], model
+    for found in answer.findings:
+        if found.certainty == "doubtful" or with_role(found.effect, "moment"):
+            continue
+        better = Path(f"{Path(given).stem}_{found.effect}.toml")
+        why = "Then" if steps else "To add it, and see by how much the error falls"
+        steps.append((why, command_line(f"add {found.effect}", logs, given, better)))
+        given = str(better)
+    return steps

@@ -24,7 +24,6 @@ from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
-from twinmill.terminal import whole
 
 TOO_FEW = (
     f"Of fewer than {SETTINGS.fewest_robots} robots none can be called the odd one, and what one "
@@ -37,7 +36,6 @@ NOTHING_GAINED = (
     "as given, and the new file has these."
 )
 
-Commands = Sequence[tuple[str, str]]  # what for, and the line to type
 Steps = Sequence[tuple[str | None, float]]  # what came into the model, and the score then
 
 TONES: dict[str, Tone] = {
@@ -263,7 +261,7 @@ def _late(diagnosis: Diagnosis) -> str:
     return f"Late by {total}: these logs cannot part lag and delay."
 
 
-def terminal(diagnosis: Diagnosis, commands: Commands = ()) -> RenderableType:
+def terminal(diagnosis: Diagnosis, commands: show.Commands = ()) -> RenderableType:
     """What a person reads of a diagnosis, and what to type then."""
     return Group(*_said(diagnosis), *_next(diagnosis, commands))
 
@@ -299,14 +297,14 @@ def _without(diagnosis: Diagnosis) -> str:
     return f", without {', '.join(gone)}" if gone else ""
 
 
-def _next(diagnosis: Diagnosis, commands: Commands) -> list[Text]:
+def _next(diagnosis: Diagnosis, commands: show.Commands) -> list[Text]:
     step = next_run(diagnosis)
     told = [Text(f"Next run: {step}")] if step else []
-    return told + [part for why, command in commands for part in (Text(f"{why}:"), whole(command))]
+    return told + show.typed_next(commands)
 
 
 def terminal_explanation(
-    result: Explanation, commands: Commands = (), not_written: str = ""
+    result: Explanation, commands: show.Commands = (), not_written: str = ""
 ) -> RenderableType:
     """What a person reads of the whole loop, and what to type then.
 
@@ -329,7 +327,9 @@ def terminal_explanation(
     )
 
 
-def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None = None) -> Section:
+def section(
+    diagnosis: Diagnosis, commands: show.Commands = (), steps: Steps | None = None
+) -> Section:
     """The page of a diagnosis: verdict, figures, tables and the commands that follow.
 
     Args:
@@ -369,7 +369,7 @@ def section(diagnosis: Diagnosis, commands: Commands = (), steps: Steps | None =
 
 
 def explanation_section(
-    result: Explanation, commands: Commands = (), not_written: str = ""
+    result: Explanation, commands: show.Commands = (), not_written: str = ""
 ) -> Section:
     """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
     page = section(result.diagnosis, commands, result.steps)

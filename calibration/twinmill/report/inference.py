@@ -36,11 +36,16 @@ def sentence(answer: Answer) -> str:
     return f"Missing: {names}{_on(answer)}."
 
 
-def terminal_of_robots(results: list[Inference]) -> RenderableType:
-    """Text of `twinmill infer`: of one robot all, of several what is missing of each."""
+def terminal_of_robots(results: list[Inference], commands: show.Commands = ()) -> RenderableType:
+    """Text of `twinmill infer`: of one robot all, of several what is missing of each.
+
+    Args:
+        results: one for each robot.
+        commands: what to type then, each with why.
+    """
     if len(results) > 1:
         return Group(show.table(_robots(results)), Text(ONE_BY_ONE))
-    return terminal(results[0])
+    return Group(terminal(results[0]), *show.typed_next(commands))
 
 
 def _robots(results: list[Inference]) -> Table:

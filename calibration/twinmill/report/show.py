@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person reads in the terminal."""
 
+from collections.abc import Sequence
+
 from rich import box
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -12,8 +14,9 @@ from twinmill.fitting.compare import Comparison
 from twinmill.fitting.fit import FitResult
 from twinmill.report import comparisons, detections, tables
 from twinmill.report.tables import Cell, Table, number, tone
-from twinmill.terminal import Fitting
+from twinmill.terminal import Fitting, whole
 
+Commands = Sequence[tuple[str, str]]  # what for, and the line to type
 STYLES = {"": "", "good": "bold green", "warn": "yellow", "bad": "bold red", "dim": "dim"}
 BAR = 10  # characters
 WARNINGS = 3  # in the terminal; --json has all
@@ -192,6 +195,11 @@ def warned(warnings: list[str]) -> list[RenderableType]:
     if len(warnings) > WARNINGS:
         lines.append(Text(f"! and {len(warnings) - WARNINGS} more (the JSON has all).", "yellow"))
     return lines
+
+
+def typed_next(commands: Commands) -> list[Text]:
+    """Lines to type next, each with what for."""
+    return [part for why, command in commands for part in (Text(f"{why}:"), whole(command))]
 
 
 def _written(path: object, not_written: str) -> Text:
