@@ -4,9 +4,9 @@
 from pathlib import Path
 
 import pytest
-from twinmill_cli.infer import _mending
 
 from twinmill.inference.answer import Answer, Named
+from twinmill_cli.infer import _mending
 
 
 def named(effect, certainty):
