@@ -12,12 +12,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 
 SIZES = np.array([0.01, 0.03, 0.1, 0.3])  # from barely seen to a third of the way, relative
 CHANCE = np.array([0.6, 0.25, 0.1, 0.05])  # that a dependence has each: small ones are common
 STEP = float(np.sqrt(SIZES[1] / SIZES[0]))  # half the distance of two sizes, as a factor
 GROWS = 1.01 * STEP**2  # times its size in one log, up to which a wander is as usual: one distance
+# Chance that the relative error of a formula has each: an exponential distribution, of those with a
+# known mean the one that says least; the rest is too small to be seen, or too large for a formula.
+BINS = np.r_[SIZES[0] / STEP, np.sqrt(SIZES[1:] * SIZES[:-1]), SIZES[-1] * STEP]
+OF_FORM = -np.diff(np.exp(-BINS / PRIORS.form))
+FORMS = 2  # of that error
 NODES = 7  # of a curve over speed: as a table of duties has
 LATEST = 10  # steps that a response to a command may last
 
@@ -58,6 +64,23 @@ def kernels(m: Motion) -> list[Kernel]:
             if np.abs(scaled).max(initial=0.0) > 1e-9:
                 found.append(Kernel(word, f"{word}: {name}", scaled, lasting))
     return found
+
+
+def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
+    """FORMS arrays (K, W, 3): what an effect's formula may miss, for a relative error of one.
+
+    The effect's own change, times a smooth function of how fast the robot is, or of time; without
+    its size, which is the effect's own number.
+
+    Args:
+        change: (W, 3) of the prediction by the effect, m and rad.
+        m: the motion.
+    """
+    fast = _hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES)
+    waves, share = _waves(m.t_s, 30.0, 15.0)
+    forms = fast, np.sqrt(share)[:, None] * waves
+    weight = (change**2).sum(axis=1) / max(np.sum(change**2), 1e-300)
+    return tuple((f - (f @ weight)[:, None])[:, :, None] * change for f in forms)
 
 
 Form = tuple[str, np.ndarray, np.ndarray | float]

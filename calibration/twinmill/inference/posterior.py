@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Posterior probabilities of what is missing, from a table of evidence and prior odds.
 
-Four kinds of hypotheses compete: effects of the catalogue with or without a dependence that is a
-thing of its own; effects of which the dependence is what a formula misses; a dependence alone; and
-an unnamed thing that an effect mimics, of which the dependence is the part that the effect's form
-does not take. Where they hold the same columns likelihood cannot tell them apart; the priors of the
-sizes do.
+Three kinds of hypotheses compete: effects of the catalogue with or without a dependence that is a
+thing of its own; a dependence alone; and an unnamed thing that an effect mimics, of which the
+dependence is the part that the effect's form does not take. The data cannot tell the first from
+the last by likelihood where both hold the same columns; the prior of the sizes does.
 """
 
 from dataclasses import dataclass
@@ -76,9 +75,9 @@ def beliefs(table: Table) -> list[Belief]:
     2018, Bayesian Analysis 13): what few blocks speak for, or some against, is not sure.
     """
     rows = [row for entry in table.entries for row in _rows(entry, table)]
-    logs = np.array([row.log for row in rows])
-    nothing = np.array([not (row.entry.effects or row.entry.words) for row in rows])
-    blocks = np.array([row.entry.blocks for row in rows])
+    logs = np.array([log for _, log, _ in rows])
+    nothing = np.array([not (entry.effects or entry.words) for _, _, entry in rows])
+    blocks = np.array([e.blocks for _, _, e in rows])
     rest = logs - blocks.sum(axis=1)
     count = blocks.shape[1]
     drawn = np.random.default_rng(0).dirichlet(np.ones(count), DRAWS) * count
@@ -86,69 +85,37 @@ def beliefs(table: Table) -> list[Belief]:
     p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
     some = np.exp(logs - logsumexp(logs[~nothing]))
     p[~nothing] = some[~nothing] * (1 - p[nothing].sum())
-    return [_belief(row, float(v)) for row, v in zip(rows, p, strict=True)]
+    return [_belief(mimicked, e, float(v)) for (mimicked, _, e), v in zip(rows, p, strict=True)]
 
 
-@dataclass(frozen=True)
-class _Row:
-    """One entry of the table in one reading.
-
-    Attributes:
-        entry: of the table.
-        log: log posterior up to a constant.
-        mimicked: effects in whose place one unnamed thing is.
-        words: dependences that are things of their own, or the unnamed thing's.
-    """
-
-    entry: Entry
-    log: float
-    mimicked: tuple[str, ...]
-    words: tuple[str, ...]
-
-
-def _belief(row: _Row, probability: float) -> Belief:
+def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float) -> Belief:
     """What begins or ends several times is no effect of the catalogue, but depends on time."""
-    entry, mimicked = row.entry, row.mimicked
     at_moments = [n for n in map(catalogue_name, entry.effects) if n in beginning_at_a_moment()]
     again = at_moments if len(at_moments) > 1 else []
 
     def once(effects) -> tuple[str, ...]:
         return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in again)
 
-    words = (AGAIN, *row.words) if again and AGAIN not in row.words else row.words
+    words = (AGAIN, *entry.words) if again and AGAIN not in entry.words else entry.words
     real = once(n for n in entry.effects if n not in mimicked)
     like = tuple(n for n in once(mimicked) if n not in real)
     return Belief(real, like, words, entry, probability)
 
 
-def _rows(entry: Entry, table: Table) -> list[_Row]:
-    """All readings of an entry."""
-    count, words = len(entry.effects), entry.words
+def _rows(entry: Entry, table: Table) -> list[tuple[tuple[str, ...], float, Entry]]:
+    """Effects that are mimicked, log posterior up to a constant, and the entry."""
+    count = len(entry.effects)
     stale = np.log(PRIORS.stale if entry.stale else 1 - PRIORS.stale)
-    effects = log_prior_of_effects(count, len(table.candidates))
-
-    def things(number: int) -> float:
-        return float(
-            number * np.log(PRIORS.outside / len(table.words))
-            if number
-            else np.log(1 - PRIORS.outside)
-        )
-
-    other = stale + things(len(words))
-    rows = [_Row(entry, other + effects + entry.log_evidence, (), words)]
+    each = np.log(PRIORS.outside / len(table.words))
+    other = len(entry.words) * each if entry.words else np.log(1 - PRIORS.outside)
+    real = stale + other + log_prior_of_effects(count, len(table.candidates)) + entry.log_evidence
+    rows = [((), float(real), entry)]
     for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
         if np.isfinite(log_evidence):
             # the first word is no further thing, but the part that the effects' forms do not take
-            like = sum(_log_likeness(catalogue_name(n), words, table) for n in names)
+            like = sum(_log_likeness(catalogue_name(n), entry.words, table) for n in names)
             rest = log_prior_of_effects(count - len(names), len(table.candidates))
-            rows.append(_Row(entry, other + like + rest + log_evidence, names, words))
-    for name, log_evidence in zip(entry.effects, entry.log_formed, strict=True):
-        if (
-            np.isfinite(log_evidence)
-            and words[0] in TOLD_BY[catalogue()[catalogue_name(name)]["needs"]]
-        ):
-            own = stale + things(len(words) - 1) + effects + log_evidence
-            rows.append(_Row(entry, own, (), words[1:]))
+            rows.append((names, float(stale + other + like + rest + log_evidence), entry))
     return rows
 
 

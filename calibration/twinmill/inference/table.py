@@ -8,14 +8,13 @@ import numpy as np
 from scipy.special import logsumexp
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, GROWS, SIZES, STEP
-from twinmill.inference.evidence import Linear
+from twinmill.inference.discrepancy import CHANCE, FORMS, GROWS, OF_FORM, SIZES, STEP, forms_of
+from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
-from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import effect_names
 
 COMPARED = 10  # sets of the table ...
@@ -35,7 +34,6 @@ class Entry:
         log_evidence: integrated over numbers, forms and sizes.
         log_mimicked: for each of `subsets`, the same where an unnamed thing is in its place, of
             which the dependence is the part that the effect's form does not take.
-        log_formed: for each effect, the same where the first dependence is what its formula misses.
         blocks: (B,) log density of each block of time at the posterior mean.
         fall: of the squares by the dependence.
     """
@@ -45,7 +43,6 @@ class Entry:
     words: tuple[str, ...]
     log_evidence: float
     log_mimicked: tuple[float, ...]
-    log_formed: tuple[float, ...]
     blocks: np.ndarray
     fall: float
 
@@ -103,7 +100,7 @@ def table_of(search: Search) -> Table:
         for view in views:
             each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
             squares = np.array([each[index].sum() for index in within])
-            own = _Comparison(p, search.words, h, squares, view)
+            own = _Comparison(p, search.words, h, changes, squares, view)
             of_noise = own.entries(names in whole)
             for entry in of_noise:
                 key = entry.effects, entry.stale, tuple(sorted(entry.words))
@@ -157,7 +154,6 @@ class _Beside:
         fall: of the squares by it; 0 if it is none.
         log_relative: (M,) log prior of its size where it is what the form of each of `subsets`
             leaves, over that of a thing of its own.
-        log_form: (E,) the same where it is what the formula of each effect misses.
         cov: prior covariance of a stale base; None for what is known.
         local: (B,) what moments cost the evidence, in the blocks in which they are: where a block
             counts less, so does the price of what happened in it.
@@ -168,7 +164,6 @@ class _Beside:
     log_chance: float
     fall: float
     log_relative: np.ndarray
-    log_form: np.ndarray
     cov: np.ndarray | None
     local: np.ndarray
 
@@ -180,6 +175,7 @@ class _Comparison:
     problem: Problem
     words: tuple[str, ...]
     h: Hypothesis
+    changes: np.ndarray  # (E, W, 3) of the prediction by each effect, m and rad
     squares: np.ndarray  # (M,) that each of `subsets` takes
     view: View
 
@@ -188,6 +184,8 @@ class _Comparison:
         usual, news = self._moments(None)
         own = self._evidence(usual)
         out = [self._alone(usual), *self._with_words(usual, own), self._alone(news)]
+        for other in self._others(usual):
+            out += [self._alone(other), *self._with_words(other, self._evidence(other))]
         if whole:
             cov = self.h.cov.copy()
             count = len(self.problem.prior.mean)
@@ -207,8 +205,9 @@ class _Comparison:
         which is wider where the form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
         """
         usual, news = self._moments(None)
-        likely = self._likeliest(usual, self._evidence(usual))
-        every = [(b, self._linear(b)) for b in (usual, news, likely)]
+        plain = (usual, *self._others(usual))
+        likely = [self._likeliest(b, self._evidence(b)) for b in plain]
+        every = [(b, self._linear(b)) for b in (*plain, news, *likely)]
         linear = max(every, key=lambda b: b[1].log_evidence + b[0].log_chance)[1]
         mean, spread = self.h.posterior(linear)
         root, count = np.linalg.cholesky(self.h.cov), len(self.h.mean)
@@ -236,10 +235,47 @@ class _Comparison:
             chance = float(found.log_chance(rate)[len(on)]) if rate else 0.0
             white = np.concatenate([np.zeros((0, len(bare.y))), *(m.white for m in on)])
             fall = 2 * float(found.gains[len(on)])
-            relative, form = self._log_relative(np.array(fall)), self._log_form(np.array(fall))
+            relative = self._log_relative(np.array(fall))
             local = self._price(bare, white, on, chance)
-            beside.append(_Beside(words, white, chance, fall, relative, form, cov, local))
+            beside.append(_Beside(words, white, chance, fall, relative, cov, local))
         return beside[0], beside[1]
+
+    def _others(self, usual: _Beside) -> list[_Beside]:
+        """What may be there in the place of usual moments, which are looked for before all else.
+
+        Nothing, where a dependence does what they do; and what the formula of an effect misses.
+        """
+        none = [self._without_moments(usual)] if len(usual.white) else []
+        return [*none, *self._of_form(none[0] if none else usual)]
+
+    def _without_moments(self, usual: _Beside) -> _Beside:
+        rate, count = self.problem.rate, self.view.moments[0].shape[0] - 1
+        chance = float(rate.log_chance(np.array(0), count)) if rate else 0.0
+        nothing = np.zeros(())
+        return replace(
+            usual,
+            white=usual.white[:0],
+            log_chance=chance,
+            fall=0.0,
+            log_relative=self._log_relative(nothing),
+            local=np.zeros_like(usual.local),
+        )
+
+    def _of_form(self, beside: _Beside) -> list[_Beside]:
+        """With what the formula of one effect misses at its likeliest size; none if it is exact."""
+        linear, best = self._linear(beside), (0.0, beside)
+        for change in self.changes:
+            for columns in forms_of(change, self.problem.motion):
+                white = self.view.fitter.whiten(columns)
+                gains, _ = gains_by_size(*linear.projected(white, white @ white.T), SIZES)
+                chance = np.log(OF_FORM / FORMS)
+                s = int(np.argmax(gains + chance))
+                gain = float(gains[s] + chance[s])
+                if gain > best[0]:
+                    both = np.concatenate([beside.white, SIZES[s] * white])
+                    likely = beside.log_chance + float(chance[s])
+                    best = gain, replace(beside, white=both, log_chance=likely)
+        return [best[1]] if best[0] else []
 
     def _price(self, bare: Linear, white: np.ndarray, on, chance: float) -> np.ndarray:
         """(B,) change of the evidence by moments less that of the density, in their blocks."""
@@ -264,7 +300,6 @@ class _Comparison:
             usual.log_chance + float(np.log(CHANCE[s] / forms)),
             float(own.falls[f, s]) if gains[f, s] > 0 else 0.0,
             self._log_relative(own.falls[f, s]) - np.log(CHANCE[s]),
-            self._log_form(own.falls[f, s]) - np.log(CHANCE[s]),
             None,
             usual.local,
         )
@@ -287,7 +322,6 @@ class _Comparison:
             log_evidence=found,
             fall=beside.fall,
             mimicked=beside.log_relative if beside.words else -np.inf,
-            formed=beside.log_form if beside.words else -np.inf,
         )
 
     def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
@@ -315,13 +349,10 @@ class _Comparison:
         likely = gains + np.log(CHANCE[sizes] / CHANCE[sizes].sum())
         total = float(logsumexp(likely))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
-        formed: np.ndarray | float = beside.log_form if beside.words else -np.inf
         if words and not beside.words:
-            falls = own.falls[at][:, sizes]
-            mimicked, formed = (
-                np.logaddexp.reduce((gains + log).reshape(len(log), gains.size), axis=1) - total
-                for log in (self._log_relative(falls), self._log_form(falls))
-            )
+            relative = self._log_relative(own.falls[at][:, sizes])
+            each = (gains + relative).reshape(len(relative), gains.size)
+            mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
         linear = own.linear.with_columns(SIZES[sizes][s] * own.white(self.view, at[f]))
         return self._entry(
@@ -331,7 +362,6 @@ class _Comparison:
             log_evidence=own.alone + beside.log_chance + total,
             fall=beside.fall if beside.words else float(own.falls[at][:, sizes][f, s]),
             mimicked=mimicked,
-            formed=formed,
         )
 
     def _entry(
@@ -343,7 +373,6 @@ class _Comparison:
         log_evidence: float,
         fall: float,
         mimicked: np.ndarray | float,
-        formed: np.ndarray | float,
     ) -> Entry:
         share = self.view.log_size * np.bincount(self.view.block) / len(self.view.block)
         blocks = linear.log_densities(self.view.block) - share + beside.local
@@ -354,13 +383,9 @@ class _Comparison:
             words,
             found,
             tuple(float(found + m) for m in np.broadcast_to(mimicked, len(self.squares))),
-            tuple(float(found + m) for m in np.broadcast_to(formed, len(self.h.effects))),
             blocks,
             fall,
         )
-
-    def _log_form(self, falls: np.ndarray) -> np.ndarray:
-        return log_form(self.squares[: len(self.h.effects)], falls)
 
     def _log_relative(self, falls: np.ndarray) -> np.ndarray:
         """(M, ...) log prior of a dependence that takes these squares as what effects leave.
@@ -372,22 +397,6 @@ class _Comparison:
         share = falls / np.maximum(falls + squares, 1e-300)
         with np.errstate(divide="ignore"):
             return np.log(np.minimum(1, share * STEP**2) - share / STEP**2)
-
-
-def log_form(squares: np.ndarray, falls: np.ndarray) -> np.ndarray:
-    """(E, ...) log prior of a dependence as what a formula misses, by size.
-
-    The error of a formula relative to the size of its effect has an exponential distribution: of
-    those with a known mean the one that says least. Each size stands for a bin of their grid.
-
-    Args:
-        squares: (E,) that each effect takes.
-        falls: (...) squares that the dependence takes.
-    """
-    squares = squares.reshape(-1, *[1] * np.ndim(falls))
-    error = np.sqrt(falls / np.maximum(squares, 1e-300)) / PRIORS.form
-    with np.errstate(divide="ignore"):
-        return -error / STEP + np.log(-np.expm1(-error * (STEP - 1 / STEP)))
 
 
 def _as_without_moments(entries: list[Entry]) -> list[Entry]:

@@ -8,17 +8,25 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 from scipy.special import logsumexp
-from scipy.stats import multivariate_normal
+from scipy.stats import expon, multivariate_normal
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import SIZES, STEP, _aside, _way_since_back, kernels
+from twinmill.inference.discrepancy import (
+    OF_FORM,
+    SIZES,
+    STEP,
+    _aside,
+    _way_since_back,
+    forms_of,
+    kernels,
+)
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Noise
 from twinmill.inference.posterior import beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
-from twinmill.inference.table import Entry, Table, log_form
+from twinmill.inference.table import Entry, Table
 
 STEP_S = 0.1
 
@@ -159,11 +167,10 @@ def table(entries):
     return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"))
 
 
-def entry(effects, words, log_evidence, mimicked=None, formed=None):
+def entry(effects, words, log_evidence, mimicked=None):
     mimicked = tuple(mimicked or [-np.inf] * (2 ** len(effects) - 1))
-    formed = tuple(formed or [-np.inf] * len(effects))
     blocks = np.full(6, log_evidence / 6)
-    return Entry(effects, False, words, log_evidence, mimicked, formed, blocks, 1.0)
+    return Entry(effects, False, words, log_evidence, mimicked, blocks, 1.0)
 
 
 def test_flat_evidence_leaves_the_prior_odds():
@@ -183,8 +190,8 @@ def test_what_one_block_alone_speaks_for_is_less_sure():
     single = np.r_[12.0, np.zeros(7)]
 
     def sure(blocks):
-        found = Entry(("battery_sag",), False, (), 12.0, (-np.inf,), (-np.inf,), blocks, 0.0)
-        none = Entry((), False, (), 0.0, (), (), np.zeros(8), 0.0)
+        found = Entry(("battery_sag",), False, (), 12.0, (-np.inf,), blocks, 0.0)
+        none = Entry((), False, (), 0.0, (), np.zeros(8), 0.0)
         return beliefs(table([none, found]))[1].probability
 
     assert sure(even) > 0.999
@@ -203,26 +210,26 @@ def test_an_unnamed_thing_looks_rather_like_an_effect_that_depends_on_the_same(e
         assert mimic / real == pytest.approx(density * alike / (PRIORS.effects / 10))
 
 
-@pytest.mark.parametrize("effect, takes", [("battery_sag", True), ("wheel_gain", False)])
-def test_a_dependence_may_be_what_a_formula_misses_if_its_effect_depends_on_the_same(effect, takes):
-    """Then it costs no prior of a further thing, and is told as none; no wheel's gain has time."""
-    entries = [entry((), (), -50), entry((effect,), ("time",), 0, formed=[log(0.2)])]
-    found = beliefs(table(entries))
-    further, own = (
-        sum(b.probability for b in found if b.effects and bool(b.words) == told)
-        for told in (True, False)
-    )
-    q = PRIORS.outside / 2 / (1 - PRIORS.outside)
-    assert own / further == pytest.approx(0.2 / q if takes else 0)
+def test_what_a_formula_misses_changes_its_course_and_not_its_size():
+    """Half more at each speed is the effect's own number; half more at top speed alone is not."""
+    m = motion()
+    change = m.moved * (0.1, 0.1, 0)
+    way = (np.abs(m.moved) / m.top[:3]).max(axis=1)
+    for columns in forms_of(change, m):
+        assert np.tensordot(columns, change, 2) == pytest.approx(0, abs=1e-12)
+    fast = forms_of(change, m)[0].reshape(7, -1)
+    wanted = (np.interp(way, [0, 1], [0, 1])[:, None] * change).ravel()
+    wanted -= wanted @ change.ravel() / np.sum(change**2) * change.ravel()
+    weights = np.linalg.lstsq(fast.T, wanted, rcond=None)[0]
+    assert fast.T @ weights == pytest.approx(wanted, abs=1e-12)
 
 
-def test_chances_of_what_a_formula_misses_add_up_to_one():
-    """Over a grid of sizes from nothing to everything, each for what lies about it."""
-    falls = STEP ** (2 * np.arange(-40, 20, 2.0))
-    found = log_form(np.array([1.0]), falls)
-    assert np.exp(logsumexp(found, axis=1)) == pytest.approx(1, abs=1e-4)
-    mean = np.exp(found[0]) @ np.sqrt(falls)
-    assert mean == pytest.approx(PRIORS.form, rel=0.1)
+def test_chances_of_a_formulas_errors_are_those_of_an_exponential_distribution():
+    """Each size stands for what is nearer to it than to the others, as a factor."""
+    between = np.sqrt(SIZES[1:] * SIZES[:-1])
+    each = expon(scale=PRIORS.form)
+    assert list(OF_FORM[1:3]) == pytest.approx(list(np.diff(each.cdf(between))))
+    assert 0.8 < OF_FORM.sum() < each.sf(SIZES[0] / STEP)
 
 
 def test_a_heading_that_is_off_leads_the_way_aside():
