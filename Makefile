@@ -38,7 +38,7 @@ check-long: tests
 # ACTUATION=table.csv sets measured speeds of robots beside the published ones.
 MUJOCO_SEEDS ?= 20
 paper: build
-	@.venv/bin/twinmill claims --mujoco-seeds $(MUJOCO_SEEDS) \
+	@.venv/bin/twinmill lab claims --mujoco-seeds $(MUJOCO_SEEDS) \
 	    $(if $(ACTUATION),--actuation $(ACTUATION)) --out paper
 
 # Installs and builds no more than it shows.

@@ -37,7 +37,7 @@ def sentence(answer: Answer) -> str:
 
 
 def terminal_of_robots(results: list[Inference]) -> RenderableType:
-    """Text of `twinmill infer`: of one robot all, of several what is missing of each."""
+    """Text of `twinmill lab infer`: of one robot all, of several what is missing of each."""
     if len(results) > 1:
         return Group(show.table(_robots(results)), Text(ONE_BY_ONE))
     return terminal(results[0])
