@@ -211,7 +211,8 @@ def swarm(tmp_path_factory) -> Path:
     "swarm compare s.lcmlog --seeds 39 --first-seed 3 --odd 2",
     "swarm phase sweep --goal milling --at n=6 --out {made}",
     "swarm plot s.lcmlog -o {made}.svg",
-    "swarm ask how-many --behavior milling --n 5 --seeds 10 --duration-s 5 --at-least 0.8 --start disc",
+    "swarm ask how-many --behavior milling --n 5 --seeds 10 --duration-s 5 --at-least 0.8"
+    " --start disc",
 ])  # fmt: skip
 def test_the_command_that_a_result_names_makes_it_again(swarm, line, monkeypatch):
     monkeypatch.chdir(swarm)
