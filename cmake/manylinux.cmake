@@ -1,5 +1,5 @@
 # Tool chain for wheels that run with any glibc from 2.28 on:
-#   scripts/make_wheel_root ROOT [x86_64|aarch64]
+#   scripts/make_wheel_root ROOT
 #   cmake ... -DCMAKE_TOOLCHAIN_FILE=cmake/manylinux.cmake -DTWINMILL_WHEEL_ROOT=ROOT
 set(TWINMILL_WHEEL_ROOT "" CACHE PATH "Folder that scripts/make_wheel_root made")
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES TWINMILL_WHEEL_ROOT)
