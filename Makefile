@@ -38,7 +38,7 @@ check-long: tests
 # ACTUATION=table.csv sets measured speeds of robots beside the published ones.
 MUJOCO_SEEDS ?= 20
 paper: build
-	@.venv/bin/twinmill claims --mujoco-seeds $(MUJOCO_SEEDS) \
+	@.venv/bin/twinmill lab claims --mujoco-seeds $(MUJOCO_SEEDS) \
 	    $(if $(ACTUATION),--actuation $(ACTUATION)) --out paper
 
 # Installs and builds no more than it shows.
@@ -83,10 +83,12 @@ docs: build
 	    --requirement docs/requirements.lock && cp docs/requirements.lock .deps/docs; }
 	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
-# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for this machine's
-# glibc and later ones.
+# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for glibc 2.28 and later ones.
+# What it is compiled with goes into .deps/wheel-root (150 MB fetched). `scripts/wheel dist` alone makes
+# one for this machine's glibc and Python.
 wheel: build
-	@scripts/wheel dist
+	@[ -d .deps/wheel-root ] || scripts/make_wheel_root .deps/wheel-root
+	@scripts/wheel dist .deps/wheel-root
 
 # Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
 clean:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often `twinmill compare-runs` is right: robots on many days, with and without a weak wheel.
+"""How often `twinmill robot compare` is right: robots on many days, with and without a weak wheel.
 
-Robots are drawn as in `twinmill challenge`, on formulas of their own. From day to day the marker is
-mounted anew, the battery has another charge, clocks have another offset and the drive is another
-one; speeds follow the battery's voltage. The model is the owner's data sheet, some percent off.
+Robots are drawn as in `twinmill lab challenge`, on formulas of their own. From day to day the
+marker is mounted anew, the battery has another charge, clocks have another offset and the drive is
+another one; speeds follow the battery's voltage. The model is the owner's data sheet, some percent
+off.
 
     .venv/bin/python benchmarks/days.py 0-5 --out days.jsonl     # a line for each robot
     .venv/bin/python benchmarks/days.py 6-11 --out days.jsonl    # more of them, then or beside

@@ -3,7 +3,7 @@
 
     nice .venv/bin/python benchmarks/film.py --n 40 --seed 1 --out film
 
-Robots and what is hidden are drawn as in `twinmill challenge`, of drives that stay in the picture.
+Robots and hidden effects are drawn as in `twinmill lab challenge`; drives stay in the picture.
 Each frame of 1920x1080 at 30 Hz is rendered about the tag, with blur of motion, a rolling shutter,
 noise and a JPEG's losses, by the renderer of the tests, and tracked; the four floor tags are
 measured by a tape that is off by 1 mm. The model is the one of that robot from another log.

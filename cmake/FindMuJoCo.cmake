@@ -14,9 +14,10 @@ if(NOT _mujoco_dir)
         OUTPUT_VARIABLE _mujoco_dir OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 endif()
 
-find_path(MuJoCo_INCLUDE_DIR mujoco/mujoco.h PATHS "${_mujoco_dir}/include" NO_DEFAULT_PATH NO_CACHE)
+find_path(MuJoCo_INCLUDE_DIR mujoco/mujoco.h PATHS "${_mujoco_dir}/include"
+          NO_DEFAULT_PATH NO_CMAKE_FIND_ROOT_PATH NO_CACHE)
 find_file(MuJoCo_LIBRARY "libmujoco.so.${_mujoco_version}" PATHS "${_mujoco_dir}" "${_mujoco_dir}/lib"
-          NO_DEFAULT_PATH NO_CACHE)
+          NO_DEFAULT_PATH NO_CMAKE_FIND_ROOT_PATH NO_CACHE)
 if(MuJoCo_INCLUDE_DIR AND MuJoCo_LIBRARY)
     file(STRINGS "${MuJoCo_INCLUDE_DIR}/mujoco/mujoco.h" _mujoco_line REGEX "define mjVERSION_HEADER")
 endif()

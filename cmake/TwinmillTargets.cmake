@@ -30,7 +30,7 @@ endif()
 function(twinmill_strict target)
     target_compile_options(${target} PRIVATE
         -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wswitch
-        $<$<BOOL:${PROJECT_IS_TOP_LEVEL}>:-Werror>
+        $<$<AND:$<BOOL:${PROJECT_IS_TOP_LEVEL}>,$<NOT:$<BOOL:${SKBUILD}>>>:-Werror>
         $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>)
 endfunction()
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What rivals said beside what was hidden: each rival, each setting, every column.
 
-Names and dependence are judged by the rules of `twinmill challenge`; a rival's answer is put into
-the form of `twinmill diagnose --json` for that.
+Names and dependence are judged by the rules of `twinmill lab challenge`; a rival's answer is put
+into the form of `twinmill diagnose --json` for that.
 """
 
 from collections.abc import Iterable, Mapping

@@ -362,7 +362,7 @@ class Effect(Shown):
         self.equation, self.stage = entry["equation"], entry["stage"]
 
     def to_json(self) -> dict[str, Any]:
-        """All of the card, as `twinmill effects NAME --json`.
+        """All of the card, as `twinmill twin effects NAME --json`.
 
         Returns:
             name, summary, equation, stage, reference, parameters and more.

@@ -128,7 +128,7 @@ const char *fw_verdict_str(enum fw_verdict verdict)
         case FW_VERDICT_RUNNING: return "running: stop before choosing a script";
         case FW_VERDICT_UNSIGNED: return "not signed: only a stop may be";
         case FW_VERDICT_FORGED: return "its signature is wrong: signed with another key?";
-        case FW_VERDICT_NO_KEY: return "the robot has no key: `twinmill flash` brings it one";
+        case FW_VERDICT_NO_KEY: return "the robot has no key: `twinmill robot flash` brings it one";
         case FW_VERDICT_SESSION: return "made for an earlier run of the robot's program";
         case FW_VERDICT_EXPIRED:
             return "came over 3 s after it was made, or was made before the stop";

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill characterise` at a terminal, driving a twin; runs that are cut short in every way.
+"""`twinmill robot characterise` at a terminal, driving a twin, and cut short in every way.
 
 Usage: characterise_session.py FOLDER, in a network of its own, with TWIN_RUN set. Prints what
 happened as JSON.

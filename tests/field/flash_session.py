@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill flash` on pretended robots, in every way that it can end.
+"""`twinmill robot flash` on pretended robots, in every way that it can end.
 
 Usage: flash_session.py FOLDER, in a network and with mounts of its own, with TURBOPI set. Prints
 what happened as JSON.

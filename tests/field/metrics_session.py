@@ -2,7 +2,7 @@
 """A swarm of robots and one of twins on one bus, measured while they drive.
 
 Usage: metrics_session.py FOLDER, as root of a network namespace. Leaves in FOLDER what each swarm
-logged itself. Prints what `twinmill metrics --live` said of them, of one prefix and of an empty
+logged itself. Prints what `twinmill swarm metrics --live` said of them, one prefix and an empty
 bus, as JSON.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill characterise`: plays a script and logs it; stops the robot on whatever goes wrong."""
+"""`twinmill robot characterise`: plays a script, logs it; stops the robot on any failure."""
 
 import os
 

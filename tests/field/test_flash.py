@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill flash`: the program comes onto robots over a real ssh; each failure has a name."""
+"""`twinmill robot flash`: installs the program over a real ssh; each failure has a name."""
 
 import os
 import shutil

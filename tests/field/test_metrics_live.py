@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill metrics` on a live bus, against the logs that the same swarms wrote themselves."""
+"""`twinmill swarm metrics` on a live bus, against the logs that the same swarms wrote."""
 
 import json
 from dataclasses import replace

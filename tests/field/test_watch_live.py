@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill watch` on a live bus: robots and twins at once, against what they logged themselves."""
+"""`twinmill swarm watch` on a live bus: robots and twins at once, against their own logs."""
 
 from importlib.util import find_spec
 

@@ -3,7 +3,7 @@
 
 Usage: watch_session.py FOLDER, as root of a network namespace. Leaves in FOLDER what robots and
 twins logged themselves, what `from_bus` heard (heard), and, where the viewer is installed, what
-`twinmill watch` showed (shown.rrd). Prints what `twinmill watch` said, as JSON.
+`twinmill swarm watch` showed (shown.rrd). Prints what `twinmill swarm watch` said, as JSON.
 """
 
 import json
@@ -33,7 +33,7 @@ def drive(log: Path, prefix: str, seed: int, n: int = 2) -> subprocess.Popen:
 
 
 def listen(heard: Path) -> list[str]:
-    """Writes down what the source of `twinmill watch` gives; who could be shown of it."""
+    """Writes down what the source of `twinmill swarm watch` gives; who could be shown of it."""
     window, log = Window(LISTEN_S), lcm.EventLog(str(heard), "w")
     for now_us, batch in from_bus(URL, LISTEN_S):
         window.add(now_us, batch)

@@ -419,6 +419,15 @@ def test_a_command_has_two_names(twinmill, flat, words):
     assert told.partition("Options")[2] == out.partition("Options")[2]
 
 
+def test_a_terminal_alone_is_told_the_new_name_of_a_command(twinmill, monkeypatch):
+    code, out, err = twinmill("effects", "coasting", "--json")
+    assert (code, err) == (0, "") and json.loads(out)
+    monkeypatch.setattr(type(sys.stderr), "isatty", lambda _: True)
+    said = "twinmill effects is now twinmill twin effects\n"
+    assert twinmill("effects", "coasting", "--json") == (0, out, said)
+    assert twinmill("twin", "effects", "coasting", "--json") == (0, out, "")
+
+
 HEAVY = {"mujoco", "numpy", "pandas", "PIL", "matplotlib", "pyarrow", "pydantic", "ribs", "scipy"}
 HELPS = [[], *([name] for name, _, _ in cli.COMMANDS), ["swarm", "stop"], ["swarm", "status"]]
 
@@ -469,8 +478,8 @@ def test_words_that_need_no_check_are_taken_without_pydantic():
     [
         ("twinmill diag", "diagnose"),
         ("twinmill diagnose --mod", "--model"),
-        ("twinmill add coas", "coasting"),
-        ("twinmill effects coas", "coasting"),
+        ("twinmill twin add coas", "coasting"),
+        ("twinmill twin effects coas", "coasting"),
     ],
 )
 def test_the_tabulator_completes_commands_options_and_effects(typed, completed):

@@ -146,7 +146,7 @@ def test_a_plan_is_whole_and_what_it_says_runs_as_printed(planned: Path, monkeyp
     starts = np.loadtxt("plan/starts.csv", delimiter=",", skiprows=1)
     assert starts.shape == (6 * 6, 5) and np.abs(starts[:, 2:4]).max() <= 0.6
     fill(Path("plan/outcomes.csv"), Path("plan/outcomes.csv"), {"class": ["milling"] * 6})
-    command = next(line for line in text.splitlines() if "twinmill score-floor" in line)
+    command = next(line for line in text.splitlines() if "twinmill lab score" in line)
     command = command.replace(f"{planned}/", "")
     run([*command.split()[1:], "--json", "--out", "score"])
     data = json.loads(capsys.readouterr().out)
@@ -168,7 +168,7 @@ def test_probabilities_that_were_changed_after_sealing_are_not_scored(planned: P
 
 
 def test_a_run_may_come_as_a_log(planned: Path, tmp_path: Path, capsys):
-    """The class of a recorded run is that of twinmill metrics."""
+    """The class of a recorded run is that of twinmill swarm metrics."""
     log = tmp_path / "run.lcmlog"
     twin = [find_program("twin_run"), "--plant", "planar", "--model", planned / "m.toml"]
     twin += ["--n", "6", "--seed", "4", "--duration-s", f"{SECONDS:g}", "--log", log]

@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill_cli.main import COMMANDS, LazyCommand, run
+from twinmill_cli.main import BELOW, COMMANDS, LazyCommand, run
 
 sys.path.insert(0, str(Path(__file__).parent))
 from ros_stand_in import StandIn
 
 TWIN = ["--robot", "twin"]
-MINUTES = ("compare", "diagnose", "explain", "next", "export-model")  # which other tests run
+MINUTES = ("compare", "diagnose", "explain", "next", "twin export")  # which other tests run
 
 
 @pytest.fixture(autouse=True)
@@ -78,7 +78,8 @@ def test_each_plan_has_a_model_that_loads_and_commands_that_exist(case):
     modules = {name: module for name, module, _ in COMMANDS}
     for words in map(shlex.split, commands):
         if words[0] == "twinmill":
-            command = LazyCommand(words[1], f"twinmill_cli.{modules[words[1]]}", "").command()
+            name = BELOW.get(words[1], {}).get(words[2], words[1])
+            command = LazyCommand(name, f"twinmill_cli.{modules[name]}", "").command()
             known = {option for p in command.params for option in p.opts}
             assert [w for w in words[2:] if w.startswith("--") and w not in known] == []
     assert "{" not in text and "\n\n\n" not in text
@@ -123,7 +124,7 @@ def test_a_robot_on_ros_comes_to_the_answer_on_its_axes(folder, monkeypatch, cap
     head = "t_s,x_m,y_m,theta_rad"
     np.savetxt("wheels_poses.csv", poses, "%.6f", delimiter=",", header=head, comments="")
     capsys.readouterr()
-    lines = [c for c in commands if "wheels_poses" in c or "twinmill wheels" in c]
+    lines = [c for c in commands if "wheels_poses" in c or "twinmill robot wheels" in c]
     assert len(lines) == 2
     for line in lines:
         result = run(shlex.split(line)[1:])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill infer` prints what to type next, for what is beyond doubt and lasts."""
+"""`twinmill lab infer` prints what to type next, for what is beyond doubt and lasts."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill optitrack` against a server whose packets are laid out by hand."""
+"""`twinmill track optitrack` against a server whose packets are laid out by hand."""
 
 import json
 import math

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill plot`: what is drawn is what was driven."""
+"""`twinmill swarm plot`: what is drawn is what was driven."""
 
 import shutil
 from dataclasses import replace

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill threshold`: limits of colour from pictures whose truth is known."""
+"""`twinmill robot threshold`: limits of colour from pictures whose truth is known."""
 
 import json
 

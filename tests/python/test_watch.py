@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill watch`: the viewer is given what was said, read back with the viewer's own reader."""
+"""`twinmill swarm watch`: what the viewer is given, read back with its own reader."""
 
 import json
 import math

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill wheels`: what each wheel did, by motion that the textbook's equations make.
+"""`twinmill robot wheels`: what each wheel did, by motion that the textbook's equations make.
 
 Lynch and Park, Modern Robotics (2017), section 13.2.1: four mecanum wheels, one of them turning.
 """

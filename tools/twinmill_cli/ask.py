@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill ask`: how many robots, how fast, how good their sensors, how alike."""
+"""`twinmill swarm ask`: how many robots, how fast, how good their sensors, how alike."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _ask(
 ) -> list[Curve]:
     """Answer a design question with a curve and a sentence.
 
-    Example: twinmill ask how-many --behavior milling --model turbopi.toml --out answer
+    Example: twinmill swarm ask how-many --behavior milling --model turbopi.toml --out answer
     """
     if out:
         check_report(out)
@@ -79,7 +79,7 @@ def _ask(
     wanted = check_goal(goal) if goal else goal_of(requests[0])
     curves = [curve_of(request, wanted) for request in requests]
     sentences = [curve.sentence(wanted, at_least) for curve in curves]
-    words = ["twinmill", "ask", question, "--behavior", behavior, "--model", model]
+    words = ["twinmill", "swarm", "ask", question, "--behavior", behavior, "--model", model]
     words += ["--seeds", str(seeds), "--duration-s", f"{duration_s:g}", "--goal", wanted]
     words += ["--n", str(n)] if n else []
     words += [] if target_radius_m is None else ["--target-radius-m", f"{target_radius_m:g}"]

@@ -77,7 +77,7 @@ def _fit(
             "--history",
             metavar="FILE",
             show_default=False,
-            help="Append the numbers to the history of the robot (.jsonl), for `twinmill drift`.",
+            help="Append the numbers to the robot's history (.jsonl), for `twinmill robot drift`.",
         ),
     ] = None,
     force: Force = False,
@@ -114,7 +114,7 @@ def _add(
         typer.Argument(
             metavar="EFFECT",
             show_default=False,
-            help="Its name; `twinmill effects` lists them. Of one robot also gains.",
+            help="Its name; `twinmill twin effects` lists them. Of one robot also gains.",
             autocompletion=effects_beginning,
         ),
     ],
@@ -149,7 +149,7 @@ def _add(
 ) -> AddResult:
     """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
 
-    Example: twinmill add coasting run.lcmlog --model fitted.toml -o better.toml
+    Example: twinmill twin add coasting run.lcmlog --model fitted.toml -o better.toml
     """
     gains = robot is not None and effect == OWN_GAINS
     known = {} if gains else {t["name"]: t["default"] for t in find_effect(effect)["texts"]}
@@ -158,7 +158,7 @@ def _add(
     texts = {name: text for name, text in texts.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
         raise ValueError(
-            f"{option(extra[0])}: {effect} has none; it is for `twinmill add equation`."
+            f"{option(extra[0])}: {effect} has none; it is for `twinmill twin add equation`."
         )
     if "formula" in known and formula is None:
         used = {**known, **texts}
@@ -166,7 +166,7 @@ def _add(
         say(f"without --formula, {usual} is fitted.")
     held = hold or []
     given = [w for name, text in texts.items() for w in (option(name), text)]
-    verb = shlex.join(["add", effect, *of_robot(robot), *given, *holding(held)])
+    verb = shlex.join(["twin", "add", effect, *of_robot(robot), *given, *holding(held)])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )

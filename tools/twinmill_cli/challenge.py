@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill challenge`: the blind test from end to end."""
+"""`twinmill lab challenge`: the blind test from end to end."""
 
 from __future__ import annotations
 
@@ -98,13 +98,13 @@ def _challenge(
     folder as results.json (the same bytes for the same seed), times.json and
     index.html. Stopped half way, the same command goes on where it was.
 
-    Example: twinmill challenge --n 20 --out challenge
+    Example: twinmill lab challenge --n 20 --out challenge
     """
     check_report(out)
     check_holds(out, WRITTEN)
     (out / DONE).mkdir(parents=True, exist_ok=True)
     workers = workers or os.cpu_count() or 1
-    command = f"twinmill challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
+    command = f"twinmill lab challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
     command += "" if judge == Judge.DIAGNOSE else f" --judge {judge}"
     how = {"seed": seed, "duration_s": duration_s, "workers": workers, "as_json": as_json}
     with alone_in(out):

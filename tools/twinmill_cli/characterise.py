@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill characterise`: drives one robot by a script, open loop, and logs all that is heard."""
+"""`twinmill robot characterise`: drives one robot by a script, open loop, and logs it."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def _characterise(
     duties as the velocities that the model reaches at them. A script of
     vx_mps, vy_mps, omega_radps is written as it is.
 
-    Example: twinmill characterise --robot 3 --script steps.csv --out run.lcmlog
+    Example: twinmill robot characterise --robot 3 --script steps.csv --out run.lcmlog
     """
     if script_as:
         return _for_ros(
@@ -161,7 +161,7 @@ def _for_ros(
         end_s = check_script(script, cap_pct)
         t_s, duties_pct = read_script(script)
         twists = TwistScript.of(ModelFile.load(model).model, Rows(t_s, duties_pct / 100, end_s))
-    words = ["twinmill", "characterise", "--script", str(script), "--script-as", form]
+    words = ["twinmill", "robot", "characterise", "--script", str(script), "--script-as", form]
     command = shlex.join([*words, "--model", model])
     write_script(twists, form, out, force, command=command, inputs=[script])
     deliver({"script_as": str(out), "duration_s": end_s}, f"Written: {out}", as_json)

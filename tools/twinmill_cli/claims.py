@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill claims`: does this program do what was published?"""
+"""`twinmill lab claims`: does this program do what was published?"""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _claims(
     claims.json and every figure as SVG. Stopped in MuJoCo, the same command goes
     on where it was.
 
-    Example: twinmill claims --out claims
+    Example: twinmill lab claims --out claims
     """
     names = only or [*CHECKED, ACTUATION]
     if unknown := [name for name in names if name not in (*CHECKED, ACTUATION)]:
@@ -168,7 +168,7 @@ def _in_mujoco(seeds: int, folder: Path) -> list[Claim]:
 
 
 def _command_line(only: list[str] | None, seeds: int, odd_turn: list[float] | None) -> str:
-    words = ["twinmill claims", *(f"--only {name}" for name in only or [])]
+    words = ["twinmill lab claims", *(f"--only {name}" for name in only or [])]
     words += [f"--seeds {seeds}", *(f"--odd-turn {turn:g}" for turn in odd_turn or [])]
     return " ".join(words)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill compare-runs`: did anything change between two runs of one robot?"""
+"""`twinmill robot compare`: did anything change between two runs of one robot?"""
 
 from __future__ import annotations
 
@@ -70,13 +70,13 @@ def _compare_runs(
 
     Exit codes: 0 nothing changed, 3 something did.
 
-    Example: twinmill compare-runs monday.lcmlog friday.lcmlog --model fitted.toml
+    Example: twinmill robot compare monday.lcmlog friday.lcmlog --model fitted.toml
     """
     given = healthy or []
     words = [w for path in given for w in ("--healthy", str(path))]
     words += [] if robot is None else ["--robot", str(robot)]
     words += [] if alarm_rate == ALARM_RATE else ["--alarm-rate", f"{alarm_rate:g}"]
-    verb = shlex.join(["compare-runs", *words])
+    verb = shlex.join(["robot", "compare", *words])
     model_file = open_model(model, out)
     source = provenance(command_line(verb, [first, second], model), model_file)
     others, missing = healthy_logs(given)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill compare-swarm`: does a recorded swarm behave as the twin's swarms do?"""
+"""`twinmill swarm compare`: does a recorded swarm behave as the twin's swarms do?"""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def _compare_swarm(
     Paths of a swarm are chaotic, so metrics over time are compared: the floor's
     run is ranked among runs of the twin that start from the same poses.
 
-    Example: twinmill compare-swarm floor.lcmlog --model fitted.toml --out report
+    Example: twinmill swarm compare floor.lcmlog --model fitted.toml --out report
     """
     model_file = open_model(model, out)
     runs = ["--seeds", str(seeds), "--first-seed", str(first_seed)]
     runs += ["--odd", odd] if odd else []
     runs += ["--behavior", behavior] if behavior else []
-    verb = shlex.join(["compare-swarm", *runs])
+    verb = shlex.join(["swarm", "compare", *runs])
     source = provenance(command_line(verb, [log], model), model_file)
     scale = (
         model_file.model.get("sensor.range_m"),

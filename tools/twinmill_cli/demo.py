@@ -150,7 +150,7 @@ def _hide(seed: int) -> str:
     print(
         f"One of {len(PAIRS)} pairs of effects, and their sizes, were drawn by lot into a file\n"
         "that nothing but the robot reads until the end. The pairs are ones that so short\n"
-        "a log can tell; of the others `twinmill challenge` shows how often it does.\n"
+        "a log can tell; of the others `twinmill lab challenge` shows how often it does.\n"
         f"SHA-256: {_digest()}"
     )
     return _digest()

@@ -162,7 +162,7 @@ def _adding(
     if not proven:
         return []
     options = [w for name, text in proven.equation.items() for w in (option(name), text)]
-    verb = shlex.join(["add", "equation", *options])
+    verb = shlex.join(["twin", "add", "equation", *options])
     model = given if proven.instead_of else explained
     why = "To add the formula" if model == given else "Then, to add the formula"
     to = Path(f"{Path(given).stem}_equation.toml")
@@ -191,7 +191,7 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     if result.verdict in ("ambiguous", "outside_catalogue"):
         return (
             "Each robot was judged by itself; the swarm as a whole can be once the model predicts "
-            "each robot: `twinmill compare-swarm`."
+            "each robot: `twinmill swarm compare`."
         ), None
     log, model = read_log(path), result.model
     if not all((robot.mode == TABLE).any() for robot in log.robots.values()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill discover`: looks for behaviours that nobody thought of."""
+"""`twinmill lab discover`: looks for behaviours that nobody thought of."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _discover(
     Stopped half way, or with more generations, the same command goes on where it
     was. DIR/behaviors.toml makes each runnable by name in twin_run.
 
-    Example: twinmill discover --set robot.body_radius_m=0.1 --set target_radius_m=0.1 --out found
+    Example: twinmill lab discover --set robot.body_radius_m=0.1 --out found
     """
     request = make_request(
         "milling", model, change or [], n=n, seeds=seeds, duration_s=duration_s, start=start
@@ -165,7 +165,7 @@ def _source(
     hunt: Hunt, model: str, change: list[str], limits: dict[str, int], *, out: Path
 ) -> Provenance:
     request = hunt.request
-    words = ["twinmill", "discover", "--model", model]
+    words = ["twinmill", "lab", "discover", "--model", model]
     words += [word for text in change for word in ("--set", text)]
     words += [word for name, limit in limits.items() for word in (f"--{name}", str(limit))]
     words += ["--n", str(hunt.n), "--seeds", str(request.seeds)]

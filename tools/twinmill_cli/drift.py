@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill drift`: a robot's numbers over its calibrations."""
+"""`twinmill robot drift`: a robot's numbers over its calibrations."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ def _drift(
     The band is where the next calibration of an unchanged robot lies, by those
     before it. Exit codes: 0 all are in their bands, 3 one is not.
 
-    Example: twinmill drift robot.jsonl --out report
+    Example: twinmill robot drift robot.jsonl --out report
     """
     if out:
         check_report(out)
     words = [] if alarm_rate == ALARM_RATE else ["--alarm-rate", f"{alarm_rate:g}"]
-    command = shlex.join(["twinmill", "drift", str(history), *words])
+    command = shlex.join(["twinmill", "robot", "drift", str(history), *words])
     result = drift(read_history(history), alarm_rate)
     source = Provenance(command, f"twinmill {__version__}", "")
     finish_changed(result, present, source, changed=bool(result.left), as_json=as_json, out=out)

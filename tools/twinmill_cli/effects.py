@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill effects`: the catalogue."""
+"""`twinmill twin effects`: the catalogue."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _effects(
     `effects new NAME --from MODEL` writes source, card and test of an effect
     for the catalogue, from an equation of a model.
 
-    Example: twinmill effects coasting
+    Example: twinmill twin effects coasting
     """
     if name != NEW and (called or from_model):
         surplus = f"'{called}'" if called else f"--from {from_model}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill export-model`: a model for other simulators, and ranges of its numbers."""
+"""`twinmill twin export`: a model for other simulators, and ranges of its numbers."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _export_model(
     geometry, masses, wheels, camera and limits. JSON has all. --ranges writes
     95 % intervals and samples of all fitted numbers that go together.
 
-    Example: twinmill export-model better.toml --to mjcf --ranges
+    Example: twinmill twin export better.toml --to mjcf --ranges
     """
     if to is None and not with_ranges:
         raise ValueError(
@@ -87,7 +87,7 @@ def _export_model(
     )
     data = {
         **done.to_json(),
-        "command": shlex.join(["twinmill", "export-model", model, *(["--to", to] if to else [])]),
+        "command": shlex.join(["twinmill", "twin", "export", model, *(["--to", to] if to else [])]),
         "version": f"twinmill {__version__}",
         "model_sha256": source.file.hash,
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill flash`: puts the robot's program on many robots at once."""
+"""`twinmill robot flash`: puts the robot's program on many robots at once."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _flash(
     Robots stop while they are updated, and stand after it. Exit code 1 if any
     failed; each says why.
 
-    Example: twinmill flash robot03.local robot04.local --behavior milling
+    Example: twinmill robot flash robot03.local robot04.local --behavior milling
     """
     targets = [parse_target(host) for host in hosts]
     _refuse_twins(targets)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill infer`: probabilities of what a model lacks."""
+"""`twinmill lab infer`: probabilities of what a model lacks."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ def _infer(
     speed, turns, the past, single moments) and nothing at all compete by their
     evidence. Sure means 90 % or more.
 
-    Example: twinmill infer run.lcmlog --model fitted.toml --own calibration.lcmlog
+    Example: twinmill lab infer run.lcmlog --model fitted.toml --own calibration.lcmlog
 
     With --keep known.toml the model is written with what it misses in its own
-    log: later, `twinmill infer other.lcmlog --model known.toml` is enough.
+    log: later, `twinmill lab infer other.lcmlog --model known.toml` is enough.
     """
     native.keep_memory()  # what the work frees it wants again
     words = [word for path in own or () for word in ("--own", str(path))]
-    verb = shlex.join(["infer", *words, *(["--keep", str(keep)] if keep else [])])
+    verb = shlex.join(["lab", "infer", *words, *(["--keep", str(keep)] if keep else [])])
     source = provenance(command_line(verb, logs, model), model_file := open_model(model, None))
     if keep is not None and not own:
         raise ValueError("infer: --keep keeps what --own tells; give the model's own log, too.")

@@ -42,14 +42,14 @@ class LazyCommand(TyperCommand):
         module: whose function `register` adds it to an application.
         summary: first sentence of its help.
         registered: its name there, if another.
-        hidden: the list of commands leaves it out.
+        renamed: its name in the list of commands, which leaves this one out.
     """
 
     def __init__(
-        self, name: str, module: str, summary: str, *, registered: str = "", hidden: bool = False
+        self, name: str, module: str, summary: str, *, registered: str = "", renamed: str = ""
     ) -> None:
-        super().__init__(name, help=summary, hidden=hidden)
-        self.module, self.registered = module, registered or name
+        super().__init__(name, help=summary, hidden=bool(renamed))
+        self.module, self.registered, self.renamed = module, registered or name, renamed
         self.below: dict[str, LazyCommand] = {}  # commands whose first word is this one's name
 
     def command(self) -> TyperCommand | TyperGroup:
@@ -80,6 +80,8 @@ class LazyCommand(TyperCommand):
             typer.Exit: it showed its help.
         """
         words = list(args)
+        if self.renamed and sys.stderr.isatty() and not options.get("resilient_parsing"):
+            typer.echo(f"twinmill {self.name} is now twinmill {self.renamed}", err=True)
         command = self.command()
         if words and words[0] in self.below and not isinstance(command, TyperGroup):
             below = self.below[words[0]]

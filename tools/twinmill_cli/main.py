@@ -251,7 +251,7 @@ GROUPS = {
 
 
 class Commands(TyperGroup):
-    """Commands of `TOP` with those below them; each under its own name alone, too."""
+    """Commands of `TOP` with those below them; each under its flat name, too."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
@@ -270,9 +270,10 @@ class Commands(TyperGroup):
                 command = LazyCommand(name, *told[name])
                 command.below = below
                 self.add_command(command)
-        for name, said in told.items():
-            if name not in self.commands:
-                self.add_command(LazyCommand(name, *said, hidden=True))
+        for first, below in BELOW.items():
+            for new, old in below.items():
+                if old not in self.commands:
+                    self.add_command(LazyCommand(old, *told[old], renamed=f"{first} {new}"))
 
 
 def _completes() -> bool:

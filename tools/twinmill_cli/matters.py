@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill matters`: which effect and which number of a model the swarm feels."""
+"""`twinmill swarm matters`: which effect and which number of a model the swarm feels."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _matters(
     its interval, and what the logs do not exclude is put in. The same seeds
     run before and after. Stopped half way, the same command with --out goes on.
 
-    Example: twinmill matters run.lcmlog --model explained.toml --out matters
+    Example: twinmill swarm matters run.lcmlog --model explained.toml --out matters
     """
     if out:
         check_report(out)
@@ -200,7 +200,7 @@ def _table(request: Request, folder: Path, progress: Progress) -> pa.Table:
 
 def _command_line(given: dict) -> str:
     """The command that does this again."""
-    words = ["twinmill", "matters", *map(str, given["logs"] or [])]
+    words = ["twinmill", "swarm", "matters", *map(str, given["logs"] or [])]
     for name in ("model", "behavior", "goal", "n"):
         words += [f"--{name}", str(given[name])] if given[name] is not None else []
     for name in ("seeds", "first_seed", "duration_s", "spread_m", "margin", "draws", "map_seeds"):

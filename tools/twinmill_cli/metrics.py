@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill metrics`: what the swarm in a log or on the bus does, real or simulated."""
+"""`twinmill swarm metrics`: what the swarm in a log or on the bus does, real or simulated."""
 
 from __future__ import annotations
 
@@ -58,9 +58,9 @@ def _metrics(
     View range and body size are the model's. Velocities are fitted to the poses;
     twin_run says the same of its own run, from the poses that it publishes.
 
-    Example: twinmill metrics run.lcmlog --out report
+    Example: twinmill swarm metrics run.lcmlog --out report
 
-    Example: twinmill metrics --live
+    Example: twinmill swarm metrics --live
     """
     if live == (log is not None):
         raise ValueError("give either a LOG or --live.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill metrics --live`: what the swarms on the bus do now, as a screen or lines of JSON."""
+"""`twinmill swarm metrics --live`: the swarms on the bus now, as a screen or lines of JSON."""
 
 from __future__ import annotations
 

@@ -178,20 +178,19 @@ def _how(
             ("then, what it sent and its poses imported:", then),
         ]
         return present.How(first, steps)
+    robot = f"twinmill robot characterise --robot {number} --script {path}"
     if plan.rows.kind == "twist":
         program = shlex.quote(str(script.with_suffix(".py")))
-        robot = f"twinmill characterise --robot {number} --script {path} --script-as publisher"
         steps = [
-            ("As a program for ROS 2:", f"{robot} --out {program}"),
+            ("As a program for ROS 2:", f"{robot} --script-as publisher --out {program}"),
             ("on the robot:", f"python3 {program}"),
             ("then, what it sent and its poses imported:", then),
         ]
         return present.How(first, steps)
     cap_pct = round(100 * float(np.abs(plan.rows.command).max()))
-    robot = f"twinmill characterise --robot {number} --script {path} --cap-pct {cap_pct}"
     twin = f"twin_run --n 1 --model {shlex.quote(model)} --script {path}"
     steps = [
-        ("On the robot:", f"{robot} --out next.lcmlog"),
+        ("On the robot:", f"{robot} --cap-pct {cap_pct} --out next.lcmlog"),
         ("or in the twin:", f"{twin} --log next.lcmlog"),
         ("then:", then),
     ]

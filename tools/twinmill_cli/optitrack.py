@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill optitrack`: an OptiTrack's live stream on the bus, or why nothing arrives."""
+"""`twinmill track optitrack`: an OptiTrack's live stream on the bus, or why nothing arrives."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _optitrack(
     delay is in them. With --check, turn a robot by hand: that shows which axis
     is up.
 
-    Example: twinmill optitrack --server 192.168.1.20 --check
+    Example: twinmill track optitrack --server 192.168.1.20 --check
     """
     if up not in ("y", "z"):
         raise ValueError(f"--up {up}: must be y or z.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill phase`: a sweep as a phase diagram, with experiments on it."""
+"""`twinmill swarm phase`: a sweep as a phase diagram, with experiments on it."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _phase(
 ) -> dict:
     """Draw what becomes of the swarm over a sweep's grid, and where to experiment next.
 
-    Example: twinmill phase sweep --experiments floor.csv
+    Example: twinmill swarm phase sweep --experiments floor.csv
     """
     request, table = read_sweep(folder)
     phase = phase_of(request, table, check_goal(goal) if goal else goal_of(request))
@@ -83,7 +83,7 @@ def _phase(
     match = agreement(runs) if runs else None
     target = out or folder / "phase"
     check_report(target)
-    words = ["twinmill", "phase", str(folder), "--goal", phase.goal]
+    words = ["twinmill", "swarm", "phase", str(folder), "--goal", phase.goal]
     words += [word for text in at or [] for word in ("--at", text)]
     words += ["--experiments", str(experiments)] if experiments else []
     words += ["--rival", str(rival)] if rival else []

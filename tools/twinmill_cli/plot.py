@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill plot`: a log at one glance."""
+"""`twinmill swarm plot`: a log at one glance."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _plot(
 
     Speeds come from the poses. Twins on channels TWIN_... are dashed.
 
-    Example: twinmill plot run.lcmlog -o run.html
+    Example: twinmill swarm plot run.lcmlog -o run.html
     """
     out = out or Path(f"{log.stem}.png")
     if out.suffix not in SUFFIXES:
@@ -57,7 +57,7 @@ def _plot(
     with busy(f"drawing {log}"), replacing(out, force, inputs=[log]) as temporary:
         multi_log = read_multi_log(log)
         panels = _panels(multi_log, log)
-        command = shlex.join(["twinmill", "plot", str(log), "-o", str(out)])
+        command = shlex.join(["twinmill", "swarm", "plot", str(log), "-o", str(out)])
         source = Provenance(command, f"twinmill {__version__}", "")
         if out.suffix == ".html":
             temporary.write_text(_page(log, multi_log, panels, source))

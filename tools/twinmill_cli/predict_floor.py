@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill predict-floor`: a sealed prediction of real runs, and the plan to make them."""
+"""`twinmill lab predict`: a sealed prediction of real runs, and the plan to make them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _predict_floor(
     end differently, or surely and otherwise than most cells do. DIR/plan.md is
     for the laboratory; the probabilities are in a file whose hash it names.
 
-    Example: twinmill predict-floor sweep --cells 9 -o plan
+    Example: twinmill lab predict sweep --cells 9 -o plan
     """
     request, table = read_sweep(sweep)
     if cells > len(request.points):

@@ -41,11 +41,11 @@ STEPS = {
     "3. What swarms of them do is looked for": [
         "twin_sweep --model explained.toml --x n=4:9:6 --y range_m=0.7,0.9,1.1 --seeds 20 "
         "--duration-s 60 --out sweep",
-        "twinmill phase sweep",
+        "twinmill swarm phase sweep",
     ],
     "4. Robots do it, or not": [
-        "twinmill predict-floor sweep --cells 6 --repeats 2 --draws 20 -o plan",
-        f"twinmill score-floor plan plan/{FORM}",
+        "twinmill lab predict sweep --cells 6 --repeats 2 --draws 20 -o plan",
+        f"twinmill lab score plan plan/{FORM}",
     ],
 }
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill score-floor`: what came of a sealed prediction."""
+"""`twinmill lab score`: what came of a sealed prediction."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _score_floor(
     Scores are proper: the log score in nats and Brier's. Their intervals come
     from the scatter of the cells.
 
-    Example: twinmill score-floor plan plan/outcomes.csv --out score
+    Example: twinmill lab score plan plan/outcomes.csv --out score
     """
     if out:
         check_report(out)
@@ -59,7 +59,7 @@ def _score_floor(
     found = score(plan.expected, cell, seen, axes=plan.names, seed=plan.seed)
     told = sentences(found, missing)
     source = Provenance(
-        shlex.join(["twinmill", "score-floor", str(folder), str(outcomes), "--sha256", digest]),
+        shlex.join(["twinmill", "lab", "score", str(folder), str(outcomes), "--sha256", digest]),
         f"twinmill {__version__}",
         hashlib.sha256(plan.request.model_text.encode()).hexdigest(),
     )

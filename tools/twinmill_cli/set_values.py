@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill set`: numbers of a model set by hand, in a new model file."""
+"""`twinmill twin set`: numbers of a model set by hand, in a new model file."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _set(
 
     What fits told of these numbers is taken out of the new file.
 
-    Example: twinmill set base.motor_lag_s=0.06 --model turbopi.toml -o slower.toml
+    Example: twinmill twin set base.motor_lag_s=0.06 --model turbopi.toml -o slower.toml
     """
     wanted: dict[str, float] = {}
     for name, value in map(_parsed, values):

@@ -435,7 +435,8 @@ def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
         if robot.is_double:
             raise ValueError(
                 f"two robots say that they are number {robot_id} "
-                f"({', '.join(robot.senders.hosts)}): give one another, `twinmill flash HOST=ID`."
+                f"({', '.join(robot.senders.hosts)}): give one another number, "
+                "`twinmill robot flash HOST=ID`."
             )
 
 

@@ -284,4 +284,4 @@ def _why(given: list[Answer]) -> str:
 
 def _hint(given: list[Answer]) -> str:
     unknown = any(a.reason.startswith("no behaviour") for a in given)
-    return "; `twinmill flash --behaviors FILE` brings tables to robots" if unknown else ""
+    return "; `twinmill robot flash --behaviors FILE` brings tables to robots" if unknown else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill tags`: sheets to print for a ceiling camera."""
+"""`twinmill track tags`: sheets to print for a ceiling camera."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _tags(
     A sheet has the robot's number, a line that goes to its front, and a ruler
     of 100 mm to check the print by.
 
-    Example: twinmill tags --out tags.pdf --robots 1-8 --floor --board
+    Example: twinmill track tags --out tags.pdf --robots 1-8 --floor --board
     """
     if paper not in PAPERS_M:
         raise ValueError(f"--paper {paper}: must be one of {', '.join(PAPERS_M)}.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill threshold`: the green that a robot looks for, from pictures of its own camera."""
+"""`twinmill robot threshold`: the green that a robot looks for, from pictures of its own camera."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _threshold(
     With pictures of several colours, as red=c.png, the first is the robot's
     bit 1, the next its bit 2, and so on; colours that overlap are named.
 
-    Example: twinmill threshold a.png b.png --picture seen.png --config turbopi.conf
+    Example: twinmill robot threshold a.png b.png --picture seen.png --config turbopi.conf
     """
     if [bool(images), bool(camera), bool(robot)].count(True) != 1:
         raise ValueError("threshold: give pictures, or --camera, or --robot: one of them.")

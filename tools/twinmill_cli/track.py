@@ -474,11 +474,11 @@ def _calibrate(
 ) -> dict:
     """Find a camera's lens from a film of a board that is moved about before it.
 
-    The board is that of `twinmill tags --board`, or a checkerboard. Show it in
+    The board is that of `twinmill track tags --board`, or a checkerboard. Show it in
     all parts of the picture and tilted to all sides; move slowly, and keep it
     flat. Focus, zoom and resolution must be those of the runs.
 
-    Example: twinmill track-calibrate board.mp4 --out camera.toml
+    Example: twinmill track calibrate board.mp4 --out camera.toml
     """
     check_new_file(out, force, [video])
     pattern, film = _board(board, squares, square_m), _film(video, None)
@@ -537,7 +537,7 @@ def _check(
     marks of a ruler, and let `track` find it. No robot is needed. Exit code 1
     says that a stop is off by more than 3 mm or 1 degree.
 
-    Example: twinmill track-check ruler.csv --marks-mm 0,100,200,300
+    Example: twinmill track check ruler.csv --marks-mm 0,100,200,300
     """
     sheets = [s for s in read_poses(poses, Columns()) if robot in (None, s.robot_id)]
     if len(sheets) != 1:

@@ -30,7 +30,7 @@ def _text(data: dict) -> str:
     lines = [f"{worlds}, {data['wall_s']:.1f} s: {classes}"]
     if data["why_full"]:
         lines.append(f"Every robot ran its firmware and plant, slowly: {data['why_full']}.")
-    lines.append(f"{data['file']}\nPicture: twinmill phase {shlex.quote(str(data['out']))}")
+    lines.append(f"{data['file']}\nPicture: twinmill swarm phase {shlex.quote(str(data['out']))}")
     return "\n".join(lines)
 
 

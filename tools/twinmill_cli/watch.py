@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill watch`: robots and their twins side by side, while they drive or from a log."""
+"""`twinmill swarm watch`: robots and their twins side by side, while they drive or from a log."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _watch(
     sees a neighbour; orange, where the model would have the robot go from two
     seconds ago. Over time: bits, and the model's score over the last 30 s.
 
-    Example: twinmill watch run.lcmlog --save run.rrd
+    Example: twinmill swarm watch run.lcmlog --save run.rrd
     """
     if sum([save is not None, bool(connect), spawn]) > 1:
         raise ValueError("--save, --connect and --spawn: give one of them.")
@@ -75,7 +75,9 @@ def _watch(
     batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, say)
     with replacing(save, force) if save else nullcontext() as file:
         show = _show(batches, model_file, log.name if log else None, file, url=connect)
-    command = shlex.join(["twinmill", "watch", *([str(log)] if log else []), "--model", model])
+    command = shlex.join(
+        ["twinmill", "swarm", "watch", *([str(log)] if log else []), "--model", model]
+    )
     source = {"command": command, "version": f"twinmill {__version__}"}
     data = {
         "saved": str(save) if save else None,

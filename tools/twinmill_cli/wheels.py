@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill wheels`: one wheel at a time, and whether each does what its column says."""
+"""`twinmill robot wheels`: one wheel at a time, and whether each does what its column says."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _wheels(
     wheels that stand, poses that are mirrored or turned.
     Exit code 1 says that something is wrong.
 
-    Example: twinmill wheels -o wheels.csv; twinmill wheels wheels.lcmlog
+    Example: twinmill robot wheels -o wheels.csv; twinmill robot wheels wheels.lcmlog
     """
     model_file = open_model(model, None)
     robot_model = model_file.model
@@ -86,7 +86,8 @@ def _write(
     names, rows = script(model, duty_pct)
     if form:
         twists = _twists(model, rows[:-1, 0], rows[:-1, 1:], float(rows[-1, 0]))
-        write_script(twists, form, output, force, command=f"twinmill wheels --script-as {form}")
+        command = f"twinmill robot wheels --script-as {form}"
+        write_script(twists, form, output, force, command=command)
     else:
         with replacing(output, force) as temporary:
             temporary.write_text(csv_text(names, rows))

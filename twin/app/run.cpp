@@ -188,7 +188,7 @@ public:
     }
 
     double WallS() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
-    // Of the poses as they were published: what `twinmill metrics` says of the log.
+    // Of the poses as they were published: what `twinmill swarm metrics` says of the log.
     Metrics Mean(const Publisher &publisher) const
     {
         return publisher.recent().Mean(ring_, scale_);

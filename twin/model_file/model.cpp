@@ -155,7 +155,7 @@ void Model::AddEffect(const std::string &name, const std::map<std::string, std::
     const EffectSpec *spec = FindEffect(name);
     if (!spec)
         throw std::invalid_argument("there is no effect '" + name +
-                                    "'; `twinmill effects` lists those there are");
+                                    "'; `twinmill twin effects` lists those there are");
     if (const std::string why = WhyNot(*spec); !why.empty())
         throw std::invalid_argument("effect '" + name + "' " + why);
     EffectInstance instance{spec, ParametersFor(*spec, MakeWheels()), {}, ""};
@@ -167,7 +167,7 @@ void Model::AddEffect(const std::string &name, const std::map<std::string, std::
         instance.texts.push_back(given != texts.end() ? given->second : text.default_value);
     }
     if (used != texts.size())
-        throw std::invalid_argument("effect '" + name + "' has no such text; `twinmill effects " +
+        throw std::invalid_argument("effect '" + name + "' has no such text; `twinmill twin effects " +
                                     name + "` lists those it has");
     instance.stage = StageName(instance.Bind().act());
     effects.push_back(std::move(instance));

@@ -32,7 +32,7 @@ COASTING = '\n[[effect]]\nname = "coasting"\ndeceleration_mps2 = 1.5\n'
 DRIVE_S, SWARM_S, SEEDS = 60.0, 60.0, 24
 BEHAVIORS, ROBOTS = ("milling", "milling_cmaes"), "n=4:9:6"
 EFFECTS = ("speed_curve", "lag_by_duty")
-COMMAND = "twinmill claims"
+COMMAND = "twinmill lab claims"
 # What no drive of one robot tells, as the true model has it.
 CAMERA = {"sensor.false_negative_rate": 0.04, "sensor.false_positive_rate": 0.10}
 DIFFERENCES = {"idiosyncrasy.theta_a1_std": 0.04, "idiosyncrasy.theta_a2_std": 0.04}

@@ -50,7 +50,7 @@ PARTS = (
         "Cost against fidelity of models",
         ("fidelity",),
         open="How cost is counted; here by what must be measured.",
-        elsewhere="For one real robot: docs/accuracy.md; for a model of yours: twinmill matters.",
+        elsewhere="One real robot: docs/accuracy.md; a model of yours: twinmill swarm matters.",
     ),
     Part(
         "Two rules of one bit and their behaviours: milling, diffusing",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The four questions of a design, asked as `twinmill ask` asks them."""
+"""The four questions of a design, asked as `twinmill swarm ask` asks them."""
 
 from twinmill.claims.rows import Claim, Row
 from twinmill.defaults import Question
@@ -26,7 +26,7 @@ def questions(seeds: int) -> Claim:
             ends = curve.low[best], curve.high[best]
             rows.append(Row(what, curve.probability[best], *ends, None, None, unit="%"))
             figures.append(curve_figure(curve, GOAL, "", WANTED))
-        command = f"$ twinmill ask {question} --target-radius-m {RADIUS_M:g} --seeds {seeds}"
+        command = f"$ twinmill swarm ask {question} --target-radius-m {RADIUS_M:g} --seeds {seeds}"
         transcript.append(
             (f"{question.replace('-', ' ').capitalize()}?", "\n".join([command, *said]))
         )

@@ -175,7 +175,7 @@ def read_signs(robot: RobotLog, model: native.Model, label: str) -> WheelSigns:
     if np.isnan(did).all():
         raise LogError(
             f"{label}: no command was alone for {2 * MARGIN_S + 0.5:.1f} s; play the script that "
-            "`twinmill wheels -o wheels.csv` writes."
+            "`twinmill robot wheels -o wheels.csv` writes."
         )
     wanted = np.column_stack([body[:, places].sum(axis=1) for places in used.values()])
     columns = _named(list(used), wanted, did, track.command_kind)

@@ -130,7 +130,7 @@ class AddResult:
             *told,
             f"Held-out predictions are {how} with it ({without:.3g} to {after:.3g}): leave it out; "
             "or, if its fit began too far off, put better values into the new model with "
-            "`twinmill set` and fit that again with `twinmill fit`.",
+            "`twinmill twin set` and fit that again with `twinmill fit`.",
         ]
 
     @property
@@ -394,7 +394,7 @@ def _check_not_new(held: Collection[str], fresh: Sequence[Parameter]) -> None:
     if name := next((p.name for p in fresh if p.name in held), None):
         raise ModelError(
             f"{name}: is of what is added, and has no value yet that could be held; add it, put a "
-            f"value in with `twinmill set`, and hold that in a fit ({option('hold')})."
+            f"value in with `twinmill twin set`, and hold that in a fit ({option('hold')})."
         )
 
 

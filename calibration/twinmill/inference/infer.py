@@ -19,8 +19,8 @@ from twinmill.model.model_file import ModelFile
 HELD, HELD_OWN = "infer: the logs hold", "infer: the model's own logs hold"
 ONE = (
     "one robot's commands and poses are judged at a time: give logs of one robot, or let each be "
-    "judged by itself (twinmill infer in a shell, tm.infer_robots in Python); diagnose judges what "
-    "differs between several, and tables"
+    "judged by itself (twinmill lab infer in a shell, tm.infer_robots in Python); diagnose judges "
+    "what differs between several, and tables"
 )
 OWN = "give own logs of the robot that is judged, or none"
 
@@ -40,7 +40,7 @@ class Inference:
     always: Always | None
 
     def to_json(self) -> dict:
-        """Fields of `twinmill infer --json`."""
+        """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
         return {
             **self.answer.to_json(),

@@ -163,7 +163,7 @@ def find_effect(name: str) -> dict:
     if name in entries:
         return entries[name]
     near = get_close_matches(name, entries, n=1, cutoff=0.6)
-    hint = f"did you mean {near[0]}?" if near else "`twinmill effects` lists them all."
+    hint = f"did you mean {near[0]}?" if near else "`twinmill twin effects` lists them all."
     raise ValueError(f"effect '{name}': not in the catalogue; {hint}")
 
 

@@ -61,7 +61,10 @@ def section(
             ("robots", str(hunt.n)),
             ("runs", f"{hunt.request.seeds} of {hunt.request.duration_s:g} s each"),
             ("run one", f"in this folder: {shown[0].command}"),
-            ("put one on a robot", f"twinmill flash robot03.local --behavior {shown[0].name}"),
+            (
+                "put one on a robot",
+                f"twinmill robot flash robot03.local --behavior {shown[0].name}",
+            ),
         ],
         figures=[
             _map(offered, present),

@@ -37,7 +37,7 @@ def sentence(answer: Answer) -> str:
 
 
 def terminal_of_robots(results: list[Inference], commands: show.Commands = ()) -> RenderableType:
-    """Text of `twinmill infer`: of one robot all, of several what is missing of each.
+    """Text of `twinmill lab infer`: of one robot all, of several what is missing of each.
 
     Args:
         results: one for each robot.

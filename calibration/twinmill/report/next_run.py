@@ -171,7 +171,7 @@ def _narrowed(found: Narrowing) -> list[str]:
             f"Which number moves it is not known: what {len(shares)} models tell of another is no "
             "better than their mean, so these points and this drive may be chance. More "
             f"{option('draws')} "
-            f"and {option('seeds')} tell, or nothing here matters (twinmill matters)."
+            f"and {option('seeds')} tell, or nothing here matters (twinmill swarm matters)."
         )
     if found.untold > SMALL_SHARE:
         said.append(

@@ -151,7 +151,7 @@ def calibration(result: RunComparison) -> str:
 
 
 def terminal(result: RunComparison) -> RenderableType:
-    """What `twinmill compare-runs` prints."""
+    """What `twinmill robot compare` prints."""
     tone = "bold red" if result.changed else "bold green"
     return Group(
         *(Text(line, tone) for line in verdict(result)),

@@ -58,7 +58,7 @@ def fit(result: FitResult, not_written: str = "") -> RenderableType:
 
 
 def added(result: AddResult, not_written: str = "") -> RenderableType:
-    """What `twinmill add` prints: scores fitted and held out, the effect's estimates.
+    """What `twinmill twin add` prints: scores fitted and held out, the effect's estimates.
 
     Args:
         result: of the addition.

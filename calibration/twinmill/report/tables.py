@@ -322,7 +322,7 @@ def catalogue(entries: list[dict]) -> Table:
         "Effects",
         ["effect", "stage", "what it is"],
         rows,
-        "twinmill effects NAME shows one with its equation and parameters.",
+        "twinmill twin effects NAME shows one with its equation and parameters.",
         (0, 1, 2),
     )
 

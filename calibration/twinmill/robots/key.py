@@ -44,7 +44,7 @@ def load(path: Path | None = None) -> bytes:
         raise ValueError(
             f"{option('key', str(file))}: there is no key here, so no robot's answer is believed; "
             "copy the "
-            "operator's, or make one: `twinmill flash`."
+            "operator's, or make one: `twinmill robot flash`."
         )
     if not file.is_file():
         raise ValueError(f"{option('key', str(file))}: is no file; name the file of a key.")

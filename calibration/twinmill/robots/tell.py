@@ -35,7 +35,8 @@ VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
 NEVER_HEARD = "was never heard"
 NO_SIGNATURE = (
-    "signs nothing with this operator's key: `twinmill flash` brings robots theirs; has it another "
+    "signs nothing with this operator's key: `twinmill robot flash` brings robots theirs; has it "
+    "another "
     "key?"
 )
 

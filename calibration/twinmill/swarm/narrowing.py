@@ -260,7 +260,7 @@ def design_for(
         names = ", ".join(list(spread.parts())[:3])
         raise ValueError(
             f"what the swarm does depends on {names}, which no drive of one robot shows; measure "
-            "these by themselves (twinmill effects NAME)."
+            "these by themselves (twinmill twin effects NAME)."
         )
     moves, floor = (
         family(duty_axes(limits.max_duty, modelled.model.wheel_kind)),

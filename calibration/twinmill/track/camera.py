@@ -78,13 +78,13 @@ def read_camera(path: Path) -> Camera:
         times = [float(shutter.get(name, 0.0)) for name in ("exposure_s", "line_delay_s")]
     except (OSError, UnicodeDecodeError, TOMLKitError, TypeError, ValueError, KeyError) as error:
         raise ValueError(
-            f"{path}: is no camera's file ({error}); make one with `twinmill track-calibrate`."
+            f"{path}: is no camera's file ({error}); make one with `twinmill track calibrate`."
         ) from error
     numbers = np.array([fx, fy, cx, cy, *distortion, *times])
     if distortion.shape != (5,) or not np.isfinite(numbers).all() or min(fx, fy) <= 0:
         raise ValueError(
             f"{path}: needs focal lengths above 0 and five numbers of distortion; make it anew "
-            "with `twinmill track-calibrate`."
+            "with `twinmill track calibrate`."
         )
     if min(times) < 0:
         raise ValueError(f"{path}: exposure_s and line_delay_s must not be below 0.")

@@ -32,7 +32,7 @@ BY_APRILTAG = {
 FAMILIES = BY_OPENCV | BY_APRILTAG
 FAMILY = "apriltag_36h11"
 ROBOTS = range(100)  # a robot's tag is its number
-FLOOR = range(500, 504)  # as `twinmill tags --floor` prints them
+FLOOR = range(500, 504)  # as `twinmill track tags --floor` prints them
 TAGS = 587  # in the family
 WINDOW_PX, WINDOW_MODULES = 5, 0.8  # half width: a corner is refined without its neighbours
 

@@ -95,7 +95,8 @@ def _choose(counts: dict[int, int], frames: int, wanted: frozenset[int] | None) 
     seen = [n for n in counts if n in ROBOTS]
     if not seen:
         raise ValueError(
-            f"no robot's tag was found in {frames} frames; see that tags of `twinmill tags` are in "
+            f"no robot's tag was found in {frames} frames; see that tags of `twinmill track tags` "
+            "are in "
             "view, sharp, and at least 20 px wide."
         )
     if wanted is None:

@@ -17,7 +17,15 @@ def next_command(logs: list[Path], model: str, options: Mapping) -> list[str]:
 
 def then_commands(logs: list[Path], model: str, plan: Mapping) -> list[str]:
     """To play the script on the robot, and to diagnose with what comes of it."""
-    robot = ["twinmill", "characterise", "--robot", str(plan["robot_id"]), "--script", "script.csv"]
+    robot = [
+        "twinmill",
+        "robot",
+        "characterise",
+        "--robot",
+        str(plan["robot_id"]),
+        "--script",
+        "script.csv",
+    ]
     if plan["drive"] == "twist":
         robot += ["--script-as", "publisher", "--out", "script.py"]
     else:

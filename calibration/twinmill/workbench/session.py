@@ -513,7 +513,8 @@ class Session:
         if robot_id is not None:
             what += ["--robot", str(robot_id)]
         holds = [word for name in held for word in ("--hold", name)]
-        words = (kind, *what, *holds, *map(str, self.paths))
+        verb = ("twin", "add") if kind == "add" else (kind,)
+        words = (*verb, *what, *holds, *map(str, self.paths))
         command = self.tree.command_to_come(number, words)
         name, text = self.tree.file_name(number), self.tree.tried[number].text
         return Work(kind, name, text, command, effect, held, number, words, robot_id=robot_id)

@@ -30,7 +30,7 @@ DIAGRAM_STARTS = 5  # in each of its cells
 def swarm_commands(model: str, options: Mapping[str, Any]) -> list[str]:
     """The first start as the workbench runs it, and its metrics."""
     run = ["twin_run", *_words(model, options, 1)]
-    return [shlex.join(run), shlex.join(["twinmill", "metrics", LOG, "--model", model])]
+    return [shlex.join(run), shlex.join(["twinmill", "swarm", "metrics", LOG, "--model", model])]
 
 
 def _words(model: str, options: Mapping[str, Any], seed: int) -> list[str]:

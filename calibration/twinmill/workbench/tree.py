@@ -25,7 +25,7 @@ class Tried:
     Attributes:
         number: its place in the tree.
         parent: number of the model that it comes from; None of the one that was given.
-        verb: words of the command that makes it, without models: `add coasting run.lcmlog`.
+        verb: words of the command that makes it, without models: `twin add coasting run.lcmlog`.
         label: short, for people.
         text: of its file.
         values: set by hand, by name.
@@ -113,7 +113,7 @@ class Tree:
         of = self.current
         parent = self.tried[of.parent] if of.values else of
         values = {name: float(f"{v:.6g}") for name, v in {**of.values, **values}.items()}
-        verb = ("set", *(f"{name}={value:.6g}" for name, value in values.items()))
+        verb = ("twin", "set", *(f"{name}={value:.6g}" for name, value in values.items()))
         number = len(self.tried)
         command = self._command(verb, self.file_name(parent.number), self.file_name(number))
         text = with_values(self.model_file(parent.number), values, command)

@@ -95,7 +95,7 @@ def test_a_state_without_a_rate_is_told_where_to_give_it(adding):
 
 
 def test_a_number_that_is_not_there_yet_cannot_be_held(adding):
-    with pytest.raises(ModelError, match=r"equation\.p0: is of what is added.*twinmill set"):
+    with pytest.raises(ModelError, match=r"equation\.p0: is of what is added.*twinmill twin set"):
         adding("p0*vx", held=["equation.p0"])
 
 
@@ -104,7 +104,7 @@ def test_what_spoils_left_out_predictions_is_told(adding):
     result = adding("p0*vx*p1", adds_to="omega_radps")
     assert result.heldout_after.score > result.heldout_refit.score
     (note,) = result.notes
-    assert "worse with it" in note and "twinmill set" in note
+    assert "worse with it" in note and "twinmill twin set" in note
 
 
 def test_what_left_out_predictions_do_not_mind_is_told(adding):

@@ -91,7 +91,7 @@ def test_the_printed_command_adds_it_as_it_stands(
     said = io.StringIO()
     with redirect_stdout(said):
         run(["diagnose", str(playing), "--model", str(one_clock_base.path)])
-    (line,) = [x for x in said.getvalue().splitlines() if x.strip().startswith("twinmill add")]
+    (line,) = [x for x in said.getvalue().splitlines() if x.strip().startswith("twinmill twin add")]
     run(shlex.split(line)[1:])
     (written,) = tmp_path.glob("*.toml")
     assert effect_names(ModelFile.load(str(written)).model) == ["equation"]
@@ -143,7 +143,7 @@ def test_explain_leaves_the_formula_out_if_asked(playing, one_clock_base, tmp_pa
     with redirect_stdout(said):
         words = ["explain", str(playing), "--model", str(one_clock_base.path), "-o", str(out)]
         run([*words, "--no-formula"])
-    assert "twinmill add equation" in said.getvalue()
+    assert "twinmill twin add equation" in said.getvalue()
     assert "equation" not in effect_names(ModelFile.load(str(out)).model)
 
 

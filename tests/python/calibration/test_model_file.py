@@ -46,7 +46,7 @@ def fitted(parent):
 @pytest.fixture
 def child(parent, fitted, tmp_path):
     path = tmp_path / "child.toml"
-    child_of(parent, fitted, path, "twinmill add").write()
+    child_of(parent, fitted, path, "twinmill twin add").write()
     return path
 
 
@@ -81,7 +81,7 @@ def test_child_holds_what_the_log_hardly_tells_without_an_error(parent, fitted, 
 def test_child_says_where_it_comes_from(child, parent):
     data = tomllib.loads(child.read_text())
     assert data["parent"] == hashlib.sha256(parent.path.read_bytes()).hexdigest()
-    assert data["created_by"] == "twinmill add"
+    assert data["created_by"] == "twinmill twin add"
     assert data["fit"] == {"logs": ["run.lcmlog"], "score_before": 4.5, "score_after": 1.1}
     assert data["noise"]["drive_mps"] == 2e-3 and data["noise"]["drive_turn_s"] == 0.2
     assert "# my own words" in child.read_text()

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Thirty sealed cases in every check: what was answered rightly must stay so.
 
-Right is said by what was hidden, not by an earlier answer: `twinmill challenge` draws the robots,
-plays them by formulas of its own, by forces, or on free rollers, and scores. LOST are the cases
-that are not answered yet, in logs of half the usual length. Every change is printed as a warning;
-one case may be lost anew, since another processor rounds otherwise.
+Right is said by what was hidden, not by an earlier answer: `twinmill lab challenge` draws the
+robots, plays them by formulas of its own, by forces, or on free rollers, and scores. LOST are the
+cases that are not answered yet, in logs of half the usual length. Every change is printed as a
+warning; one case may be lost anew, since another processor rounds otherwise.
 """
 
 import warnings

@@ -14,7 +14,7 @@ OWN, OLDER = "rerun-sdk==0.41.0", "rerun-sdk==0.34.1"
 
 
 def _write(folder: Path) -> None:
-    """By `twinmill watch --save`, which needs Rerun's library beside ours."""
+    """By `twinmill swarm watch --save`, which needs Rerun's library beside ours."""
     environment = os.environ | {"PYTHONPATH": str(packages_at(OWN))}
     command = [Path(sys.executable).with_name("twinmill"), "watch", str(drive.write_log(folder))]
     subprocess.run(

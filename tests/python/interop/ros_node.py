@@ -23,7 +23,7 @@ LATE_S = 0.15  # three of its periods: a loaded machine
 
 
 def _write(folder: Path) -> None:
-    """By `twinmill characterise --script-as publisher`."""
+    """By `twinmill robot characterise --script-as publisher`."""
     from twinmill_cli.main import run
 
     if not shutil.which("unshare") or subprocess.run([*_alone(), "true"], check=False).returncode:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill tags`: what is printed is found, is as large as it says, and shows the front."""
+"""`twinmill track tags`: what is printed is found, is as large as it says, and shows the front."""
 
 import io
 import re

@@ -16,7 +16,7 @@ from twinmill.runs.compare import compare_runs
 def report(same_robot, tmp_path_factory):
     model = ModelFile.load(str(same_robot["first"].parent / "model.toml"))
     runs = [load_measurements([same_robot[name]], model.model)[0] for name in ("first", "weak")]
-    source = Provenance("twinmill compare-runs", "twinmill 0.1.0", "")
+    source = Provenance("twinmill robot compare", "twinmill 0.1.0", "")
     folder = tmp_path_factory.mktemp("runs")
     drawn = section(compare_runs(*runs, model))
     return write_report(folder, "Two runs", source, [drawn], note="")

@@ -511,7 +511,7 @@ class _Rows:
         if sides := SIDES.get(len(messages.unordered)):
             notes.append(
                 f"{topic}: {', '.join(messages.unordered)} are taken for {sides}, as they stand: "
-                "their names do not tell; see what `twinmill wheels` or `diagnose` says of signs."
+                "their names do not tell; see what `twinmill robot wheels` or `diagnose` says."
             )
         if messages.root:
             notes.append(f"{topic}: its place in the frame {messages.root} is taken.")

@@ -223,7 +223,7 @@ def write_entries(folder: Path, hunt: Hunt, found: list[Entry]) -> None:
     with replacing(folder / "archive.parquet", force=True) as fresh:
         pq.write_table(pa.Table.from_pylist(rows), fresh, compression="zstd")
     lines = [
-        "# Found by twinmill discover: speed and turn for nothing seen, then for seen, "
+        "# Found by twinmill lab discover: speed and turn for nothing seen, then for seen, "
         "or so for each number of the model's bits."
     ]
     for entry in filter(lambda entry: entry.name, found):

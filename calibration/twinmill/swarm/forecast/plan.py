@@ -140,7 +140,7 @@ def read_plan(folder: Path, digest: str | None) -> tuple[Plan, str]:
     """
     path = folder / SEALED
     if not path.exists():
-        raise ValueError(f"{folder}: holds no {SEALED}; make a plan with twinmill predict-floor.")
+        raise ValueError(f"{folder}: holds no {SEALED}; make a plan with twinmill lab predict.")
     sealed = path.read_bytes()
     found = hashlib.sha256(sealed).hexdigest()
     text = (folder / PLAN).read_text() if (folder / PLAN).exists() else ""
@@ -347,7 +347,7 @@ In this order, which is random, so that the battery, the floor and the day fall 
 
 Write into `{FORM}` for each run its class, or the path of its log. Then:
 
-    twinmill score-floor {folder} {folder / FORM} --sha256 {digest}
+    twinmill lab score {folder} {folder / FORM} --sha256 {digest}
 """
 
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a swarm does as whoever knows its published poses alone finds it: the twin then says of a
-// run what `twinmill metrics` says of the run's log, and of real robots.
+// run what `twinmill swarm metrics` says of the run's log, and of real robots.
 #ifndef SWARM_RECENT_POSES_H
 #define SWARM_RECENT_POSES_H
 
