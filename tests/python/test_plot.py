@@ -67,6 +67,21 @@ def test_bits_are_green_from_when_it_sees_and_commands_have_their_signs(log):
     assert np.array(duties.get_array())[:, 5].tolist() == [-50, 100, -50, 100]
 
 
+def test_each_bit_of_a_robot_is_a_row_of_its_own(driven):
+    """A number that runs 0, 1, 2, 3: bit 1 in its 2nd and 4th quarter, bit 2 in its last half."""
+    robot = driven()
+    count = len(robot.command_t_s)
+    number = (4 * np.arange(count) // count).astype(np.int8)
+    axes = painted(
+        [RecordedRobot("", replace(robot, detected=number, detected_raw=number))], "bits"
+    )
+    rows = axes.images[0].get_array()
+    green = (rows == matplotlib.colors.to_rgb("#009e73")).all(axis=2)
+    middles = [int((k + 0.5) / 4 * green.shape[1]) for k in range(4)]
+    assert green[:, middles].tolist() == [[False, True, False, True], [False, False, True, True]]
+    assert [label.get_text()[-5:] for label in axes.get_yticklabels()] == ["bit 1", "bit 2"]
+
+
 def test_where_no_camera_was_recorded_nobody_is_said_to_see_nobody(driven):
     """As in logs of imported commands: telemetry with neither frames nor detections."""
     robot = driven()

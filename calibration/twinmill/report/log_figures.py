@@ -40,6 +40,7 @@ class Drawing:
         frames = {k: frames_of(recorded.log) for k, recorded in enumerate(robots)}
         self._frames = {k: seen for k, seen in frames.items() if seen is not None}
         self.telling = list(self._frames)
+        self.bit_rows = sum(seen.told.shape[1] for seen in self._frames.values())
         self.driven = [k for k, a in enumerate(robots) if len(a.log.command_t_s)]
         self._motion = {k: _motion(robots[k]) for k in self.tracked}
 
@@ -82,17 +83,19 @@ class Drawing:
         axes.set(ylabel=label, xlim=(0, self.end_s))
 
     def bits(self, axes: Axes) -> None:
-        """The voted bit, a row per robot whose camera was recorded: green where it sees another."""
-        rows = []
+        """Voted bits, a row for each of a robot whose camera was recorded: green where it is set."""
+        rows, names = [], []
         for k, seen in self._frames.items():
-            bit = seen.voted if seen.has_vote else seen.raw
-            rows.append(self._held(k, seen.t_s, bit[:, None])[:, 0])
+            rows += list(self._held(k, seen.t_s, seen.told).T)
+            count = seen.told.shape[1]
+            name = self._robots[k].name
+            names += [f"{name} bit {i + 1}" for i in range(count)] if count > 1 else [name]
         picture = np.ones((len(rows), len(rows[0]), 3))
         for bit, color in enumerate((NOT_SEEN, SEES)):
             picture[np.array(rows) == bit] = to_rgb(color)
         axes.imshow(picture, **self._strip(len(rows)))
         axes.set_title("green: sees a neighbour", loc="left", color=SEES)
-        self._name_rows(axes, [self._robots[k].name for k in self.telling])
+        self._name_rows(axes, names)
 
     def commands(self, axes: Axes) -> None:
         """A row per wheel, blue back, red forward."""

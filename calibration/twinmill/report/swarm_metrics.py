@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a swarm does, as a page: its class, its metrics over time, its paths."""
 
+import itertools
+
 import numpy as np
 import twinmill_native as native
 
@@ -41,10 +43,19 @@ def section(series: SwarmSeries) -> Section:
         facts=[
             ("robots", ", ".join(map(str, series.robots))),
             ("odd", ", ".join(map(str, series.odd)) or "none"),
+            *_bits(series),
             ("time with all poses", f"{series.t_s[-1] - series.t_s[0]:.1f} s"),
         ],
         figures=[_over_time(series), _paths(series)],
     )
+
+
+def _bits(series: SwarmSeries) -> list[tuple[str, str]]:
+    """Which bits the cameras told, mean of the robots that have so many."""
+    told = list(itertools.zip_longest(*series.bits.values()))
+    shares = [float(np.mean([s for s in bit if s is not None])) for bit in told]
+    words = [f"bit {k + 1} in {100 * share:.0f} %" for k, share in enumerate(shares)]
+    return [("seen, last 10 s", f"{', '.join(words)} of the frames")] if words else []
 
 
 def _over_time(series: SwarmSeries) -> Figure:
