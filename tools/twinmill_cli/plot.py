@@ -76,7 +76,7 @@ def _plot(
 
 def _panels(multi_log: MultiLog, log: Path) -> list[tuple]:
     """(painter, height_in, title, caption) of all that the log can show."""
-    drawing = Drawing(multi_log.robots)
+    drawing = Drawing(multi_log.robots, multi_log.bodies)
     rows = len(drawing.driven)
     panels = []
     if drawing.tracked:
