@@ -23,7 +23,7 @@ import numpy as np
 import turbopi
 import twinmill_native as native
 
-from twinmill.chance import share_interval
+from twinmill.swarm.classes import interval
 from twinmill.swarm.metrics import STEP_S, body_velocity
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -142,7 +142,7 @@ def compare(name: str, scenario: dict, other: str, runs: int) -> dict:
         (folder / "b.toml").write_text(f'rows = "{table_text(scenario)}"\n')
         if goal := scenario.get("goal"):
             (folder / "world.toml").write_text(
-                f"[[body]]\nname = \"goal\"\nat_m = {goal['at_m']}\nradius_m = {goal['radius_m']}\n"
+                f'[[body]]\nname = "goal"\nat_m = {goal["at_m"]}\nradius_m = {goal["radius_m"]}\n'
                 'colour = "blue"\nsolid = false\n'
             )
         with ThreadPoolExecutor(2) as pool:
@@ -187,7 +187,7 @@ def _line(found: dict) -> str:
     names = sorted({*found["here"]["classes"], *found["there"]["classes"]})
     for name in names:
         counts = [found[where]["classes"].get(name, 0) for where in ("here", "there")]
-        low_high = [share_interval(count, found["runs"]) for count in counts]
+        low_high = [interval(count, found["runs"]) for count in counts]
         shown = [
             f"{100 * count / found['runs']:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
             for count, (low, high) in zip(counts, low_high, strict=True)
@@ -205,9 +205,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--other", required=True, help="Python that has swarmsim 1.2.5")
     parser.add_argument("--runs", type=int, default=200)
+    parser.add_argument("--only", default="", help="scenarios whose names have this in them")
     parser.add_argument("--json", action="store_true")
     given = parser.parse_args()
     for name, scenario in SCENARIOS.items():
+        if given.only not in name:
+            continue
         found = compare(name, scenario, given.other, given.runs)
         print(json.dumps(found) if given.json else _line(found), flush=True)
 

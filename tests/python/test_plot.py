@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from twinmill.data.multi_log import RecordedRobot, read_multi_log
-from twinmill.report.log_figures import Drawing
+from twinmill.data.world_bodies import world_bodies
+from twinmill.report.log_figures import Drawing, paint_bodies
 from twinmill_cli.main import run
 
 
@@ -80,6 +81,25 @@ def test_each_bit_of_a_robot_is_a_row_of_its_own(driven):
     middles = [int((k + 0.5) / 4 * green.shape[1]) for k in range(4)]
     assert green[:, middles].tolist() == [[False, True, False, True], [False, False, True, True]]
     assert [label.get_text()[-5:] for label in axes.get_yticklabels()] == ["bit 1", "bit 2"]
+
+
+def test_bodies_of_a_world_are_drawn_where_they_are(write_log, message):
+    """Of a wall's outline all points are as far from its line as it is thick, its ends included."""
+    start, end = np.array([1.0, 2.0]), np.array([4.0, 6.0])
+    told = [
+        message("body", utime_us=k, name="wall", from_m=start, to_m=end, radius_m=0.1)
+        for k in range(2)
+    ]
+    (wall,) = world_bodies([m.encode() for m in told], 0)
+    assert not wall.moves
+    points = wall.outline()
+    part = np.clip((points - start) @ (end - start) / 25, 0, 1)
+    np.testing.assert_allclose(
+        np.linalg.norm(points - start - part[:, None] * (end - start), axis=1), 0.1
+    )
+    axes = Figure().subplots()
+    paint_bodies(axes, [wall])
+    np.testing.assert_allclose(axes.patches[0].get_xy()[:-1], points)
 
 
 def test_where_no_camera_was_recorded_nobody_is_said_to_see_nobody(driven):

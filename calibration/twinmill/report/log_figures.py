@@ -89,7 +89,7 @@ class Drawing:
         axes.set(ylabel=label, xlim=(0, self.end_s))
 
     def bits(self, axes: Axes) -> None:
-        """Voted bits, a row for each of a robot whose camera was recorded: green where it is set."""
+        """Voted bits of robots whose cameras were recorded, a row each: green where it is set."""
         rows, names = [], []
         for k, seen in self._frames.items():
             rows += list(self._held(k, seen.t_s, seen.told).T)
@@ -151,7 +151,7 @@ class Drawing:
 
 
 def paint_bodies(axes: Axes, bodies: Sequence[WorldBody]) -> None:
-    """Bodies of a world where they were last, in their colours, and the ways of those that moved."""
+    """Bodies of a world where they were last, in their colours; dotted the ways they moved."""
     for body in bodies:
         color = body.colour or UNSEEN
         if body.moves:

@@ -43,7 +43,11 @@ def section(series: SwarmSeries) -> Section:
             ("robots", ", ".join(map(str, series.robots))),
             ("odd", ", ".join(map(str, series.odd)) or "none"),
             *_bits(series),
-            *([("bodies", ", ".join(body.name for body in series.bodies))] if series.bodies else []),
+            *(
+                [("bodies", ", ".join(body.name for body in series.bodies))]
+                if series.bodies
+                else []
+            ),
             ("time with all poses", f"{series.t_s[-1] - series.t_s[0]:.1f} s"),
         ],
         figures=[_over_time(series), _paths(series)],
