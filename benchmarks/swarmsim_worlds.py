@@ -25,13 +25,13 @@ ROBOTS, GOAL = "blue", "goal"
 class SeesWhatItStandsIn(BinaryFOVSensor):
     """The same, but a region that the robot stands in is seen whatever is ahead."""
 
-    def checkForLOSCollisions(self, world: RectangularWorld) -> None:  # noqa: N802
+    def checkForLOSCollisions(self, world: RectangularWorld) -> None:
         """As the sensor it is of, then within the regions of its team."""
         super().checkForLOSCollisions(world)
         for other in world.population:
-            if other.team == self.target_team and isinstance(other, DetectionRegion):
-                if np.linalg.norm(other.pos - self.agent.pos) < other.radius:
-                    self.determineState(True, other, world)
+            is_target = other.team == self.target_team and isinstance(other, DetectionRegion)
+            if is_target and np.linalg.norm(other.pos - self.agent.pos) < other.radius:
+                self.determineState(True, other, world)
 
 
 def paths(starts: np.ndarray, scenario: dict, seed: int) -> np.ndarray:
