@@ -50,7 +50,7 @@ def other_machine() -> subprocess.Popen:
 
 
 def main(folder: Path) -> dict:
-    """The same sweep on this machine's threads and on the cluster, that loses a machine half way."""
+    """One sweep on this machine's threads and on the cluster, which loses a machine half way."""
     request_module.PART_BATCHED = 400_000
     asked = make_request("milling", "paper.toml", ["v_mps=0.1:0.3:20"], seeds=20, duration_s=60.0)
     sweep(asked, folder / "here")

@@ -16,7 +16,7 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
-from found_swarm import BITS, ROBOTS, find_mill, metrics_of, swarm_words
+from found_swarm import BITS, find_mill, metrics_of, swarm_words
 from ssh_robots import SshRobot, make_package
 
 from twinmill.threshold.pictures import from_rgb
@@ -155,7 +155,7 @@ def found_mill(flash: Flasher, robot: SshRobot, folder: Path, package: Path) -> 
                     "--behavior", name, *bits)  # fmt: skip
     system, log = robot.folder / "system", folder / "mill.lcmlog"
     words = swarm_words(found, name, system / "etc/turbopi/behaviors.toml")
-    words += ("--hil", str(ROBOTS), "--firmware", str(system / "usr/bin/turbopi"))
+    words += ("--hil", "1", "--firmware", str(system / "usr/bin/turbopi"))
     twin = [os.environ["TWIN_RUN"], *words, "--duration-s", "20", "--log", log]
     subprocess.run(twin, check=True, capture_output=True)
     said = metrics_of(log, found)

@@ -77,7 +77,7 @@ def test_a_mill_of_two_bits_that_was_found_drives_the_robot_and_is_recognised(se
     found = session["found"]
     assert found["put"]["code"] == 0
     assert 'bit1 = "left"' in found["config"] and 'bit2 = "right"' in found["config"]
-    # Robots whose duties the flashed program gave, each seeing by both halves.
+    # Robots that see by both halves; the flashed program gave the first one's duties.
     assert found["class"] == "milling"
     assert [len(shares) for shares in found["bits"].values()] == [2] * 5
 
