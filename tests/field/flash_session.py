@@ -156,7 +156,7 @@ def found_mill(flash: Flasher, robot: SshRobot, folder: Path, package: Path) -> 
     system, log = robot.folder / "system", folder / "mill.lcmlog"
     words = swarm_words(found, name, system / "etc/turbopi/behaviors.toml")
     words += ("--hil", "1", "--firmware", str(system / "usr/bin/turbopi"))
-    twin = [os.environ["TWIN_RUN"], *words, "--duration-s", "20", "--log", log]
+    twin = [os.environ["TWIN_RUN"], *words, "--duration-s", "24", "--log", log]
     subprocess.run(twin, check=True, capture_output=True)
     said = metrics_of(log, found)
     return {"put": put, "config": robot.config.read_text(), "class": said["class"],

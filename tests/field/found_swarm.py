@@ -33,9 +33,9 @@ def find_mill(folder: Path) -> tuple[Path, str]:
 
 
 def swarm_words(found: Path, name: str, behaviors: Path) -> tuple[str, ...]:
-    """For `twin_run`: the robots' cameras are drawn, and all play the table."""
+    """For `twin_run`: all robots play the table, and no cone errs."""
     return (
-        *("--plant", "planar", "--sensor", "camera", "--start", "square", "--n", str(ROBOTS)),
+        *("--plant", "planar", "--sensor", "cone", "--start", "square", "--n", str(ROBOTS)),
         *("--model", str(found / "model.toml"), "--behaviors", str(behaviors), "--behavior", name),
     )
 
