@@ -16,6 +16,7 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
+from found_swarm import BITS, find_mill, metrics_of, swarm_words
 from ssh_robots import SshRobot, make_package
 
 from twinmill.threshold.pictures import from_rgb
@@ -146,6 +147,22 @@ def own_tables(flash: Flasher, robot: SshRobot, folder: Path, package: Path) -> 
             "same": there.read_text() == good.read_text()}  # fmt: skip
 
 
+def found_mill(flash: Flasher, robot: SshRobot, folder: Path, package: Path) -> dict:
+    """A mill of two bits that was found is put on a robot; that robot's program drives the twin."""
+    found, name = find_mill(folder)
+    bits = [word for k, sector in enumerate(BITS) for word in ("--set", f"bit{k + 1}={sector}")]
+    put = flash.run(robot.name, "--package", package, "--behaviors", found / "behaviors.toml",
+                    "--behavior", name, *bits)  # fmt: skip
+    system, log = robot.folder / "system", folder / "mill.lcmlog"
+    words = swarm_words(found, name, system / "etc/turbopi/behaviors.toml")
+    words += ("--hil", "1", "--firmware", str(system / "usr/bin/turbopi"))
+    twin = [os.environ["TWIN_RUN"], *words, "--duration-s", "24", "--log", log]
+    subprocess.run(twin, check=True, capture_output=True)
+    said = metrics_of(log, found)
+    return {"put": put, "config": robot.config.read_text(), "class": said["class"],
+            "bits": said["bits"]}  # fmt: skip
+
+
 def main(folder: Path) -> dict:
     program = Path(os.environ["TURBOPI"])
     key = let_in(folder)
@@ -174,6 +191,7 @@ def main(folder: Path) -> dict:
         result["second"] = flash.run(*both, "--package", new)
         result["vendor"] = vendor(flash, robots[1], new)
         result["own"] = own_tables(flash, robots[1], folder, new)
+        result["found"] = found_mill(flash, robots[1], folder, new)
         result["installed"] = [(robot.folder / "installed").read_text().strip() for robot in robots]
         result["rollback"] = flash.run("robot03", "--rollback")
         result["back_to"] = (robots[0].folder / "installed").read_text().strip()

@@ -28,8 +28,9 @@ FAILURES = (
 def session(tmp_path_factory):
     """What happened: see flash_session.py."""
     missing = [name for name in REQUIRED if not shutil.which(name)]
-    if missing or not os.environ.get("TURBOPI"):
-        pytest.skip(f"not here: {', '.join(missing) or 'the program, TURBOPI'}")
+    missing += [name for name in ("TURBOPI", "TWIN_RUN") if not os.environ.get(name)]
+    if missing:
+        pytest.skip(f"not here: {', '.join(missing)}")
     if os.geteuid() != 0:
         pytest.skip("only root may let an ssh server change users")
     return run_session("flash_session.py", tmp_path_factory.mktemp("flash"))
@@ -70,6 +71,15 @@ def test_tables_of_ones_own_are_put_on_the_robot(session):
     robot = only(own["bad"])
     assert own["bad"]["code"] == 1 and robot["kind"] == "bad behaviours"
     assert "line 1: table 'ahead' must be" in robot["sentence"]
+
+
+def test_a_mill_of_two_bits_that_was_found_drives_the_robot_and_is_recognised(session):
+    found = session["found"]
+    assert found["put"]["code"] == 0
+    assert 'bit1 = "left"' in found["config"] and 'bit2 = "right"' in found["config"]
+    # Robots that see by both halves; the flashed program gave the first one's duties.
+    assert found["class"] == "milling"
+    assert [len(shares) for shares in found["bits"].values()] == [2] * 5
 
 
 def test_rollback_goes_to_the_package_before(session):

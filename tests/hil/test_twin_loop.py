@@ -15,11 +15,12 @@ import subprocess
 import lcm
 import pytest
 import turbopi
+from found_swarm import BITS, find_mill, metrics_of, swarm_words
 from rig import BUILD
 from robot import SIGNS, Robot
 
 TWIN_RUN = os.environ.get("TWIN_RUN")
-SWARM = (
+ONE_BIT = (
     *("--plant", "planar", "--sensor", "camera", "--n", "2", "--spread-m", "0.7"),
     *("--behavior", "milling"),
     *("--duration-s", "6", "--seed", "5"),
@@ -65,12 +66,19 @@ def answer_frames(robot, twin, frame_bytes):
         delays_s.append(robot.rig.duties[-1].t_s - shown_s)
 
 
-def drive_twin(rig, words):
-    """Takes the place of the stand-in, which was started with these words."""
+def drive_twin(rig, words, pairs):
+    """Takes the place of the stand-in, which was started with these words.
+
+    Args:
+        rig: the guest.
+        words: the command line.
+        pairs: further settings of the program in the guest.
+    """
     settings = dict(word.split("=") for word in words if "=" in word)
     path = next(word for word in words if word.startswith("stub:unix:")).removeprefix("stub:unix:")
     size_px = int(settings["width_px"]), int(settings["height_px"])
     pairs = {
+        **pairs,
         **{key: settings[key] for key in ("width_px", "height_px", "vote_frames")},
         "frame_timeout_ms": PATIENCE_MS,
         "watchdog_ms": PATIENCE_MS,
@@ -92,22 +100,47 @@ def drive_twin(rig, words):
     )
 
 
-@pytest.mark.skipif(not TWIN_RUN, reason="TWIN_RUN does not name the twin's program")
-def test_twin_driven_by_the_guest_is_the_twin_byte_for_byte(rig, tmp_path):
-    alone, looped = tmp_path / "alone.lcmlog", tmp_path / "looped.lcmlog"
-    command = [TWIN_RUN, *SWARM, "--log"]
-    subprocess.run([*command, alone], check=True, capture_output=True)
+def run_both(rig, folder, swarm, pairs, by_itself=()):
+    """The twin by itself, and its first robot driven by the guest. Returns the logs' paths."""
+    alone, looped = folder / "alone.lcmlog", folder / "looped.lcmlog"
+    command = [TWIN_RUN, *swarm, "--log"]
+    subprocess.run([*command, alone, *by_itself], check=True, capture_output=True)
     console = (BUILD / "twin.log").open("w")
     with subprocess.Popen(
-        [*command, looped, "--hil", "1", "--firmware", stand_in(tmp_path)], stderr=console
+        [*command, looped, "--hil", "1", "--firmware", stand_in(folder)], stderr=console
     ) as twin:
         try:
-            rig.wait((tmp_path / "words").exists)
-            drive_twin(rig, (tmp_path / "words").read_text().split())
+            rig.wait((folder / "words").exists)
+            drive_twin(rig, (folder / "words").read_text().split(), pairs)
             assert twin.wait(timeout=30) == 0
         finally:
             twin.kill()
+    return alone, looped
+
+
+needs_twin = pytest.mark.skipif(not TWIN_RUN, reason="TWIN_RUN does not name the twin's program")
+
+
+@needs_twin
+def test_twin_driven_by_the_guest_is_the_twin_byte_for_byte(rig, tmp_path):
+    alone, looped = run_both(rig, tmp_path, ONE_BIT, {})
     assert read(looped) == read(alone)
     said = [turbopi.telemetry_t.decode(e[2]) for e in read(alone) if e[1] == "R00_TELEMETRY"]
     # A run in which the robot turns both ways, so that equal means something.
     assert len({tuple(t.wheel_duty_pct) for t in said}) > 1
+
+
+@needs_twin
+def test_a_mill_of_two_bits_that_was_found_is_one_in_twin_and_guest(rig, tmp_path):
+    found, name = find_mill(tmp_path)
+    tables = found / "behaviors.toml"
+    (rows,) = (row for row in tables.read_text().splitlines() if row.startswith(f"{name} ="))
+    pairs = {f"bit{k + 1}": sector for k, sector in enumerate(BITS)}
+    pairs["table"] = rows.partition("=")[2].strip(' "')
+    swarm = (*swarm_words(found, name, tables), "--duration-s", "24")
+    # The first robot's program has drawn frames to look at, on this machine and then in the guest.
+    alone, looped = run_both(rig, tmp_path, swarm, pairs, ("--hil", "1"))
+    assert read(looped) == read(alone)
+    said = metrics_of(looped, found)
+    assert said["class"] == metrics_of(alone, found)["class"] == "milling"
+    assert {len(shares) for shares in said["bits"].values()} == {2}

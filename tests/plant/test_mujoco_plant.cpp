@@ -536,5 +536,26 @@ TEST(MujocoPlant, RefusesWhatItCannotSimulate)
     EXPECT_THROW(MakePlant({{0, 0, 0}}, {.timestep_s = 0}), std::invalid_argument);
 }
 
+// Walls and posts stop the hull, which is kHalfLength_m long in front; a goal does not.
+TEST(World, StopsTheHullAtAWallAndNotAtAGoal)
+{
+    const WorldBody wall{"", {{0.6, -1}, {0.6, 1}, 0.02}, 0.2, ""},
+        goal{"", {{0.3, 0}, {0.3, 0}, 0.1}, 0.2, "red", false};
+    MujocoPlant plant = MakePlant({{0, 0, 0}}, {.world = {goal, wall}});
+    plant.SetCommand(0, Ideal({0.3, 0, 0}));
+    Simulate(plant, 4);
+    const double contact_m = 0.6 - 0.02 - kHalfLength_m;
+    EXPECT_NEAR(plant.State(0).pose.x_m, contact_m, 0.01);  // contacts are soft, wheels stick out
+}
+
+// It goes 1 m in 4 s and does not yield.
+TEST(World, EvaderPushesARobotAway)
+{
+    const WorldBody evader{"", {{-0.5, 0}, {-0.5, 0}, 0.1}, 0.2, "red", true, {{0.5, 0}}, 0.25};
+    MujocoPlant plant = MakePlant({{0, 0, 0}}, {.world = {evader}});
+    Simulate(plant, 4);
+    EXPECT_NEAR(plant.State(0).pose.x_m, 0.5 + 0.1 + kHalfLength_m, 0.02);
+}
+
 }  // namespace
 }  // namespace twin

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from twinmill.data.multi_log import RecordedRobot, read_multi_log
-from twinmill.report.log_figures import Drawing
+from twinmill.data.world_bodies import world_bodies
+from twinmill.report.log_figures import Drawing, paint_bodies
 from twinmill_cli.main import run
 
 
@@ -65,6 +66,40 @@ def test_bits_are_green_from_when_it_sees_and_commands_have_their_signs(log):
     assert green.argmax() * cell_s == pytest.approx(1.5, abs=2 * cell_s)
     (duties,) = painted(robots, "commands").images
     assert np.array(duties.get_array())[:, 5].tolist() == [-50, 100, -50, 100]
+
+
+def test_each_bit_of_a_robot_is_a_row_of_its_own(driven):
+    """A number that runs 0, 1, 2, 3: bit 1 in its 2nd and 4th quarter, bit 2 in its last half."""
+    robot = driven()
+    count = len(robot.command_t_s)
+    number = (4 * np.arange(count) // count).astype(np.int8)
+    axes = painted(
+        [RecordedRobot("", replace(robot, detected=number, detected_raw=number))], "bits"
+    )
+    rows = axes.images[0].get_array()
+    green = (rows == matplotlib.colors.to_rgb("#009e73")).all(axis=2)
+    middles = [int((k + 0.5) / 4 * green.shape[1]) for k in range(4)]
+    assert green[:, middles].tolist() == [[False, True, False, True], [False, False, True, True]]
+    assert [label.get_text()[-5:] for label in axes.get_yticklabels()] == ["bit 1", "bit 2"]
+
+
+def test_bodies_of_a_world_are_drawn_where_they_are(write_log, message):
+    """Of a wall's outline all points are as far from its line as it is thick, its ends included."""
+    start, end = np.array([1.0, 2.0]), np.array([4.0, 6.0])
+    told = [
+        message("body", utime_us=k, name="wall", from_m=start, to_m=end, radius_m=0.1)
+        for k in range(2)
+    ]
+    (wall,) = world_bodies([m.encode() for m in told], 0)
+    assert not wall.moves
+    points = wall.outline()
+    part = np.clip((points - start) @ (end - start) / 25, 0, 1)
+    np.testing.assert_allclose(
+        np.linalg.norm(points - start - part[:, None] * (end - start), axis=1), 0.1
+    )
+    axes = Figure().subplots()
+    paint_bodies(axes, [wall])
+    np.testing.assert_allclose(axes.patches[0].get_xy()[:-1], points)
 
 
 def test_where_no_camera_was_recorded_nobody_is_said_to_see_nobody(driven):

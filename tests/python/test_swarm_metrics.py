@@ -57,6 +57,20 @@ def test_robots_on_a_circle_are_a_mill_about_its_middle(write_log, message, omeg
     assert found["diffusion"] == pytest.approx(0, abs=0.02)
 
 
+def test_bits_are_counted_each_by_itself_over_the_last_10_s(write_log, message):
+    """Frames at 10 Hz that run 0, 1, 2, 3; before the last 10 s all are 3."""
+    events = ring(message, 2, 0.6, 0.5)
+    for k in range(150):
+        utime_us, number = 1_700_000_000_000_000 + 100_000 * k, k % 4 if k >= 50 else 3
+        said = message("telemetry", utime_us=utime_us, frame_utime_us=utime_us, robot_id=1)
+        said.detected_raw = said.detected = number
+        events.append(("R01_TELEMETRY", said))
+    series = swarm_metrics(read_log(write_log(*events)), 1.1, 0.1)
+    assert list(series.bits) == [1]
+    assert series.bits[1] == pytest.approx([0.5, 0.5], abs=0.02)
+    assert dict(section(series).facts)["seen, last 10 s"].startswith("bit 1 in 50 %, bit 2 in ")
+
+
 def test_standing_robots_are_as_far_apart_as_they_are(write_log, message):
     events = ring(message, 3, 2.0, 1e-9)
     found = metrics_of(swarm_metrics(read_log(write_log(*events)), 1.0, 0.1))

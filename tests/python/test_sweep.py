@@ -197,11 +197,11 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(tmp_path: Path, monk
     sweep(asked, tmp_path / "here")
     sweep(in_mujoco, tmp_path / "mujoco here")
     with (
-        LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None) as cluster,
         Client(cluster) as client,
     ):
         pids = list(client.run(os.getpid).values())
-        assert len(set(pids)) == 2
+        assert len(set(pids)) == 4
         keep, kept = Store.keep, []
 
         def keep_and_kill(store: Store, number: int, columns: dict) -> None:

@@ -481,3 +481,61 @@ def test_effects_of_the_model_act_in_drawn_frames(tmp_path, plant):
     # A body that wide hides whatever is not the nearest.
     hidden = shares('[[effect]]\nname = "occlusion"\nradius_m = 0.5\n')
     assert (hidden <= plain).all() and hidden.sum() < plain.sum()
+
+
+WORLD = """
+[[body]]
+name = "gate"
+from_m = [0.5, -3]
+to_m = [0.5, 3]
+[[body]]
+name = "evader"
+at_m = [-2, 2]
+radius_m = 0.1
+colour = "red"
+path_m = [[2, 2]]
+speed_mps = 0.5
+"""
+
+
+@pytest.mark.parametrize("plant", ["planar", "mujoco"])
+def test_bodies_are_logged_where_their_file_puts_them_and_robots_stay_on_their_side(
+    tmp_path, plant
+):
+    world, log, script = (tmp_path / name for name in ("w.toml", "a.lcmlog", "s.csv"))
+    world.write_text(WORLD)
+    script.write_text("t_s,speed_input,turn_input\n0,100,0\n3,0,0\n")
+    words = ("--n", 1, "--seed", 4, "--spread-m", 0.1, "--world", world, "--script", script)
+    result = run(*words, "--log", log, plant=plant, model="turbopi_nominal.toml")
+    assert result.returncode == 0, result.stderr
+    messages, _ = read(log)
+    evader = [m for m in messages["TWIN_BODY"] if m.name == "evader"]
+    at_s = np.array([m.utime_us - evader[0].utime_us for m in evader]) / 1e6
+    np.testing.assert_allclose([m.from_m[0] for m in evader], -2 + 0.5 * at_s, atol=1e-6)
+    assert {m.from_m[1] for m in evader} == {2.0} and evader[0].colour == "red"
+    # Ahead is a metre long; the wall's near side is at 0.48 m, and a robot at least 0.1 m long.
+    ahead = messages["TWIN_TRUTH_R00"]
+    assert abs(np.cos(ahead[0].theta_rad)) > 0.7
+    assert max(m.x_m for m in ahead) < 0.4
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[[body]]\nat_m = [0, 0]\n", "radius_m must be a number from 0.001 to 1000"),
+        ("[[body]]\nat_m = [0]\nradius_m = 1\n", "at_m must be two numbers"),
+        ("[[body]]\nradius_m = 1\n", "give at_m of a disc, or from_m and to_m of a wall"),
+        ('[[body]]\nat_m = [0, 0]\nradius_m = 1\ncolour = "pink"\n', "no colour 'pink'"),
+        ("[[body]]\nat_m = [5, 0]\nradius_m = 1\nsize_m = 1\n", "there is no key 'size_m'"),
+        ("[[body]]\nat_m = [5, 0]\nradius_m = 1\nspeed_mps = 1\n", "give path_m and speed_mps"),
+        ("[[body]]\nat_m = [0, 0]\nradius_m = 5\n", "the world's bodies left out"),
+        ("body = 3\n", "must be a list of [[body]]"),
+        ("[[body]\n", "w.toml, line 1"),
+    ],
+)
+def test_a_wrong_world_is_one_sentence_and_no_log(tmp_path, text, says):
+    (tmp_path / "w.toml").write_text(text)
+    log = tmp_path / "a.lcmlog"
+    result = run("--n", 2, "--world", tmp_path / "w.toml", "--duration-s", 1, "--log", log)
+    assert result.returncode == 1 and result.stderr.count("\n") == 1
+    assert says in result.stderr and not log.exists()

@@ -76,7 +76,7 @@ def _plot(
 
 def _panels(multi_log: MultiLog, log: Path) -> list[tuple]:
     """(painter, height_in, title, caption) of all that the log can show."""
-    drawing = Drawing(multi_log.robots)
+    drawing = Drawing(multi_log.robots, multi_log.bodies)
     rows = len(drawing.driven)
     panels = []
     if drawing.tracked:
@@ -86,8 +86,9 @@ def _panels(multi_log: MultiLog, log: Path) -> list[tuple]:
             (drawing.turn, 1.4, "Turn", "Counter-clockwise is positive, from the poses."),
         ]
     if drawing.telling:
-        height_in = 0.5 + 0.18 * len(drawing.telling)
-        panels.append((drawing.bits, height_in, "Bits", "Green: the robot sees a neighbour."))
+        height_in = 0.5 + 0.18 * drawing.bit_rows
+        words = "Green: the robot sees a neighbour, or what that bit of several looks for."
+        panels.append((drawing.bits, height_in, "Bits", words))
     if drawing.driven:
         words = "A row per wheel: front-left, front-right, rear-left, rear-right."
         panels.append((drawing.commands, 0.8 + 0.36 * rows, "Commands", words))

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "behaviors.h"
 
-#include <toml++/toml.h>
-
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+
+#include "toml_file.h"
 
 namespace twin
 {
@@ -27,19 +27,6 @@ std::string DefaultFile()
     return "";
 }
 
-toml::table Parse(const std::string &path)
-{
-    try
-    {
-        return toml::parse_file(path);
-    }
-    catch (const toml::parse_error &error)
-    {
-        throw std::invalid_argument(path + ", line " + std::to_string(error.source().begin.line) +
-                                    ": " + std::string(error.description()));
-    }
-}
-
 }  // namespace
 
 std::string FindBehaviors(const std::string &path)
@@ -52,7 +39,7 @@ OwnBehaviors::OwnBehaviors(const std::string &path)
     const std::string file = FindBehaviors(path);
     if (file.empty())
         return;
-    for (const auto &[key, value] : Parse(file))
+    for (const auto &[key, value] : ParseToml(file))
     {
         const std::optional<std::string> text = value.value<std::string>();
         fw_table table;

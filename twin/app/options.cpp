@@ -63,6 +63,10 @@ void AddWorld(CLI::App &app, Options &o)
                    "TOML file of tables of your own; default: behaviors.toml here, else in "
                    "~/.config/twinmill")
         ->check(CLI::ExistingFile);
+    app.add_option("--world", o.world,
+                   "TOML file of bodies that are seen and in the way: obstacles, walls, goals, "
+                   "evaders")
+        ->check(CLI::ExistingFile);
     app.add_option("--script", o.script, "CSV of inputs or duties that all play instead")
         ->check(CLI::ExistingFile);
     app.add_option("--seed", o.seed, "same seed, same run")
@@ -192,6 +196,8 @@ std::string CommandLine(const Options &o, size_t robots, int64_t epoch_us)
         line << " --duration-s " << *o.duration_s;
     if (!o.behaviors.empty())
         line << " --behaviors " << o.behaviors;
+    if (!o.world.empty())
+        line << " --world " << o.world;
     if (!o.script.empty())
         line << " --script " << o.script;
     if (!o.channel_prefix.empty())

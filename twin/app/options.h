@@ -28,7 +28,7 @@ struct Options
     double spread_m = 1.2;  // of square and disc
     std::optional<double> duration_s, dt_s, realtime_factor;
     double pose_rate_hz = 120;
-    std::string script, behaviors, log, channel_prefix, script_dir = ".", key;
+    std::string script, behaviors, world, log, channel_prefix, script_dir = ".", key;
     bool force = false, wait = false;
     std::optional<std::string> lcm_url;
     std::optional<int64_t> epoch_us;

@@ -48,7 +48,7 @@ std::vector<std::string> Inputs(const Options &options)
 {
     std::vector<std::string> paths;
     for (const std::string &path :
-         {FindModelFile(options.model), FindModelFile(options.mjcf), options.script,
+         {FindModelFile(options.model), FindModelFile(options.mjcf), options.script, options.world,
           FindBehaviors(options.behaviors), KeyPath(options.key), options.hil.program})
         if (!path.empty())
             paths.push_back(path);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "turbopi/body_t.hpp"
 #include "turbopi/pose_t.hpp"
 #include "turbopi/run_t.hpp"
 #include "turbopi/telemetry_t.hpp"
@@ -15,6 +16,7 @@ namespace
 {
 
 constexpr double kMarkerHeight_m = 0.106;  // of the marker body above the floor
+constexpr const char *kBodyChannel = "TWIN_BODY";
 constexpr int64_t kRunPeriod_us = 5'000'000;
 
 }  // namespace
@@ -53,7 +55,11 @@ void Publisher::PublishDecisions(const Swarm &swarm)
 {
     const bool run_due = swarm.UtimeUs() >= next_run_utime_us_;
     if (run_due)
+    {
         next_run_utime_us_ += kRunPeriod_us;
+        for (const WorldBody &body : swarm.World())
+            PublishBody(body, swarm.TimeS());
+    }
     for (int id = 0; id < swarm.Size(); ++id)
     {
         if (run_due)
@@ -115,6 +121,9 @@ void Publisher::PublishPoses(const Swarm &swarm)
             PublishPose(id, t_s, pose);
             PublishTruth(id, t_s, pose, state);
         }
+        for (const WorldBody &body : swarm.World())
+            if (!body.path_m.empty())
+                PublishBody(body, t_s);
         ++pose_seq_;
     }
     for (int id = 0; id < swarm.Size(); ++id)
@@ -144,6 +153,23 @@ void Publisher::PublishPose(int id, double t_s, const Pose2 &pose)
     message.orientation_wxyz[3] = std::sin(seen.theta_rad / 2);
     outlet_.Send(Utime(t_s), member.pose, message);
     recent_.Add(id, static_cast<double>(message.utime_us - start_utime_us_) / 1e6, seen);
+}
+
+void Publisher::PublishBody(const WorldBody &body, double t_s)
+{
+    const Capsule now = body.At(t_s);
+    turbopi::body_t message;
+    message.utime_us = Utime(t_s);
+    message.name = body.name;
+    for (int i = 0; i < 2; ++i)
+    {
+        message.from_m[i] = now.from_m[i];
+        message.to_m[i] = now.to_m[i];
+    }
+    message.radius_m = now.radius_m;
+    message.colour = body.colour;
+    message.solid = body.is_solid;
+    outlet_.Send(message.utime_us, kBodyChannel, message);
 }
 
 void Publisher::PublishTruth(int id, double t_s, const Pose2 &pose, const RobotState &state)

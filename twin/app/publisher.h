@@ -40,10 +40,10 @@ public:
     // What was published of poses, newest ones.
     const RecentPoses &recent() const { return recent_; }
 
-    // After Swarm::Decide(): R<nn>_TELEMETRY, and R<nn>_RUN every 5 s.
+    // After Swarm::Decide(): R<nn>_TELEMETRY, and R<nn>_RUN and TWIN_BODY every 5 s.
     void PublishDecisions(const Swarm &swarm);
     // At the start and after every Swarm::Advance(): the R<nn>_POSE and TWIN_TRUTH_R<nn> that fell
-    // due, between the poses known before and after.
+    // due, between the poses known before and after, and TWIN_BODY of bodies that move.
     void PublishPoses(const Swarm &swarm);
 
 private:
@@ -60,6 +60,7 @@ private:
     void PublishRun(int id, int64_t utime_us);
     void PublishTelemetry(int id, const Swarm &swarm);
     void PublishPose(int id, double t_s, const Pose2 &pose);
+    void PublishBody(const WorldBody &body, double t_s);
     void PublishTruth(int id, double t_s, const Pose2 &pose, const RobotState &state);
     int64_t Utime(double t_s) const;
 

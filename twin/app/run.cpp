@@ -24,6 +24,7 @@
 #include "swarm/metrics.h"
 #include "swarm/robots.h"
 #include "swarm/species.h"
+#include "world_file.h"
 
 namespace twin
 {
@@ -48,6 +49,7 @@ struct Setup
     std::vector<Model> robots;
     OwnBehaviors own;
     std::vector<const fw_behavior *> behaviors;
+    std::vector<WorldBody> world;
     int64_t start_utime_us;
     std::string command_line;
 };
@@ -69,6 +71,7 @@ Setup Prepare(const Options &options)
     setup.model.base.control_period_s = options.dt_s.value_or(setup.model.base.control_period_s);
     setup.own = OwnBehaviors(options.behaviors);
     setup.behaviors = ParseSpecies(options.behavior, options.n, setup.own.All());
+    setup.world = LoadWorld(options.world);
     const int n = static_cast<int>(setup.behaviors.size());
     setup.robots = DrawRobots(setup.model, n, options.seed);
     setup.start_utime_us = StartUtimeUs(options);
@@ -78,16 +81,19 @@ Setup Prepare(const Options &options)
 
 std::unique_ptr<Plant> MakePlant(const Options &options, const Setup &setup)
 {
+    const double radius_m = setup.model.robot.body_radius_m;
     const auto starts = StartPoses(options.start, static_cast<int>(setup.robots.size()),
-                                   options.spread_m, setup.model.robot.body_radius_m, options.seed);
+                                   options.spread_m, radius_m, options.seed, setup.world);
     if (options.plant == PlantKind::kPlanar)
-        return std::make_unique<PlanarBodies>(setup.robots, starts, options.seed);
+        return std::make_unique<PlanarBodies>(setup.robots, starts, options.seed, kGridPays,
+                                              setup.world);
     const WheelKind wheels = setup.model.base.wheels;
     // The installed robot has mecanum wheels: others are made of their model's numbers.
     const bool is_made = options.mjcf == Options{}.mjcf && wheels != WheelKind::kMecanum &&
                          wheels != WheelKind::kNone;
     return std::make_unique<MujocoPlant>(is_made ? "" : FindModelFile(options.mjcf), setup.robots,
-                                         starts, MujocoOptions{.seed = options.seed});
+                                         starts,
+                                         MujocoOptions{.seed = options.seed, .world = setup.world});
 }
 
 Swarm MakeSwarm(const Options &options, const Setup &setup,
@@ -100,7 +106,8 @@ Swarm MakeSwarm(const Options &options, const Setup &setup,
                 {.seed = options.seed,
                  .start_utime_us = setup.start_utime_us,
                  .max_step_s = kMaxStep_s,
-                 .colours = ParseColours(options.behavior, options.n)});
+                 .colours = ParseColours(options.behavior, options.n),
+                 .world = setup.world});
     for (int robot = 0; robot < swarm.Size(); ++robot)
         swarm.Play(robot, script);
     const CameraWorld world =

@@ -1,11 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sensor/cone_sensor.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 namespace twin
 {
+
+namespace
+{
+
+// Whether a solid body, `but` apart, is between the robot that looks and a point.
+bool HiddenByBody(const Sight &sight, const Eigen::Vector2d &point_m, const SeenBody *but)
+{
+    const Pose2 &eye = sight.poses[sight.self];
+    return std::ranges::any_of(sight.bodies, [&](const SeenBody &body) {
+        return &body != but && body.is_solid && Crosses(body.shape, {eye.x_m, eye.y_m}, point_m);
+    });
+}
+
+}  // namespace
 
 ConeSensor::ConeSensor(const DetectionModel &detection, std::span<const fw_bit> bits, int robot,
                        uint64_t seed)
@@ -24,11 +39,24 @@ bool ConeSensor::Sees(const Eye &eye, const Sight &sight)
 {
     shown_.resize(sight.poses.size());
     for (size_t i = 0; i < shown_.size(); ++i)
-        shown_[i] = IsInside(sight.colours.empty() ? TargetColour() : sight.colours[i], eye.box);
-    const double sure = ViewProbability(sight.poses, sight.self, eye.detection, {}, shown_);
+        shown_[i] = IsInside(sight.colours.empty() ? TargetColour() : sight.colours[i], eye.box) &&
+                    !HiddenByBody(sight, {sight.poses[i].x_m, sight.poses[i].y_m}, nullptr);
+    const double sure = SeesBody(eye, sight)
+                            ? 1
+                            : ViewProbability(sight.poses, sight.self, eye.detection, {}, shown_);
     const bool in_view = detection_.softness_m > 0 ? random_.Uniform() < sure : sure > 0;
     const bool errs = random_.Uniform() < (in_view ? detection_.miss_rate : detection_.false_rate);
     return in_view != errs;
+}
+
+bool ConeSensor::SeesBody(const Eye &eye, const Sight &sight) const
+{
+    return std::ranges::any_of(sight.bodies, [&](const SeenBody &body) {
+        if (!body.colour || !IsInside(*body.colour, eye.box))
+            return false;
+        const auto part_m = PartInView(sight.poses[sight.self], body.shape, eye.detection);
+        return part_m && !HiddenByBody(sight, *part_m, &body);
+    });
 }
 
 double ConeSensor::ReachM() const

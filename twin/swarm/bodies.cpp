@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace twin
 {
@@ -89,13 +90,32 @@ void PushApart(std::vector<Pose2> &poses, const std::vector<Pose2> &before,
                     push(i, j);
 }
 
+// As a push between two discs, of which one takes the whole of it: the robot, and the wall's disc
+// that is nearest to it.
+void PushOut(Pose2 &pose, const Pose2 &pose_before, const Body &body, const Capsule &wall,
+             const Capsule &wall_before)
+{
+    const Eigen::Vector2d at_m = NearestPoint(wall, {pose.x_m, pose.y_m});
+    const Eigen::Vector2d moved_m = wall.from_m - wall_before.from_m;
+    const Pose2 nearest{at_m.x(), at_m.y(), 0};
+    const Body still{wall.radius_m, 0};
+    if (!Touch(pose, nearest, body, still))
+        return;
+    const Shift half =
+        HalfPush(pose, nearest, Moved(pose, pose_before), {moved_m.x(), moved_m.y()}, body, still);
+    pose.x_m -= 2 * half.x_m;
+    pose.y_m -= 2 * half.y_m;
+}
+
 PlanarBodies::PlanarBodies(const std::vector<Model> &models, const std::vector<Pose2> &starts,
-                           uint64_t seed, size_t grid_from)
+                           uint64_t seed, size_t grid_from, std::vector<WorldBody> world)
     : PlanarPlant(models, starts, seed),
+      world_(std::move(world)),
       before_(models.size()),
       poses_(models.size()),
       grid_from_(grid_from)
 {
+    std::erase_if(world_, [](const WorldBody &body) { return !body.is_solid; });
     for (const Model &model : models)
         bodies_.push_back(model.MakeBody());
     touch_ = std::any_of(bodies_.begin(), bodies_.end(),
@@ -112,8 +132,20 @@ void PlanarBodies::Step(double dt_s)
     for (int i = 0; i < Size(); ++i)
         poses_[static_cast<size_t>(i)] = State(i).pose;
     PushApart(poses_, before_, bodies_, poses_.size() >= grid_from_ ? &grid_ : nullptr);
+    StopAtWorld(dt_s);
     for (int i = 0; i < Size(); ++i)
         Move(i, poses_[static_cast<size_t>(i)]);
+}
+
+void PlanarBodies::StopAtWorld(double dt_s)
+{
+    for (const WorldBody &body : world_)
+    {
+        const Capsule now = body.At(TimeS()), before = body.At(TimeS() - dt_s);
+        for (size_t i = 0; i < poses_.size(); ++i)
+            if (bodies_[i].radius_m > 0)
+                PushOut(poses_[i], before_[i], bodies_[i], now, before);
+    }
 }
 
 }  // namespace twin

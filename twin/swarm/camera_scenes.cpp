@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -124,6 +125,8 @@ Scene CameraScenes::Next(const Sight &sight)
         scales_[i] = TargetScale(poses, i) * !misses;
     Scene scene = RobotsSeenBy(self_, poses, world_.target, scales_, sight.colours);
     scene.balls.insert(scene.balls.end(), world_.distractors.begin(), world_.distractors.end());
+    for (const SeenBody &body : sight.bodies)
+        std::ranges::copy(BoxesOf(body, poses[self_]), std::back_inserter(scene.boxes));
     if (imagines)
         scene.balls.push_back(FalseTarget(poses[self_]));
     return scene;

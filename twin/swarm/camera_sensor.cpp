@@ -19,6 +19,7 @@ void CameraSensor::Expose(const Sight &sight, int64_t now_us)
 {
     on_the_way_.push_back({{sight.poses.begin(), sight.poses.end()},
                            {sight.colours.begin(), sight.colours.end()},
+                           {sight.bodies.begin(), sight.bodies.end()},
                            sight.self,
                            now_us + age_us_,
                            seq_++});
@@ -34,8 +35,9 @@ std::optional<fw_frame> CameraSensor::DrawArrived()
 {
     if (!arrived_)
         return std::nullopt;
-    frame_ = camera_.Draw(scenes_.Next({arrived_->poses, arrived_->self, arrived_->colours}),
-                          arrived_->poses[arrived_->self]);
+    frame_ = camera_.Draw(
+        scenes_.Next({arrived_->poses, arrived_->self, arrived_->colours, arrived_->bodies}),
+        arrived_->poses[arrived_->self]);
     fw_frame frame{};
     frame.yuyv = frame_.data();
     frame.width_px = scenes_.settings().width_px;

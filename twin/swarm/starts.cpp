@@ -63,8 +63,18 @@ bool Free(const std::vector<Pose2> &taken, const Pose2 &pose, double apart_m)
     return true;
 }
 
+bool IsClear(std::span<const WorldBody> world, const Pose2 &pose, double body_radius_m)
+{
+    const Eigen::Vector2d at_m{pose.x_m, pose.y_m};
+    return std::ranges::none_of(world, [&](const WorldBody &body) {
+        return body.is_solid &&
+               (NearestPoint(body.shape, at_m) - at_m).norm() < body.shape.radius_m + body_radius_m;
+    });
+}
+
 // Robot after robot takes the first free place it draws; none if one finds no place.
-std::optional<std::vector<Pose2>> Place(const Ground &ground, std::vector<Random> &streams)
+std::optional<std::vector<Pose2>> Place(const Ground &ground, std::vector<Random> &streams,
+                                        std::span<const WorldBody> world)
 {
     std::vector<Pose2> poses;
     for (Random &random : streams)
@@ -73,7 +83,7 @@ std::optional<std::vector<Pose2>> Place(const Ground &ground, std::vector<Random
         for (int attempt = 0; attempt < kTriesPerRobot && poses.size() == placed; ++attempt)
         {
             const Pose2 pose = Draw(ground, random);
-            if (Free(poses, pose, ground.apart_m))
+            if (Free(poses, pose, ground.apart_m) && IsClear(world, pose, ground.apart_m / 2))
                 poses.push_back(pose);
         }
         if (poses.size() == placed)
@@ -85,18 +95,20 @@ std::optional<std::vector<Pose2>> Place(const Ground &ground, std::vector<Random
 }  // namespace
 
 std::vector<Pose2> StartPoses(StartShape shape, int n, double spread_m, double body_radius_m,
-                              uint64_t seed)
+                              uint64_t seed, std::span<const WorldBody> world)
 {
     const Ground ground = GroundFor(shape, n, spread_m, body_radius_m);
     std::vector<Random> streams;
     for (int i = 0; i < n; ++i)
         streams.emplace_back(seed, i, "start");
     for (int restart = 0; restart < kRestarts; ++restart)
-        if (const auto poses = Place(ground, streams))
+        if (const auto poses = Place(ground, streams, world))
             return *poses;
     std::ostringstream text;
     text << n << " robots of " << body_radius_m << " m radius do not fit into a start area "
-         << 2 * ground.half_m << " m wide without overlap: raise --spread-m or lower --n";
+         << 2 * ground.half_m << " m wide without overlap"
+         << (world.empty() ? "" : ", the world's bodies left out")
+         << ": raise --spread-m or lower --n";
     throw std::invalid_argument(text.str());
 }
 

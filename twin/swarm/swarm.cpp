@@ -94,6 +94,7 @@ Swarm::Swarm(std::unique_ptr<Plant> plant, const std::vector<Model> &models,
     : plant_(std::move(plant)),
       poses_(models.size()),
       colours_(options.colours),
+      world_(options.world),
       grid_from_(options.grid_from),
       period_s_(models.front().base.control_period_s),
       substeps_(SubstepCount(period_s_, options.max_step_s)),
@@ -171,6 +172,7 @@ void Swarm::Decide()
     for (int i = 0; i < Size(); ++i)
         poses_[static_cast<size_t>(i)] = plant_->State(i).pose;
     const int64_t now_us = UtimeUs();
+    LookAtWorld();
     if (UsesGrid())
         grid_.Fill(poses_, reach_m_);
     for (int i = 0; i < Size(); ++i)
@@ -188,6 +190,18 @@ void Swarm::Decide()
     ++step_count_;
 }
 
+void Swarm::LookAtWorld()
+{
+    bodies_.clear();
+    for (const WorldBody &body : world_)
+    {
+        std::optional<Colour> colour;
+        if (!body.colour.empty())
+            colour = ColourNamed(body.colour);
+        bodies_.push_back({body.At(TimeS()), body.height_m, colour, body.is_solid});
+    }
+}
+
 bool Swarm::UsesGrid() const
 {
     return members_.size() >= grid_from_ && reach_m_ > 0;
@@ -198,7 +212,7 @@ void Swarm::Expose(int robot, int64_t now_us)
     RobotSensor &sensor = *members_[static_cast<size_t>(robot)].sensor;
     if (!UsesGrid() || !std::isfinite(sensor.ReachM()))
     {
-        sensor.Expose({poses_, static_cast<size_t>(robot), colours_}, now_us);
+        sensor.Expose({poses_, static_cast<size_t>(robot), colours_, bodies_}, now_us);
         return;
     }
     near_poses_.clear();
@@ -212,7 +226,7 @@ void Swarm::Expose(int robot, int64_t now_us)
         if (!colours_.empty())
             near_colours_.push_back(colours_[i]);
     }
-    sensor.Expose({near_poses_, self, near_colours_}, now_us);
+    sensor.Expose({near_poses_, self, near_colours_, bodies_}, now_us);
 }
 
 void Swarm::DecideOne(Member &member, int64_t now_us)

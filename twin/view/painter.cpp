@@ -13,6 +13,7 @@ namespace
 constexpr int kMaxGeoms = 20000;
 constexpr int kFanSteps = 12;
 constexpr double kFanHeight_m = 0.004;  // above the floor
+constexpr double kFlat_m = 0.004;       // of a goal
 constexpr float kSeen[4] = {0.15f, 0.85f, 0.3f, 0.35f}, kUnseen[4] = {0.95f, 0.6f, 0.15f, 0.22f};
 constexpr int kCornerGap_px = 12, kCornerWidth_px = 320, kCornerHeight_px = 240;
 constexpr double kNumberHeight_m = 0.29, kMarkRadius_m = 0.14, kMarkHalf_m = 0.001;
@@ -62,6 +63,15 @@ void HalveToRgb(const Image &picture, std::vector<uint8_t> &rgb)
             rgb.push_back(byte(y - 0.392 * u - 0.813 * v));
             rgb.push_back(byte(y + 2.017 * u));
         }
+}
+
+// As HalveToRgb does, of one colour.
+void ToRgb(const Colour &colour, float rgb[3])
+{
+    const double y = 1.164 * (colour.y - 16), u = colour.u - 128, v = colour.v - 128;
+    const double bytes[3] = {y + 1.596 * v, y - 0.392 * u - 0.813 * v, y + 2.017 * u};
+    for (int i = 0; i < 3; ++i)
+        rgb[i] = static_cast<float>(std::clamp(bytes[i] / 255, 0.0, 1.0));
 }
 
 // What the robot's table goes by: a vote of frames, and so a little later than what is in view.
@@ -176,6 +186,36 @@ void Painter::AddCone(const RobotState &state, const ViewCone &cone, bool detect
     }
 }
 
+// A post at each end, and for a wall what is between them; what robots drive over is flat.
+void Painter::AddBody(const WorldBody &body, double t_s)
+{
+    const Capsule now = body.At(t_s);
+    const double half_m = (body.is_solid ? body.height_m : kFlat_m) / 2;
+    const Eigen::Vector2d along_m = now.to_m - now.from_m, middle_m = (now.from_m + now.to_m) / 2;
+    float rgba[4] = {0.55f, 0.55f, 0.58f, 1};
+    if (!body.colour.empty())
+        ToRgb(ColourNamed(body.colour), rgba);
+    const auto add = [&](int type, const Eigen::Vector2d &at_m, const mjtNum size[3],
+                         const mjtNum *turned) {
+        const mjtNum at[3] = {at_m.x(), at_m.y(), half_m};
+        if (mjvGeom *geom = NewDecor())
+        {
+            mjv_initGeom(geom, type, size, at, turned, rgba);
+            geom->category = mjCAT_DECOR;
+        }
+    };
+    const mjtNum post[3] = {now.radius_m, half_m, 0};
+    add(mjGEOM_CYLINDER, now.from_m, post, nullptr);
+    const double length_m = along_m.norm();
+    if (length_m == 0)
+        return;
+    add(mjGEOM_CYLINDER, now.to_m, post, nullptr);
+    const double c = along_m.x() / length_m, s = along_m.y() / length_m;
+    const mjtNum turned[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
+    const mjtNum wall[3] = {length_m / 2, now.radius_m, half_m};
+    add(mjGEOM_BOX, middle_m, wall, turned);
+}
+
 // Room for one more thing that is only looked at, or null.
 mjvGeom *Painter::NewDecor()
 {
@@ -212,6 +252,8 @@ void Painter::Draw(const Swarm &swarm, int robot_in_corner, const std::string &n
         AddCone(swarm.State(i), cones_[static_cast<size_t>(i)], swarm.Output(i).detected);
         AddNumber(swarm.State(i), i, i == robot_in_corner);
     }
+    for (const WorldBody &body : swarm.World())
+        AddBody(body, swarm.TimeS());
     mjr_render(area, &scene_, &context_);
     DrawCorner(swarm, robot_in_corner, area);
     char time[32];

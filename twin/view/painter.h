@@ -36,6 +36,7 @@ private:
     double DistanceFor(double x_m, double y_m, const mjrRect &area) const;
     mjvGeom *NewDecor();
     void AddCone(const RobotState &state, const ViewCone &cone, bool detected);
+    void AddBody(const WorldBody &body, double t_s);
     void AddNumber(const RobotState &state, int robot, bool is_in_corner);
     void ShadeBeside(const ViewCone &cone, double half_across, const mjrRect &corner);
     void DrawCorner(const Swarm &swarm, int robot, const mjrRect &area);

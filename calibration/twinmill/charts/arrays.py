@@ -54,13 +54,12 @@ def commands(robot: RobotLog | Track) -> Arrays:
 
 
 def seen(frames: Frames | None) -> Arrays:
-    """(K, 2) robot's clock and whether its camera saw another robot, where that changes."""
+    """(K, 1 + k) robot's clock and the k bits that its camera told, where one changes."""
     if frames is None or not len(frames.t_s):
         return {"seen": np.empty((0, 2))}
-    bit = frames.voted if frames.has_vote else frames.raw
-    kept = np.concatenate([[True], np.diff(bit.astype(int)) != 0])
+    kept = np.concatenate([[True], np.any(np.diff(frames.told, axis=0), axis=1)])
     kept[-1] = True
-    return {"seen": np.column_stack([frames.t_s, bit])[kept]}
+    return {"seen": np.column_stack([frames.t_s, frames.told])[kept]}
 
 
 def expected(detections: Detections, model: native.Model) -> Arrays:

@@ -20,6 +20,7 @@ class Frames:
         has_raw: false in logs that keep the voted bit alone.
         voted: (K,) bool, after the vote that the frame closed.
         has_vote: false of cameras that do not vote; `voted` is then `raw`.
+        further: (K, k - 1) bool, bits 2 to k as `told` tells the first; all else is of the first.
     """
 
     t_s: np.ndarray
@@ -28,6 +29,13 @@ class Frames:
     has_raw: bool
     voted: np.ndarray
     has_vote: bool = True
+    further: np.ndarray | None = None
+
+    @property
+    def told(self) -> np.ndarray:
+        """(K, k) bool, all bits: after their votes, or of the frame where there is no vote."""
+        first = (self.voted if self.has_vote else self.raw)[:, None]
+        return first if self.further is None else np.hstack([first, self.further])
 
 
 def frames_of(robot: RobotLog) -> Frames | None:
@@ -44,5 +52,19 @@ def frames_of(robot: RobotLog) -> Frames | None:
     t_s = robot.frame_t_s if stamped else robot.command_t_s
     known = np.flatnonzero(np.isfinite(t_s))
     fresh = known[np.diff(t_s[known], prepend=-np.inf) > 0]
-    raw, voted = robot.detected_raw[fresh] & 1 > 0, robot.detected[fresh] & 1 > 0
-    return Frames(t_s[fresh], stamped, raw, bool(raw.any() or not voted.any()), voted)
+    raw, *_ = _bits(robot.detected_raw[fresh]).T
+    voted, *further = _bits(robot.detected[fresh]).T
+    return Frames(
+        t_s[fresh],
+        stamped,
+        raw,
+        bool(raw.any() or not voted.any()),
+        voted,
+        further=np.column_stack(further) if further else None,
+    )
+
+
+def _bits(numbers: np.ndarray) -> np.ndarray:
+    """(K, k) bool, bit 1 first; k is as many as any of the numbers needs, at least one."""
+    count = max(int(np.max(numbers, initial=0)).bit_length(), 1)
+    return numbers[:, None] >> np.arange(count) & 1 > 0

@@ -25,6 +25,7 @@ from twinmill.data.lcm_log import (
     split_events,
 )
 from twinmill.data.other_files import LCM_LOG, LOOKED_AT, other_file
+from twinmill.data.world_bodies import CHANNEL, WorldBody, world_bodies
 from twinmill.foreign_text import NAME_MAX, plain_line
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
@@ -39,7 +40,7 @@ FARTHEST_M = 1e9  # no room is as large: such a place is damage
 
 _READ = ("TELEMETRY", "POSE", "DRIVE", "RUN", "DETECTION")
 _KNOWN_ELSEWHERE = re.compile(
-    r".*(R\d\d_((SIGNED_)?ACK|LINK)|SWARM_(COMMAND|SIGNED)|TWIN_TRUTH_R\d\d)$"
+    r".*(R\d\d_((SIGNED_)?ACK|LINK)|SWARM_(COMMAND|SIGNED)|TWIN_TRUTH_R\d\d|TWIN_BODY)$"
 )
 
 
@@ -111,6 +112,7 @@ class Log:
         robots: by robot_id, ascending.
         warnings: sentences.
         data: bytes of a log that is in no file.
+        bodies: of a twin's world.
     """
 
     path: Path
@@ -119,6 +121,7 @@ class Log:
     robots: dict[int, RobotLog]
     warnings: list[str]
     data: bytes | None = field(default=None, repr=False)
+    bodies: list[WorldBody] = field(default_factory=list)
 
     def read_bytes(self) -> bytes:
         """Bytes of its file, or of the file that `save` would write.
@@ -202,7 +205,8 @@ def decode_log(events: Events, path: Path, sha256: str, channel_prefix: str = ""
             **_pose_series(poses, t0_us, robot_id, warnings),
             **_detection_series(channels[robot_id].get("DETECTION"), t0_us, robot_id, warnings),
         )
-    return Log(path, sha256, t0_us, robots, warnings)
+    bodies = world_bodies(events.by_channel.get(CHANNEL, []), t0_us)
+    return Log(path, sha256, t0_us, robots, warnings, bodies=bodies)
 
 
 def read_bytes(path: Path) -> bytes:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from twinmill.data.lcm_log import Events, split_events
 from twinmill.data.log import RobotLog, decode_log, read_bytes
+from twinmill.data.world_bodies import CHANNEL, WorldBody, world_bodies
 
 TWIN = "TWIN_"  # channel prefix of a twin that shares a network with robots
 PREFIXES = ("", TWIN)
@@ -34,6 +35,7 @@ class MultiLog:
     t0_utime_us: int
     sha256: str
     warnings: list[str]
+    bodies: list[WorldBody]
 
 
 def read_multi_log(path: Path) -> MultiLog:
@@ -60,7 +62,8 @@ def multi_log_of(events: Events, path: Path, sha256: str = "") -> MultiLog:
     ]
     # What one prefix does not know, another does: that is no remark.
     warnings = [w for log in logs.values() for w in log.warnings if "other channels" not in w]
-    return MultiLog(robots, t0_us, sha256, warnings)
+    bodies = world_bodies(events.by_channel.get(CHANNEL, []), t0_us)
+    return MultiLog(robots, t0_us, sha256, warnings, bodies)
 
 
 def _shifted(robot: RobotLog, by_s: float) -> RobotLog:

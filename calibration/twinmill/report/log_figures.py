@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of a log: paths, speeds, bits, commands; one painter per picture."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -10,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from twinmill.data.camera_frames import frames_of
 from twinmill.data.multi_log import TWIN, RecordedRobot
 from twinmill.data.track import SILENCE_S
+from twinmill.data.world_bodies import WorldBody
 from twinmill.model.outlines import SEES
 from twinmill.report.canvas import legend_above
 from twinmill.swarm.metrics import SMOOTH, STEP_S, resample
@@ -20,6 +23,7 @@ WORDS = {"duty": "duty (%)", "wheel_speed": "wheel speed (rad/s)", "twist": "m/s
 ROWS = {"twist": ("vx", "vy", "ω")}
 WHEELS = ("fl", "fr", "rl", "rr")
 NOT_SEEN = "#e0e0e0"
+UNSEEN = "#8a8a8a"  # bodies that no camera sees
 CELL_S = 0.05  # of bits and commands over time
 
 
@@ -28,10 +32,11 @@ class Drawing:
 
     Args:
         robots: whom to show; those without poses or telemetry are left out where they have nothing.
+        bodies: what else is in the world.
     """
 
-    def __init__(self, robots: list[RecordedRobot]):
-        self._robots = robots
+    def __init__(self, robots: list[RecordedRobot], bodies: Sequence[WorldBody] = ()):
+        self._robots, self._bodies = robots, bodies
         many = colormaps["turbo"](np.linspace(0.05, 0.95, len(robots)))
         self._colors = COLORS if len(robots) <= len(COLORS) else many
         ends = [t[-1] for a in robots for t in (a.log.pose_t_s, a.log.command_t_s) if len(t)]
@@ -40,11 +45,13 @@ class Drawing:
         frames = {k: frames_of(recorded.log) for k, recorded in enumerate(robots)}
         self._frames = {k: seen for k, seen in frames.items() if seen is not None}
         self.telling = list(self._frames)
+        self.bit_rows = sum(seen.told.shape[1] for seen in self._frames.values())
         self.driven = [k for k, a in enumerate(robots) if len(a.log.command_t_s)]
         self._motion = {k: _motion(robots[k]) for k in self.tracked}
 
     def paths(self, axes: Axes) -> None:
         """From above, dots at the ends with a line to the front; twins dashed."""
+        paint_bodies(axes, self._bodies)
         for k in self.tracked:
             recorded, pose = self._robots[k], self._motion[k][1]
             color, dashed = self._colors[k], recorded.prefix == TWIN
@@ -82,17 +89,19 @@ class Drawing:
         axes.set(ylabel=label, xlim=(0, self.end_s))
 
     def bits(self, axes: Axes) -> None:
-        """The voted bit, a row per robot whose camera was recorded: green where it sees another."""
-        rows = []
+        """Voted bits of robots whose cameras were recorded, a row each: green where it is set."""
+        rows, names = [], []
         for k, seen in self._frames.items():
-            bit = seen.voted if seen.has_vote else seen.raw
-            rows.append(self._held(k, seen.t_s, bit[:, None])[:, 0])
+            rows += list(self._held(k, seen.t_s, seen.told).T)
+            count = seen.told.shape[1]
+            name = self._robots[k].name
+            names += [f"{name} bit {i + 1}" for i in range(count)] if count > 1 else [name]
         picture = np.ones((len(rows), len(rows[0]), 3))
         for bit, color in enumerate((NOT_SEEN, SEES)):
             picture[np.array(rows) == bit] = to_rgb(color)
         axes.imshow(picture, **self._strip(len(rows)))
         axes.set_title("green: sees a neighbour", loc="left", color=SEES)
-        self._name_rows(axes, [self._robots[k].name for k in self.telling])
+        self._name_rows(axes, names)
 
     def commands(self, axes: Axes) -> None:
         """A row per wheel, blue back, red forward."""
@@ -139,6 +148,15 @@ class Drawing:
         axes.set(xlabel="time (s)", xlim=(0, self.end_s))
         axes.grid(False)
         axes.tick_params(left=False)
+
+
+def paint_bodies(axes: Axes, bodies: Sequence[WorldBody]) -> None:
+    """Bodies of a world where they were last, in their colours; dotted the ways they moved."""
+    for body in bodies:
+        color = body.colour or UNSEEN
+        if body.moves:
+            axes.plot(*body.from_m.T, color=color, lw=0.8, ls=":")
+        axes.fill(*body.outline().T, color=color, alpha=0.6 if body.solid else 0.25, lw=0)
 
 
 def _motion(recorded: RecordedRobot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,6 +6,7 @@ import twinmill_native as native
 
 from twinmill.report import Figure, Section
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
+from twinmill.report.log_figures import paint_bodies
 from twinmill.swarm.classes import COLORS, WORDS
 from twinmill.swarm.metrics import SwarmSeries
 
@@ -41,10 +42,23 @@ def section(series: SwarmSeries) -> Section:
         facts=[
             ("robots", ", ".join(map(str, series.robots))),
             ("odd", ", ".join(map(str, series.odd)) or "none"),
+            *_bits(series),
+            *(
+                [("bodies", ", ".join(body.name for body in series.bodies))]
+                if series.bodies
+                else []
+            ),
             ("time with all poses", f"{series.t_s[-1] - series.t_s[0]:.1f} s"),
         ],
         figures=[_over_time(series), _paths(series)],
     )
+
+
+def _bits(series: SwarmSeries) -> list[tuple[str, str]]:
+    """Which bits the cameras told, mean over the robots."""
+    shares = np.mean(list(series.bits.values()), axis=0) if series.bits else []
+    words = [f"bit {k + 1} in {100 * share:.0f} %" for k, share in enumerate(shares)]
+    return [("seen, last 10 s", f"{', '.join(words)} of the frames")] if words else []
 
 
 def _over_time(series: SwarmSeries) -> Figure:
@@ -101,6 +115,7 @@ def _paths(series: SwarmSeries) -> Figure:
     last = series.t_s > series.t_s[-1] - LAST_S
 
     def paint(axes) -> None:
+        paint_bodies(axes, series.bodies)
         for k, robot in enumerate(series.robots):
             path = series.pose[last, k]
             odd = robot in series.odd

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
+from twinmill.data.camera_frames import frames_of
 from twinmill.data.log import Log, LogError, RobotLog
+from twinmill.data.world_bodies import WorldBody
 
 STEP_S = 0.05
 SMOOTH = 9  # steps of the window in which velocities are fitted
@@ -32,6 +34,9 @@ class SwarmSeries:
         classes: (T,) of the mean of the last 10 s at each time; needs half of them.
         mean: (metrics,) over the last 10 s.
         final: class of that mean.
+        bits: by robot whose camera was recorded, the share of frames of the last 10 s in which each
+            of its bits was set.
+        bodies: of the twin's world; they obey nobody, and no metric counts them.
     """
 
     robots: list[int]
@@ -42,6 +47,8 @@ class SwarmSeries:
     classes: list[str]
     mean: np.ndarray
     final: str
+    bits: dict[int, list[float]]
+    bodies: list[WorldBody]
 
     def to_json(self) -> dict:
         """Everything but the poses."""
@@ -51,6 +58,8 @@ class SwarmSeries:
             "metrics": dict(zip(names, self.mean.tolist(), strict=True)),
             "robots": self.robots,
             "odd": self.odd,
+            "bits": self.bits,
+            "bodies": [body.name for body in self.bodies],
             "t_s": np.round(self.t_s, 3).tolist(),
             "series": {name: self.values[:, k].tolist() for k, name in enumerate(names)},
             "classes": self.classes,
@@ -105,7 +114,20 @@ def swarm_metrics(
         classes=classes,
         mean=means[-1],
         final=classes[-1],
+        bits=_bits({i: robots[i] for i in order}, t_s[-1] - WINDOW_S),
+        bodies=log.bodies,
     )
+
+
+def _bits(robots: dict[int, RobotLog], since_s: float) -> dict[int, list[float]]:
+    """As many of each robot as any of them set at any time."""
+    found = {}
+    for i, robot in robots.items():
+        frames = frames_of(robot)
+        if frames is not None and (late := frames.t_s >= since_s).any():
+            found[i] = frames.told[late].mean(axis=0).tolist()
+    count = max(map(len, found.values()), default=0)
+    return {i: shares + [0.0] * (count - len(shares)) for i, shares in found.items()}
 
 
 def _odd(robots: dict[int, RobotLog]) -> list[int]:

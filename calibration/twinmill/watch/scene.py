@@ -23,7 +23,12 @@ PATH_S, POINT_S = 10.0, 0.05  # of the path behind a robot: its length, and betw
 GROUPS = {"": "robots", TWIN: "twins"}
 COLORS = {"": BEFORE, TWIN: PREDICTED}
 WIDE, THIN = -2.5, -1.5  # of lines: below zero are pixels for Rerun
-WORDS = ("none", "sees")
+# Of each number of up to four bits.
+WORDS = (
+    "none",
+    "sees",
+    *(f"bits {'+'.join(str(i + 1) for i in range(4) if n >> i & 1)}" for n in range(2, 16)),
+)
 
 
 @dataclass
@@ -50,7 +55,7 @@ class Shown:
         self.to.log(f"{self.entity}/body", lines, static=True)
         label = rr.Points3D([[0, 0, 0]], labels=self.label, colors=self.color, radii=-4)
         self.to.log(f"{self.entity}/name", label, static=True)
-        colors = [_rgb(BLIND), _rgb(SEES)]
+        colors = [_rgb(BLIND), *[_rgb(SEES)] * (len(WORDS) - 1)]
         states = rr.StateConfiguration(values=WORDS, labels=WORDS, colors=colors)
         self.to.log(f"bits/{self.label}", states, static=True)
 
@@ -106,7 +111,7 @@ class Shown:
                     [_flat(self.body.view())], radii=THIN, colors=_rgb(SEES if bit else BLIND)
                 )
                 self._log(f"{self.entity}/view", at_s, view)
-                self._log(f"bits/{self.label}", at_s, rr.StateChange(state=WORDS[bit != 0]))
+                self._log(f"bits/{self.label}", at_s, rr.StateChange(state=WORDS[bit]))
 
     def scored(self, now_s: float, found: LiveScore) -> None:
         """Its score, and where the model would have it go."""

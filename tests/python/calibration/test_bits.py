@@ -160,6 +160,17 @@ def test_a_frame_that_several_control_steps_used_counts_once(driven):
     assert frames_of(robot) is None
 
 
+def test_numbers_of_several_bits_are_told_bit_by_bit(driven):
+    robot = driven(1.0)
+    number = (np.arange(len(robot.command_t_s)) % 8).astype(np.int8)
+    frames = frames_of(replace(robot, detected=number, detected_raw=number))
+    assert np.array_equal(frames.told @ [1, 2, 4], number)
+    # What is calibrated is the first bit's.
+    assert np.array_equal(frames.voted, number % 2 == 1)
+    one = frames_of(replace(robot, detected=number % 2, detected_raw=number % 2))
+    assert one.told.shape == (len(number), 1)
+
+
 HIDDEN = {
     "view_range": {"range_m": 0.85 * RANGE_M},
     "view_angle": {"cone_rad": 1.3 * CONE_RAD},

@@ -89,7 +89,9 @@ double RollerDrag(const mjModel *m, const std::vector<Wheel> &wheels)
 
 MujocoPlant::MujocoPlant(const std::string &mjcf, const std::vector<Model> &models,
                          const std::vector<Pose2> &starts, const MujocoOptions &options)
-    : timestep_s_(options.timestep_s), kinematics_(Robot{}, WheelKind::kMecanum)
+    : timestep_s_(options.timestep_s),
+      kinematics_(Robot{}, WheelKind::kMecanum),
+      world_(SolidOf(options.world))
 {
     CheckInputs(models, starts, options);
     LogToStderrAlone();
@@ -155,6 +157,7 @@ void MujocoPlant::Step(double dt_s)
         member.state.vx_mps = member.state.vy_mps = member.state.omega_radps = 0;
     for (int i = 0; i < steps; ++i)
     {
+        MoveWorld();
         for (Member &member : robots_)
         {
             Drive(member, model_->opt.timestep);
@@ -171,6 +174,17 @@ void MujocoPlant::Step(double dt_s)
         member.state.omega_radps /= steps;
     }
     CheckStable();
+}
+
+// Where they are at the end of the physics step.
+void MujocoPlant::MoveWorld()
+{
+    for (size_t i = 0; i < world_.size(); ++i)
+    {
+        const Eigen::Vector2d at_m = world_[i].At(data_->time + model_->opt.timestep).from_m;
+        data_->mocap_pos[3 * i] = at_m.x();
+        data_->mocap_pos[3 * i + 1] = at_m.y();
+    }
 }
 
 // The wheels are told to turn so that, where they grip, the body moves as the drive chain says.

@@ -257,6 +257,46 @@ void AddWalls(mjSpec *world, double half_width_m)
     }
 }
 
+mjsGeom *AddPiece(mjsBody *body, mjtGeom type, double height_m)
+{
+    mjsGeom *piece = mjs_addGeom(body, nullptr);
+    piece->type = type;
+    piece->contype = piece->conaffinity = 2;
+    piece->pos[2] = height_m / 2;
+    return piece;
+}
+
+// A post at each end, and for a wall what is between them. It is told where to be, and yields to
+// nobody.
+void AddWorldBody(mjSpec *world, const WorldBody &of)
+{
+    mjsBody *body = mjs_addBody(mjs_findBody(world, "world"), nullptr);
+    body->mocap = 1;
+    body->pos[0] = of.shape.from_m.x();
+    body->pos[1] = of.shape.from_m.y();
+    const Eigen::Vector2d along_m = of.shape.to_m - of.shape.from_m;
+    const double length_m = along_m.norm();
+    for (const double end : {0.0, 1.0})
+    {
+        if (end > 0 && length_m == 0)
+            return;
+        mjsGeom *post = AddPiece(body, mjGEOM_CYLINDER, of.height_m);
+        post->size[0] = of.shape.radius_m;
+        post->size[1] = of.height_m / 2;
+        post->pos[0] = end * along_m.x();
+        post->pos[1] = end * along_m.y();
+    }
+    mjsGeom *wall = AddPiece(body, mjGEOM_BOX, of.height_m);
+    wall->size[0] = length_m / 2;
+    wall->size[1] = of.shape.radius_m;
+    wall->size[2] = of.height_m / 2;
+    wall->pos[0] = along_m.x() / 2;
+    wall->pos[1] = along_m.y() / 2;
+    const double half_rad = std::atan2(along_m.y(), along_m.x()) / 2;
+    wall->quat[0] = std::cos(half_rad);
+    wall->quat[3] = std::sin(half_rad);
+}
+
 // Attaching a body leaves the numerics of its file behind.
 void CopyRollerDrag(mjSpec *world, mjSpec *robot)
 {
@@ -280,6 +320,12 @@ std::string NameInWorld(int robot, const std::string &name)
     return prefix + name;
 }
 
+std::vector<WorldBody> SolidOf(std::vector<WorldBody> world)
+{
+    std::erase_if(world, [](const WorldBody &body) { return !body.is_solid; });
+    return world;
+}
+
 mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
                       const std::vector<Pose2> &starts, const MujocoOptions &options)
 {
@@ -295,6 +341,8 @@ mjModel *CompileWorld(const std::string &mjcf, const std::vector<Model> &models,
         AddRobot(mjcf, world.get(), robot.get(), static_cast<int>(i), starts[i], models[i]);
     if (options.arena_half_width_m)
         AddWalls(world.get(), *options.arena_half_width_m);
+    for (const WorldBody &body : SolidOf(options.world))
+        AddWorldBody(world.get(), body);
     if (!options.visuals)
         mjs_discardVisual(world.get(), nullptr);
     if (options.simplified)

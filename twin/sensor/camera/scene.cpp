@@ -29,6 +29,8 @@ struct Part
 };
 
 const Colour kGreen = Colour::FromRgb(0.10, 0.78, 0.20);
+const Colour kGrey = Colour::FromRgb(0.55, 0.55, 0.55);
+constexpr double kPlateHalf_m = 1e-3;
 const Vector3d kBallAt_m{-0.035, 0, 0.18};
 constexpr double kBallRadius_m = 0.02;
 
@@ -131,6 +133,35 @@ Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
             scene.balls.push_back({in_world(kBallAt_m), scale * kBallRadius_m, colour});
     }
     return scene;
+}
+
+std::vector<Box> BoxesOf(const SeenBody &body, const Pose2 &eye)
+{
+    const Colour colour = body.colour.value_or(kGrey);
+    const double half_height_m = body.height_m / 2, radius_m = body.shape.radius_m;
+    std::vector<Box> boxes;
+    const auto plate = [&](const Eigen::Vector2d &at_m) {
+        const double dx_m = at_m.x() - eye.x_m, dy_m = at_m.y() - eye.y_m;
+        const double distance2 = dx_m * dx_m + dy_m * dy_m;
+        if (distance2 <= radius_m * radius_m)  // it stands in it: as over a goal on the floor
+            return;
+        const double half_m = radius_m * std::sqrt(distance2 / (distance2 - radius_m * radius_m));
+        boxes.push_back({{at_m.x(), at_m.y(), half_height_m},
+                         {kPlateHalf_m, half_m, half_height_m},
+                         std::atan2(dy_m, dx_m),
+                         colour});
+    };
+    plate(body.shape.from_m);
+    const Eigen::Vector2d along_m = body.shape.to_m - body.shape.from_m;
+    if (along_m.isZero())
+        return boxes;
+    plate(body.shape.to_m);
+    const Eigen::Vector2d middle_m = (body.shape.from_m + body.shape.to_m) / 2;
+    boxes.push_back({{middle_m.x(), middle_m.y(), half_height_m},
+                     {along_m.norm() / 2, radius_m, half_height_m},
+                     std::atan2(along_m.y(), along_m.x()),
+                     colour});
+    return boxes;
 }
 
 std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed)

@@ -269,7 +269,8 @@ export class Floor {
   /** What the picked robot's camera covers, filled while it sees another robot. */
   _sight(g, robot, t) {
     const pose = valuesAt(robot.path, t);
-    const k = rowAt(robot.arrays.seen, t - (this.stage.prediction?.clock_s ?? 0));
+    const told = robot.arrays.seen;
+    const k = rowAt(told, t - (this.stage.prediction?.clock_s ?? 0));
     if (!pose || k < 0) return;
     const [, x, y, heading] = pose;
     const [half, middle] = [robot.cone.cone_rad / 2, heading + robot.cone.pan_rad];
@@ -282,7 +283,7 @@ export class Floor {
     g.closePath();
     g.globalAlpha = 0.12;
     g.fillStyle = FLOOR;
-    if (robot.arrays.seen.data[2 * k + 1]) g.fill();
+    if (told.data.subarray(k * told.width + 1, (k + 1) * told.width).some((bit) => bit)) g.fill();
     g.globalAlpha = 0.5;
     g.strokeStyle = FLOOR;
     g.stroke();

@@ -46,9 +46,11 @@ export function rowsOf(robot, prediction, band, ahead_s) {
   ];
   if (robot.arrays.seen.rows) {
     const line = { column: 1, factor: 1, width: 1.5, shift: prediction?.clock_s ?? 0 };
-    const lines = [
-      { ...line, of: robot.arrays.seen, color: MEASURED, alpha: 0.6, name: "bit", held: true },
-    ];
+    const { seen } = robot.arrays;
+    const lines = Array.from({ length: seen.width - 1 }, (_, k) => ({
+      ...line, of: seen, column: k + 1, color: k ? WHEELS[k] : MEASURED, alpha: 0.6,
+      name: k ? `bit ${k + 1}` : "bit", held: true,
+    }));
     const of = prediction?.arrays.expected;
     const named = { color: PREDICTED, alpha: 1, name: "its chance by the model", ofModel: true };
     if (of) lines.push({ ...line, ...named, of });

@@ -50,6 +50,7 @@ private:
         DetectionModel detection;
     };
     bool Sees(const Eye &eye, const Sight &sight);
+    bool SeesBody(const Eye &eye, const Sight &sight) const;
 
     DetectionModel detection_;
     Random random_;

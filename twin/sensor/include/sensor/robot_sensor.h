@@ -28,6 +28,7 @@ struct Sight
     std::span<const Pose2> poses;
     size_t self;                           // the place in `poses` of the robot that looks
     std::span<const Colour> colours = {};  // of the targets on them; empty: TargetColour()
+    std::span<const SeenBody> bodies = {};
 };
 
 // A robot's sensor. Each control step exposes it once, also while a script drives the robot.

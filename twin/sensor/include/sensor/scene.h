@@ -5,12 +5,14 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "fw/threshold.h"
 #include "plant/plant.h"
+#include "plant/world_body.h"
 
 namespace twin
 {
@@ -67,6 +69,19 @@ Colour ColourNamed(const std::string &name);
 Scene RobotsSeenBy(size_t self, std::span<const Pose2> poses, Target target,
                    std::span<const double> target_scales = {},
                    std::span<const Colour> colours = {});
+
+// A body of the world when a frame is exposed.
+struct SeenBody
+{
+    Capsule shape;
+    double height_m;
+    std::optional<Colour> colour;  // none: no bit sees it, and it is drawn grey
+    bool is_solid;
+};
+
+// As `eye` sees it: a disc as a plate across the line of sight, as wide as its outline; of a wall
+// the posts at its ends, and a box between them.
+std::vector<Box> BoxesOf(const SeenBody &body, const Pose2 &eye);
 
 // Coloured balls, none of them green, that lie on the floor in a ring about the origin.
 std::vector<Ball> Distractors(int count, double ring_radius_m, uint64_t seed);

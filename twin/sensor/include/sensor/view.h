@@ -4,11 +4,13 @@
 #ifndef SENSOR_VIEW_H
 #define SENSOR_VIEW_H
 
+#include <optional>
 #include <span>
 
 #include "effects/effect.h"
 #include "fw/bit.h"
 #include "plant/plant.h"
+#include "plant/world_body.h"
 
 namespace twin
 {
@@ -21,6 +23,12 @@ bool InView(const Pose2 &eye, const Pose2 &target, const DetectionModel &detecti
 // Whether the body of another robot, of hide_radius_m, hides robot `target` from `self`.
 bool Hidden(std::span<const Pose2> poses, size_t self, size_t target,
             const DetectionModel &detection);
+
+// The point of the body's segment from which its nearest part is in view: nearer than range_m, and
+// within half of cone_rad of the heading turned by pan_rad, with sharp edges. None: no part is.
+// Cones of up to 180 degrees.
+std::optional<Eigen::Vector2d> PartInView(const Pose2 &eye, const Capsule &body,
+                                          const DetectionModel &detection);
 
 // How well poses are known: standard deviations. All zero: exactly.
 struct Blur

@@ -4,6 +4,7 @@
 #define SWARM_BODIES_H
 
 #include "plant/planar_plant.h"
+#include "plant/world_body.h"
 #include "swarm/cell_grid.h"
 
 namespace twin
@@ -17,16 +18,25 @@ namespace twin
 void PushApart(std::vector<Pose2> &poses, const std::vector<Pose2> &before,
                const std::vector<Body> &bodies, CellGrid *grid = nullptr);
 
+// Moves a disc that overlaps what does not yield, out of it; friction as above. `..._before`:
+// where both were.
+void PushOut(Pose2 &pose, const Pose2 &pose_before, const Body &body, const Capsule &wall,
+             const Capsule &wall_before);
+
 class PlanarBodies final : public PlanarPlant
 {
 public:
-    // As PlanarPlant; each model gives its robot's body (Model::MakeBody).
+    // As PlanarPlant; each model gives its robot's body (Model::MakeBody). Those of `world` that
+    // are solid stop robots.
     PlanarBodies(const std::vector<Model> &models, const std::vector<Pose2> &starts, uint64_t seed,
-                 size_t grid_from = kGridPays);
+                 size_t grid_from = kGridPays, std::vector<WorldBody> world = {});
     void Step(double dt_s) override;
 
 private:
+    void StopAtWorld(double dt_s);
+
     std::vector<Body> bodies_;
+    std::vector<WorldBody> world_;  // the solid ones
     bool touch_ = false;
     std::vector<Pose2> before_, poses_;
     CellGrid grid_;

@@ -38,6 +38,7 @@ private:
     {
         std::vector<Pose2> poses;
         std::vector<Colour> colours;
+        std::vector<SeenBody> bodies;
         size_t self;
         int64_t utime_us;  // time stamp
         uint32_t seq;

@@ -4,9 +4,11 @@
 #define SWARM_STARTS_H
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "plant/plant.h"
+#include "plant/world_body.h"
 
 namespace twin
 {
@@ -19,10 +21,10 @@ enum class StartShape
                  // body = 0.2 m, centres at least a body apart, facing away from the middle
 };
 
-// n poses whose bodies do not overlap, around the origin.
+// n poses whose bodies do not overlap each other or the solid ones of `world`, around the origin.
 // Throws std::invalid_argument in one sentence if that many bodies do not fit.
 std::vector<Pose2> StartPoses(StartShape shape, int n, double spread_m, double body_radius_m,
-                              uint64_t seed);
+                              uint64_t seed, std::span<const WorldBody> world = {});
 
 }  // namespace twin
 

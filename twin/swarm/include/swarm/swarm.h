@@ -26,7 +26,8 @@ struct SwarmOptions
     double max_step_s = 0.025;
     // From this many robots on, neighbours are found with a grid; results are the same to the bit.
     size_t grid_from = kGridPays;
-    std::vector<Colour> colours = {};  // of the robots' targets; empty: TargetColour()
+    std::vector<Colour> colours = {};   // of the robots' targets; empty: TargetColour()
+    std::vector<WorldBody> world = {};  // what else there is to see; the plant has the same
 };
 
 // Into how many substeps of at most `max_step_s` a control period is split.
@@ -79,6 +80,7 @@ public:
     double BatteryV(int robot) const;
     // What the robot's sensor drew last; empty if it draws nothing.
     Image LastImage(int robot) const;
+    const std::vector<WorldBody> &World() const { return world_; }
 
 private:
     struct Member
@@ -93,6 +95,7 @@ private:
     };
     bool UsesGrid() const;
     void FindReach();
+    void LookAtWorld();
     void Expose(int robot, int64_t now_us);
     void DecideOne(Member &member, int64_t now_us);
 
@@ -100,6 +103,8 @@ private:
     std::vector<Member> members_;
     std::vector<Pose2> poses_, near_poses_;
     std::vector<Colour> colours_, near_colours_;
+    std::vector<WorldBody> world_;
+    std::vector<SeenBody> bodies_;
     CellGrid grid_;
     size_t grid_from_;
     double reach_m_ = 0;  // the longest finite one of a sensor; 0: none

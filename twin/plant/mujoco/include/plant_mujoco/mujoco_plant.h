@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "plant/drive_chain.h"
+#include "plant/world_body.h"
 
 namespace twin
 {
@@ -24,6 +25,7 @@ struct MujocoOptions
     bool visuals = false;  // keep what is only looked at: for a viewer or a video
     // For many worlds: servos stand still, and sensors of the file read nothing.
     bool simplified = false;
+    std::vector<WorldBody> world{};  // the solid ones stop robots
 };
 
 // What sweeps run; kSweepPhysics names all of it that changes a result, and stands in every sweep's
@@ -94,6 +96,7 @@ private:
         Wheels offset_mps;  // rim speed asked beyond the chain's, for gains and ground effects
     };
     Member MakeMember(int robot, const Model &model, const Pose2 &start, uint64_t seed) const;
+    void MoveWorld();
     void Drive(Member &member, double dt_s);
     void DragRollers(const Member &member);
     void Sense(Member &member) const;
@@ -105,6 +108,7 @@ private:
     double timestep_s_, wheel_radius_m_, drag_N_;
     Kinematics kinematics_;  // of the MJCF file's geometry
     std::vector<Member> robots_;
+    std::vector<WorldBody> world_;  // one a mocap body
 };
 
 }  // namespace twin
