@@ -23,8 +23,8 @@ def answer(verdict, *findings):
         (
             answer("effect_missing", named("dead_zone", "sure"), named("motor_lag", "group")),
             [
-                "twinmill add dead_zone run.lcmlog --model base.toml -o base_dead_zone.toml",
-                "twinmill add motor_lag run.lcmlog --model base_dead_zone.toml "
+                "twinmill twin add dead_zone run.lcmlog --model base.toml -o base_dead_zone.toml",
+                "twinmill twin add motor_lag run.lcmlog --model base_dead_zone.toml "
                 "-o base_dead_zone_motor_lag.toml",
             ],
         ),

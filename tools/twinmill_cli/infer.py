@@ -125,6 +125,6 @@ def _mending(answer: Answer, logs: list[Path], model: str) -> list[tuple[str, st
             continue
         better = Path(f"{Path(given).stem}_{found.effect}.toml")
         why = "Then" if steps else "To add it, and see by how much the error falls"
-        steps.append((why, command_line(f"add {found.effect}", logs, given, better)))
+        steps.append((why, command_line(f"twin add {found.effect}", logs, given, better)))
         given = str(better)
     return steps

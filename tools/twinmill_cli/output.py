@@ -51,7 +51,7 @@ def begin_telling() -> None:
 
 
 def decide(code: int) -> None:
-    """What became of robots is known and told: no Ctrl-C that comes later changes its exit code."""
+    """Keeps the exit code of what became of robots, and was told, from any later Ctrl-C."""
     _decided[:] = [code]
 
 

@@ -59,7 +59,7 @@ def process(_seeds: int) -> Claim:
         for step, lines in STEPS.items():
             printed = []
             for line in lines:
-                if "score-floor" in line:
+                if FORM in line:
                     ran = _laboratory(folder)
                 printed.append(f"$ {line}\n{_typed(line, folder)}")
             transcript.append((step, "\n".join(printed)))

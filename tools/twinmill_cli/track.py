@@ -474,9 +474,9 @@ def _calibrate(
 ) -> dict:
     """Find a camera's lens from a film of a board that is moved about before it.
 
-    The board is that of `twinmill track tags --board`, or a checkerboard. Show it in
-    all parts of the picture and tilted to all sides; move slowly, and keep it
-    flat. Focus, zoom and resolution must be those of the runs.
+    The board is that of `twinmill track tags --board`, or a checkerboard. Show
+    it in all parts of the picture and tilted to all sides; move slowly, and keep
+    it flat. Focus, zoom and resolution must be those of the runs.
 
     Example: twinmill track calibrate board.mp4 --out camera.toml
     """

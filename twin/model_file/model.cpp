@@ -167,8 +167,9 @@ void Model::AddEffect(const std::string &name, const std::map<std::string, std::
         instance.texts.push_back(given != texts.end() ? given->second : text.default_value);
     }
     if (used != texts.size())
-        throw std::invalid_argument("effect '" + name + "' has no such text; `twinmill twin effects " +
-                                    name + "` lists those it has");
+        throw std::invalid_argument("effect '" + name +
+                                    "' has no such text; `twinmill twin effects " + name +
+                                    "` lists those it has");
     instance.stage = StageName(instance.Bind().act());
     effects.push_back(std::move(instance));
 }

@@ -454,7 +454,7 @@ def test_lens_is_found_from_a_film_of_a_board(tmp_path, kind):
         (["--commands", "none.csv"], "none.csv"),
         (["--out", "run.mp4"], "exists"),
         (["--floor", "none.toml"], "no floor file"),
-        (["--lens", "floor.toml"], "track-calibrate"),
+        (["--lens", "floor.toml"], "twinmill track calibrate"),
     ],
 )
 def test_mistakes_on_the_command_line_get_one_sentence(folder, monkeypatch, arguments, words):
