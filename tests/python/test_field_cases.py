@@ -210,7 +210,7 @@ def test_an_effect_takes_one_share_wherever_it_is_told(judged, cases, tmp_path, 
     assert 0.02 < of["motor_lag"] < 0.05 and sum(of.values()) == pytest.approx(1, abs=0.005)
     told = f"{100 * of['motor_lag']:.0f} %"
     assert f"motor_lag ({told};" in " ".join(str(found).split())
-    assert f"motor_lag ({told})" in found.report(tmp_path / "report").read_text()
+    assert f"motor_lag ({told};" in found.report(tmp_path / "report").read_text()
     model = tmp_path / "e.toml"
     found.model.save(model)
     for target in ("mjcf", "sdf", "urdf", "ros2_control"):

@@ -50,7 +50,7 @@ def _set(
         wanted[name] = value
     model_file = open_model(model, None)
     check_new_file(output, force, [model_file.path])
-    command = command_line(shlex.join(["set", *values]), [], model, output)
+    command = command_line(shlex.join(["twin", "set", *values]), [], model, output)
     text = with_values(model_file, wanted, command)
     with replacing(output, force) as temporary:
         temporary.write_text(text)
