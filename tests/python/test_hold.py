@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is said of robots that are held: by what they have signed, which all else may contradict."""
 
+import io
 import time
 
 import pytest
 import turbopi
+from rich.console import Console
 
 from twinmill.robots import hold
 from twinmill.robots.fleet import TELEMETRY, Fleet, Heard, Robot
 from twinmill.robots.hold import Held
-from twinmill.robots.tell import SIGNED_VERBS, VERBS, Answer, Start
+from twinmill.robots.tell import SIGNED_VERBS, VERBS, Answer, Start, answers
+from twinmill_cli.swarm_screen import answer_table
 
 SESSION, OWN = 7, 100  # and the counter of the start
 STOPPED, TABLE, SCRIPT, FAULT = 0, 1, 2, 3
@@ -182,3 +185,21 @@ def test_a_command_that_a_robot_has_not_obeyed_takes_nothing_over(held):
 def test_a_command_that_was_not_heard_shows_in_what_the_robot_has_obeyed(held):
     _, _, words = held
     assert "whose words were not heard" in words(TABLE, stands=False, counter=OWN + 1)
+
+
+@pytest.mark.parametrize(
+    ("silent_s", "double", "stands"), [(0.1, False, True), (10.0, False, False), (0.1, True, False)]
+)
+def test_only_who_is_heard_and_is_one_is_said_to_stand(silent_s, double, stands):
+    """Telemetry of ten seconds ago tells nothing of now, and of two one may drive."""
+    fleet = Fleet("", connect=lambda _: Nowhere())
+    robot = fleet.robots[3] = Robot(3, telemetry=turbopi.telemetry_t())
+    robot.telemetry.mode = STOPPED
+    robot.telemetry.status_flags = TELEMETRY.STATUS_DOUBLE if double else 0
+    robot.heard_s = time.monotonic() - silent_s
+    command = turbopi.swarm_command_t()
+    command.verb = VERBS.VERB_START
+    (answer,) = answers(fleet, command, {3})
+    assert answer.stands == stands and answer.last_heard_s == pytest.approx(silent_s, abs=0.5)
+    Console(width=100, file=(said := io.StringIO())).print(answer_table([answer]))
+    assert ("not heard for 10 s" in said.getvalue()) == (silent_s > 1)

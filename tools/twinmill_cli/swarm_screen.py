@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from twinmill.robots.fleet import Robot
+from twinmill.robots.fleet import GONE_S, Robot
 from twinmill.robots.tell import Answer
 from twinmill.terminal import Fitting
 from twinmill_cli.swarm_verdict import CLOCK_WARN_S
@@ -23,7 +23,9 @@ def answer_table(given: list[Answer]) -> Fitting:
     for answer in given:
         obeyed = answer.accepted and answer.signed
         said = Text("yes", "green") if obeyed else Text(f"no: {answer.reason}", "red")
-        now = Text("; ".join([answer.mode or "?", *answer.alarms]), "red" if answer.alarms else "")
+        gone = answer.last_heard_s is not None and answer.last_heard_s > GONE_S
+        mode = f"not heard for {answer.last_heard_s:.0f} s" if gone else answer.mode or "?"
+        now = Text("; ".join([mode, *answer.alarms]), "red" if gone or answer.alarms else "")
         table.add_row(f"R{answer.robot_id:02d}", said, now)
     return Fitting(table)
 

@@ -48,9 +48,12 @@ class Answer:
     Attributes:
         accepted: None if it did not answer.
         signed: the answer has the robot's signature; another may be anybody's.
-        stands: it has signed that its motor board took zero, and nothing contradicts it.
+        mode: as it was last heard.
+        stands: it has signed that its motor board took zero, and nothing contradicts it; never of a
+            number that two robots have, nor of one that is not heard any more.
         is_double: two robots speak as this one.
         alarms: what a person must know of it, loudest first.
+        last_heard_s: how long ago it said anything; None if it never did.
     """
 
     robot_id: int
@@ -61,6 +64,7 @@ class Answer:
     stands: bool
     is_double: bool
     alarms: list[str]
+    last_heard_s: float | None = None
 
     def to_json(self) -> dict:
         """As printed."""
@@ -443,10 +447,18 @@ def _answer(robot: Robot, command) -> Answer:
         signed=signed is not None,
         reason=reason,
         mode=robot.mode,
-        stands=robot.confirms(command.seq) if command.verb == VERBS.VERB_STOP else robot.stands,
+        stands=_stands(robot, command) and not robot.is_double,
         is_double=robot.is_double,
         alarms=robot.alarms,
+        last_heard_s=time.monotonic() - robot.heard_s if robot.heard_s else None,
     )
+
+
+def _stands(robot: Robot, command) -> bool:
+    """It confirmed this stop; or, of another command, it says so now."""
+    if command.verb == VERBS.VERB_STOP:
+        return robot.confirms(command.seq)
+    return robot.stands and robot.is_here
 
 
 def _why_silent(robot: Robot) -> str:
