@@ -15,6 +15,7 @@ from twinmill_cli.output import AsJson, busy, deliver
 if working():  # not for --help
     import hashlib
 
+    from twinmill.counted import counted
     from twinmill.files import check_report
     from twinmill.report import Provenance, Section, write_report
     from twinmill.report.phase_figures import (
@@ -151,7 +152,7 @@ def _section(
         f"{phase.seeds} runs (95 % interval {100 * low:.0f} to {100 * high:.0f} %)"
     )
     others = int((phase.hits == phase.hits[best]).sum()) - 1
-    verdict += f", as in {others} other cell{'s' if others > 1 else ''}." if others else "."
+    verdict += f", as in {counted(others, 'other cell')}." if others else "."
     tables = [_next_table(phase, worth, has_rival)] if worth else []
     if match:
         score.append(("experiments as predicted", f"{match['agree']} of {match['of']}", ""))

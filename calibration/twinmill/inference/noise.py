@@ -49,9 +49,7 @@ class Noise:
         """(..., 3 W) white errors or columns of (..., W, 3), channel after channel."""
         out = np.empty((*rows.shape[:-2], 3, rows.shape[-2]))
         for c in range(3):
-            ar, ma, scale = self._filters[c]
-            for part in stretches:
-                out[..., c, part] = lfilter(ar, ma, rows[..., part, c], axis=-1) / scale
+            _filter(rows[..., c], stretches, self._filters[c], out[..., c, :])
         if self.weight is not None:
             out *= self.weight
         return out.reshape(*rows.shape[:-2], 3 * rows.shape[-2])
@@ -128,9 +126,22 @@ def _white(
 ) -> tuple[np.ndarray, float]:
     """(K, W) white rows of one channel under a noise, and the scale of its innovations."""
     a = np.exp(-step_s / np.clip(np.exp(logs[2]), *MEMORY_S))
-    ar, ma, scale = arma(np.exp(logs[0]), np.exp(logs[1]), a)
-    parts = [lfilter(ar, ma, rows[:, k], axis=1) for k in stretches]
-    return np.concatenate(parts, axis=1) / scale, scale
+    filters = arma(np.exp(logs[0]), np.exp(logs[1]), a)
+    white = np.empty(rows.shape)
+    _filter(rows, stretches, filters, white)
+    return white, filters[2]
+
+
+def _filter(
+    rows: np.ndarray,
+    stretches: Sequence[slice],
+    filters: tuple[np.ndarray, np.ndarray, float],
+    out: np.ndarray,
+) -> None:
+    """Whitens (..., W) rows by the filters of `arma` into `out`, each stretch by itself."""
+    ar, ma, scale = filters
+    for part in stretches:
+        out[..., part] = lfilter(ar, ma, rows[..., part], axis=-1) / scale
 
 
 def _seen(columns: np.ndarray, stretches, logs: np.ndarray, step_s: float) -> np.ndarray:
