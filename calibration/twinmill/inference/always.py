@@ -75,11 +75,12 @@ def _lasts(effects: tuple[str, ...]) -> bool:
 
 def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     words = len({k.depends_on for k in p.kernels}) + 1
-    linear = h.linear(view.fitter.whiten)
+    linear = bare = h.linear(view.fitter.whiten)
     found: list[tuple[Kernel, float]] = []
     prior = 0.0
     while len(found) < MOST:
-        own = evidence(h, view, None, _white(view, found))
+        beside = _white(view, found)
+        own = evidence(h, view, bare if beside is None else bare.with_columns(beside))
         forms = np.array(
             [sum(k.depends_on == kernel.depends_on for k in p.kernels) for kernel in p.kernels]
         )

@@ -21,13 +21,16 @@ def log_evidence(y: np.ndarray, x: np.ndarray) -> float:
 
 def _root(x: np.ndarray) -> np.ndarray:
     """(P, P) Cholesky factor of 1 + x x'."""
-    gram = x @ x.T
-    gram[np.diag_indices_from(gram)] += 1.0
     try:
-        return np.linalg.cholesky(gram)
+        return np.linalg.cholesky(_with_prior(x @ x.T))
     except np.linalg.LinAlgError:  # columns so large and alike that squares of them hide the 1
         upper = np.linalg.qr(np.concatenate([np.eye(len(x)), x.T]), mode="r")
         return (upper * np.sign(np.diag(upper))[:, None]).T
+
+
+def _with_prior(gram: np.ndarray) -> np.ndarray:
+    gram[np.diag_indices_from(gram)] += 1.0
+    return gram
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,14 @@ class Linear:
 
     def with_columns(self, more: np.ndarray) -> "Linear":
         """The model with more columns (K, R)."""
-        return Linear.of(self.y, np.concatenate([self.x, more]))
+        x, cross = np.concatenate([self.x, more]), more @ self.basis.T
+        try:
+            own = np.linalg.cholesky(_with_prior(more @ more.T - cross @ cross.T))
+        except np.linalg.LinAlgError:
+            return Linear.of(self.y, x)
+        low = np.block([[self.low, np.zeros_like(cross.T)], [cross, own]])
+        push = more @ self.y - cross @ self.half
+        return Linear(self.y, x, low, np.r_[self.half, solve_triangular(own, push, lower=True)])
 
     def projected(self, columns: np.ndarray, gram: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gram matrix (K, K) and products with y (K,) of columns, once d has taken its part."""

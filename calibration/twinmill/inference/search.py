@@ -82,9 +82,11 @@ class Search:
         self._exchange()
         return self
 
-    def likely(self) -> list[tuple[str, ...]]:
-        """Sets of effects that were fitted, likeliest first."""
-        return sorted(self.fitted, key=self._log_posterior, reverse=True)
+    def likely(self, within: float = np.inf) -> list[tuple[str, ...]]:
+        """Sets of effects that were fitted, within a log odds of the likeliest, which is first."""
+        log = {names: self._log_posterior(names) for names in self.fitted}
+        order = sorted(log, key=log.__getitem__, reverse=True)
+        return [names for names in order if log[names] >= log[order[0]] - within]
 
     def polished(self, effects: tuple[str, ...]) -> Hypothesis:
         """A set fitted anew with all slopes where its numbers are now."""
@@ -94,9 +96,8 @@ class Search:
     def _exchange(self) -> None:
         asked: set[tuple[tuple[str, ...], str]] = set()
         for _ in range(SETS):
-            order = self.likely()
-            least = self._log_posterior(order[0]) - NEAR
-            for names in [k for k in order if self._log_posterior(k) > least][:SETS]:
+            order = self.likely(NEAR)
+            for names in order[:SETS]:
                 for name in _last_of_kinds(names) if len(names) > 1 else ():
                     if (names, name) not in asked:
                         asked.add((names, name))
@@ -158,7 +159,7 @@ class Search:
         return found
 
     def _keep(self, h: Hypothesis) -> None:
-        self.fitted[h.effects] = evidence(h, self.view)
+        self.fitted[h.effects] = evidence(h, self.view, h.linear(self.view.fitter.whiten))
 
     def _log_posterior(self, names: tuple[str, ...]) -> float:
         """Of a set at its best: alone or with the likeliest dependence, up to a constant."""
@@ -181,23 +182,15 @@ def log_prior_of_effects(count: int, candidates: int) -> float:
     return float(each + max(count - 1, 0) * np.log(PRIORS.further))
 
 
-def evidence(
-    h: Hypothesis,
-    view: View,
-    cov: np.ndarray | None = None,
-    beside: np.ndarray | None = None,
-) -> Evidence:
+def evidence(h: Hypothesis, view: View, linear: Linear, cov: np.ndarray | None = None) -> Evidence:
     """Evidence of a hypothesis alone and with each dependence.
 
     Args:
         h: the hypothesis.
         view: under a noise.
+        linear: its linear model, with all that is there as well.
         cov: prior covariance in the place of its own.
-        beside: (K, R) white columns of a dependence that is there as well.
     """
-    linear = h.linear(view.fitter.whiten, cov)
-    if beside is not None and len(beside):
-        linear = linear.with_columns(beside)
     taken = _taken(h, view)
     # one product: the columns are long, and reading them takes the time
     rows = np.concatenate([linear.basis, taken, linear.y[None]])

@@ -2,6 +2,7 @@
 """The table of evidence: sets of effects, each alone and with nameless dependences."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -17,7 +18,8 @@ from twinmill.inference.problem import Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
 from twinmill.model.parameters import effect_names
 
-COMPARED = 10  # sets of the table ...
+COMPARED = 10  # sets of the table, within ...
+BEYOND = 12.0  # ... this log odds of the best: one in 160,000 decides nothing ...
 WHOLE = 4  # ... of which so many also with a stale base and with two dependences
 WORTH = 1.5  # least gain of a further moment: half of what one costs
 DRAWS = 60  # of blocks, for the spread of estimates
@@ -79,7 +81,7 @@ def table_of(search: Search) -> Table:
     its likeliest dependence. With one noise for all, slow drive noise is told as a dependence on
     time.
     """
-    p, order = search.problem, search.likely()
+    p, order = search.problem, search.likely(BEYOND)
     inside = [k for k in search.fitted if set(k) < set(order[0])]
     kept = list(dict.fromkeys([(), *order[:COMPARED], *inside]))
     whole = {(), *order[:WHOLE]}
@@ -227,7 +229,7 @@ class _Comparison:
 
     def _moments(self, cov: np.ndarray | None) -> tuple[_Beside, _Beside]:
         """Moments as often as the base's own log had them, and as news."""
-        bare = self.h.linear(self.view.fitter.whiten, cov)
+        bare = self._bare(cov)
         found = moments.find(bare, *self.view.moments, WORTH)
         beside = []
         for rate, words in ((self.problem.rate, ()), (Rate(), (MOMENTS,))):
@@ -305,11 +307,18 @@ class _Comparison:
         )
 
     def _evidence(self, beside: _Beside) -> Evidence:
-        return evidence(self.h, self.view, beside.cov, beside.white)
+        return evidence(self.h, self.view, self._linear(beside), beside.cov)
 
     def _linear(self, beside: _Beside) -> Linear:
-        linear = self.h.linear(self.view.fitter.whiten, beside.cov)
-        return linear.with_columns(beside.white) if len(beside.white) else linear
+        bare = self._bare(beside.cov)
+        return bare.with_columns(beside.white) if len(beside.white) else bare
+
+    def _bare(self, cov: np.ndarray | None) -> Linear:
+        return self._known if cov is None else self.h.linear(self.view.fitter.whiten, cov)
+
+    @cached_property
+    def _known(self) -> Linear:
+        return self.h.linear(self.view.fitter.whiten)
 
     def _alone(self, beside: _Beside) -> Entry:
         """The entry with no more than what is beside."""
