@@ -172,6 +172,11 @@ class RobotModel:
         why = f"{where} the robot moves as told; the real one moves {', '.join(told)}"
         return [Left("gains of speed and turning", why)] if told else []
 
+    def wheels_left(self) -> list[Left]:
+        """Wheels that a file needs to stand on, of a robot whose wheels nobody knows."""
+        why = "the model knows none; four mecanum ones without a top speed stand in for them"
+        return [Left("wheels", why)] if self.model.wheel_kind == "none" else []
+
     def sensor_left(self, why: str, *, partly: bool = False) -> list[Left]:
         """The camera's bit, if the model has a camera."""
         has = "sensor" in tomlkit.parse(self.file.text)

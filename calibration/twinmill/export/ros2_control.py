@@ -4,7 +4,7 @@
 from twinmill.arguments import option
 from twinmill.export.carried import ALL, Left, RobotModel
 from twinmill.export.drive import drive_of, wheel_gains
-from twinmill.export.steady import TOPS, limits_of, top_speed_unknown
+from twinmill.export.steady import TOPS, limits_of, top_speed_left
 from twinmill.extras import needing
 
 TIMEOUT_S = 0.5  # without a command: stop
@@ -56,8 +56,8 @@ def _base_left(robot: RobotModel) -> list[Left]:
     why = "ros2_control has no place for it"
     left = robot.base_left(why, "ros2_control has its top speeds alone")
     if missing := [way for way in _axes(robot).values() if way not in limits_of(robot).body]:
-        clause = top_speed_unknown(robot, f"the controller has no limit {' and '.join(missing)}")
-        left.append(Left("top speed", clause))
+        so = f"the controller has no limit {' and '.join(missing)}"
+        left.append(top_speed_left(robot, so))
     forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
     if sideways != forward and robot.model.wheel_kind == "mecanum":
         why = (

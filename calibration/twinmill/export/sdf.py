@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from twinmill.export.carried import ALL, HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
-from twinmill.export.steady import TOPS, limits_of, top_speed_unknown
+from twinmill.export.steady import TOPS, limits_of, top_speed_left
 
 VERSION = "1.9"  # Gazebo Fortress and later
 DRIVES = {
@@ -78,14 +78,15 @@ def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
 def _left(robot: RobotModel) -> list[Left]:
     plain = robot.model.wheel_kind == "differential"
     left = [
+        *robot.wheels_left(),
         *robot.gains_left("in Gazebo"),
         *robot.base_left("SDF has no place for it", "SDF has its top speed alone"),
     ]
     if robot.model.wheel_kind not in DRIVES:
-        left.append(Left("drive", f"Gazebo has none for {robot.model.wheel_kind} wheels"))
-    if robot.model.wheels() and limits_of(robot).rims_mps is None:
-        clause = top_speed_unknown(robot, "the joints have no limit")
-        left.append(Left("top speed of the wheels", clause))
+        why = "the file brings none for such wheels; add Gazebo's VelocityControl to its model"
+        left.append(Left("drive", why))
+    if robot.model.wheel_kind != "none" and limits_of(robot).rims_mps is None:
+        left.append(top_speed_left(robot, "the joints have no limit"))
     if plain and robot.get("robot.half_wheelbase_m"):
         why = "Gazebo turns four plain wheels in curves about one axle, not about the middle"
         left.append(Left("middle of curves", why))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import twinmill_native as native
 
-from twinmill.export.carried import RobotModel
+from twinmill.export.carried import Left, RobotModel
 
 DUTIES_PCT = np.arange(-100, 101)
 CURVES = ("dead_zone", "speed_curve")
@@ -60,20 +60,21 @@ def limits_of(robot: RobotModel) -> Limits:
     return Limits(_rims_mps(robot.model), _body(robot.model), _accelerations(robot))
 
 
-def top_speed_unknown(robot: RobotModel, so: str) -> str:
-    """A clause on what a model lacks, what follows for a file, and what to put into the model."""
-    if robot.model.drive not in ("twist", "wheel_speed") or not robot.model.wheels():
-        return f"the model has no key for it, so {so}; set it in this file"
-    return (
+def top_speed_left(robot: RobotModel, so: str) -> Left:
+    """What a model lacks, what follows for a file, and what to put into the model."""
+    if robot.model.drive == "steering":
+        return Left("top speed", f"the model has no key for it, so {so}; set it in this file")
+    return Left(
+        "top speed",
         f"the model knows none, so {so}; append [[effect]], "
-        'name = "wheel_limit", pace_s_per_m = 1 / (top speed of a rim in m/s) to the model file'
+        'name = "wheel_limit", pace_s_per_m = 1 / (top speed of a rim in m/s) to the model file',
     )
 
 
 def _rims_mps(model: native.Model) -> np.ndarray | None:
-    count = len(model.wheels())
-    if not count or model.drive == "steering":
+    if model.wheel_kind == "none" or model.drive == "steering":
         return None
+    count = len(model.wheels())
     if model.drive == "duty":
         return np.abs(rim_table(model)).max(axis=0)
     turns = [_told(model, sign * np.eye(3)[2]) for sign in (-1, 1)]

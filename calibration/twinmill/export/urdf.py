@@ -7,7 +7,7 @@ from copy import deepcopy
 import numpy as np
 
 from twinmill.export.carried import ALL, HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
-from twinmill.export.steady import TOPS, limits_of, top_speed_unknown
+from twinmill.export.steady import TOPS, limits_of, top_speed_left
 
 EFFORT_NM = 1000.0  # a joint must state a limit, and the model knows none
 CARRIED = {
@@ -80,13 +80,13 @@ def _left(robot: RobotModel) -> list[Left]:
     why = "URDF holds geometry, masses and limits alone"
     limits = limits_of(robot)
     left = [
+        *robot.wheels_left(),
         *robot.gains_left("moved by its joints"),
         *robot.base_left(why, "URDF has its top speed alone, as the joints' limit"),
         *robot.sensor_left(why),
     ]
-    if robot.model.wheels() and limits.rims_mps is None:
-        clause = top_speed_unknown(robot, "the joints have no limit")
-        left.append(Left("top speed of the wheels", clause))
+    if robot.model.wheel_kind != "none" and limits.rims_mps is None:
+        left.append(top_speed_left(robot, "the joints have no limit"))
     if robot.supports_x_m():
         why = "URDF has no friction; tell the program that front_support and rear_support slide"
         left.append(Left("friction", why))
