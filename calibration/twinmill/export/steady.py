@@ -77,9 +77,9 @@ def _rims_mps(model: native.Model) -> np.ndarray | None:
     count = len(model.wheels())
     if model.drive == "duty":
         return np.abs(rim_table(model)).max(axis=0)
-    turns = [_told(model, sign * np.eye(3)[2]) for sign in (-1, 1)]
+    ways = [_told(model, sign * np.eye(3)[i]) for sign in (-1, 1) for i in (0, 2)]
     limited = only(model, ("wheel_limit", "wheel_gain"))
-    rims_mps = np.abs(_steady(limited, np.array(turns))[:, 3 : 3 + count]).max(axis=0)
+    rims_mps = np.abs(_steady(limited, np.array(ways))[:, 3 : 3 + count]).max(axis=0)
     return rims_mps if np.all((rims_mps > 0) & (rims_mps < KNOWN)) else None
 
 
