@@ -220,6 +220,20 @@ def test_a_drives_limits_are_those_of_the_real_body(to, folder, text_of):
     assert found["angular_acceleration"] == pytest.approx((-0.8 * 8, 0.8 * 8))
 
 
+def test_a_mecanum_controller_may_be_told_what_its_wheels_can(folder, text_of):
+    """By hand, inverse kinematics of its radius: at each axis' limit a rim is at its top speed."""
+    gains = {"forward_gain": 0.9, "sideways_gain": 0.6, "yaw_gain": 0.8}
+    export(text_of("twist", "mecanum", **gains) + LIMIT.format("wheel"), "ros2_control")
+    told = yaml.safe_load((folder / "m.ros2_control").read_text())
+    told = told["mecanum_drive_controller"]["ros__parameters"]
+    kinematics = told["kinematics"]
+    lever_m = kinematics["sum_of_robot_center_projection_on_X_Y_axis"]
+    for axis, arm in (("linear.x", 1), ("linear.y", 1), ("angular.z", lever_m)):
+        wheel_radps = told[f"{axis}.max_velocity"] * arm / kinematics["wheels_radius"]
+        assert wheel_radps == pytest.approx(TOP_MPS / RADIUS_M, rel=1e-4)
+        assert told[f"{axis}.min_velocity"] == -told[f"{axis}.max_velocity"]
+
+
 def test_mujoco_does_not_drive_faster_than_the_limit_either(folder, text_of):
     """Told ten times as much: rims at their top, so the body, gain of the floor by top speed."""
     for drive, limit, told in (("wheel_speed", "wheel", 120.0), ("twist", "speed", 4.0)):

@@ -56,7 +56,7 @@ def _base_left(robot: RobotModel) -> list[Left]:
     why = "ros2_control has no place for it"
     left = robot.base_left(why, "ros2_control has its top speeds alone")
     if missing := [way for way in _axes(robot).values() if way not in limits_of(robot).body]:
-        so = f"the controller has no limit {' and '.join(missing)}"
+        so = f"the controller has no limit of speed ({', '.join(missing)})"
         left.append(top_speed_left(robot, so))
     forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
     if sideways != forward and robot.model.wheel_kind == "mecanum":
@@ -85,17 +85,18 @@ def _axes(robot: RobotModel) -> dict[str, str]:
 
 
 def _limits(robot: RobotModel) -> dict[str, float]:
-    """https://control.ros.org: what is not set is not limited; slowing down has limits below 0."""
-    limits, told = limits_of(robot), {}
+    """https://control.ros.org: what is not set is not limited; slowing down has limits below 0.
+
+    They are of what the controller is told, which sideways is more than what the robot does of it.
+    """
+    limits, gains, told = limits_of(robot), robot.gains(), {}
     for axis, way in _axes(robot).items():
+        scale = gains["ahead"] / gains[way] if way == "sideways" else 1.0
         if way in limits.body:
-            lowest, highest = limits.body[way]
-            told |= {
-                f"{axis}.max_velocity": _short(highest),
-                f"{axis}.min_velocity": _short(lowest),
-            }
+            lowest, highest = (_short(scale * top) for top in limits.body[way])
+            told |= {f"{axis}.max_velocity": highest, f"{axis}.min_velocity": lowest}
         if way in limits.accelerations:
-            most = _short(limits.accelerations[way])
+            most = _short(scale * limits.accelerations[way])
             told |= {f"{axis}.max_acceleration": most, f"{axis}.max_deceleration": -most}
     return told
 

@@ -56,7 +56,6 @@ def rcl(folder: Path) -> Told:
         )
         for axis in axes
     ]
-    top_mps = (TOP_MPS * FORWARD_GAIN, TOP_MPS, TOP_MPS * FORWARD_GAIN)
     joints = [mecanum(name, f"{k}_wheel_command_joint_name") for k in ("front_left", "rear_right")]
     return {
         "rate, a whole number": mecanum("controller_manager", "update_rate") == ("integer", 45),
@@ -66,7 +65,7 @@ def rcl(folder: Path) -> Told:
         "radius of mecanum wheels": _is(mecanum(name, "kinematics.wheels_radius"), radius_m),
         "no offset, a number": _is(mecanum(name, "kinematics.base_frame_offset.x"), 0),
         "radius of plain wheels": _is(plain("diff_drive_controller", "wheel_radius"), radius_m),
-        "top speeds, numbers": all(map(_is, tops, top_mps)),
+        "top speeds, numbers": all(_is(top, TOP_MPS * FORWARD_GAIN) for top in tops),
         "joints, a list": plain("diff_drive_controller", "left_wheel_names") == ("strings", left),
     }
 
