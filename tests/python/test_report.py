@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 import io
+import re
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from rich.console import Console
 
+import twinmill as tm
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import Comparison, compare
 from twinmill.model.model_file import ModelFile
@@ -122,3 +125,35 @@ def test_no_word_of_a_table_is_lost_in_a_narrow_terminal(section, columns):
         heads = {word for column in table.columns for word in column.split()}
         assert told | heads <= words
         assert max(map(len, console.file.getvalue().splitlines())) <= columns
+
+
+def noise_told(sensor_m, model_text, tmp_path):
+    """What a table says of the noise of arcs by algebra, each place `sensor_m` off."""
+    period_s, rng = 0.02, np.random.default_rng(1)
+    commands_t_s = np.arange(0, 40, 2.0)
+    commands = np.column_stack(
+        [rng.uniform(0.05, 0.3, 20), np.zeros(20), rng.choice([-0.8, 0, 0.5], 20)]
+    )
+    t_s = np.arange(0, 40, period_s)
+    v, w = np.repeat(commands, round(2 / period_s), axis=0)[:-1, ::2].T
+    theta_rad = np.concatenate([[0], np.cumsum(w * period_s)])
+    chord_m = v * period_s * np.sinc(w * period_s / 2 / np.pi)
+    towards = np.exp(1j * (theta_rad[:-1] + w * period_s / 2))
+    place = np.concatenate([[0], np.cumsum(chord_m * towards)])
+    pose = np.column_stack([place.real, place.imag, theta_rad])
+    pose[:, :2] += sensor_m * rng.normal(size=(len(pose), 2))
+    text = model_text("m", motor_lag_s=0).replace('"duty"', '"twist"')
+    text = text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")
+    (tmp_path / "m.toml").write_text(text)
+    log = tm.Log.from_arrays(t_s, pose, commands_t_s, commands, kind="twist", same_clock=True)
+    (told,) = re.findall(r"noise\s+(.*?)\s+floor ", str(tm.compare(log, tmp_path / "m.toml")), re.S)
+    return " ".join(told.split())
+
+
+def test_a_log_without_noise_is_said_to_have_none(model_text, tmp_path):
+    """Motion by algebra has no noise but that of rounding, and that is none; 0.3 mm are told."""
+    assert noise_told(0, model_text, tmp_path) == "none found"
+    told = re.match(
+        r"each measured pose is off by ([0-9.]+) mm", noise_told(3e-4, model_text, tmp_path)
+    )
+    assert float(told[1]) == pytest.approx(0.3, rel=0.1)

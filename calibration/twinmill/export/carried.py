@@ -18,6 +18,7 @@ HULL_HEIGHT_M = 0.08  # of the body: no model file states it
 WHEEL_SHARE = 0.03  # of the robot's mass, each, as in the twin's own MuJoCo robots
 WHEEL_WIDTH = 0.8  # of its radius
 OF_A_LOG = "clock"  # family of effects that say nothing of the robot
+ALL = ("*",)  # parameters of an effect that a file carries whole
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,14 @@ class Left:
         why: a clause.
         share: of the squared error that it explains, 0..1; None where nobody has told.
         together_with: other effects that were added at the same time, which the share counts too.
+        partly: the file has a part of it, which `why` names.
     """
 
     name: str
     why: str
     share: float | None = None
     together_with: tuple[str, ...] = ()
+    partly: bool = False
 
     def sentence(self) -> str:
         """What the file carries of the effect, or why not, with its share of the error."""
@@ -93,11 +96,31 @@ class RobotModel:
         return _cylinder(self.wheel_mass_kg, radius_m, WHEEL_WIDTH * radius_m)
 
     @property
-    def top_rim_mps(self) -> float | None:
-        """Highest rim speed of a duty table; None where the model states none."""
-        names = [v["name"] for v in self.model.values()]
-        table = [n for n in names if n.startswith("base.wheel_speed_mps.")]
-        return max(map(self.get, table)) if self.model.drive == "duty" else None
+    def touch_radius_m(self) -> float:
+        """Of the hull where it touches others, by the effects `collision`; never 0."""
+        more_m = sum(v["radius_m"] for v in self.values_of("collision"))
+        return max(0.001, self.get("robot.body_radius_m") + more_m)
+
+    @property
+    def rubbing(self) -> float:
+        """Coulomb's coefficient of the hull against others, by the effects `collision`."""
+        return sum(v["friction"] for v in self.values_of("collision"))
+
+    def tracked(self) -> tuple[float, float, float]:
+        """Place (m) and turn (rad) in the robot's frame of what motion capture sees of it."""
+        x_m, y_m = (sum(v[k] for v in self.values_of("marker_offset")) for k in ("x_m", "y_m"))
+        return x_m, y_m, sum(v["bias_rad"] for v in self.values_of("heading_bias"))
+
+    def gains(self) -> dict[str, float]:
+        """How far it goes of what its wheels make of a command, by the ways that it can go."""
+        gains = {
+            "ahead": self.get("base.forward_gain") * self.get("theta_a1"),
+            "sideways": self.get("base.sideways_gain") * self.get("theta_a1"),
+            "turning": self.get("base.yaw_gain") * self.get("theta_a2"),
+        }
+        if self.model.wheel_kind in ("differential", "ackermann"):
+            del gains["sideways"]
+        return gains
 
     def support_radius_m(self) -> float:
         """A ball between the hull's underside, which is at the axles' height, and the floor."""
@@ -123,29 +146,76 @@ class RobotModel:
             found.append((instance, card, values))
         return found
 
-    def base_left(self, why: str) -> list[Left]:
-        """Duty table, lag and noise of the base, as far as the model has them."""
-        has = {
-            "duty table": self.model.drive == "duty",
-            "motor lag": self.get("base.motor_lag_s") > 0,
-            "noise": True,
-        }
-        return [Left(name, why) for name, there in has.items() if there]
+    def values_of(self, effect: str) -> list[dict[str, float]]:
+        """Of every effect of that name."""
+        return [values for _, card, values in self.effects() if card["name"] == effect]
 
-    def left_effects(self, carried: Sequence[str], target: str) -> list[Left]:
-        """Effects that are not among those carried."""
+    def base_left(self, why: str, duties: str) -> list[Left]:
+        """Duty table, lag and noise of the base, as far as the model has them.
+
+        Args:
+            why: none of them is carried.
+            duties: why no more of the table is carried than its top speed.
+        """
+        table = [Left("duty table", duties, partly=True)] if self.model.drive == "duty" else []
+        names = ("sensor_m", "sensor_rad", "drive_mps", "drive_radps")
+        has = {
+            "motor lag": self.get("base.motor_lag_s") > 0,
+            "noise": any(self.get(f"noise.{name}") for name in names),
+        }
+        return [*table, *(Left(name, why) for name, there in has.items() if there)]
+
+    def gains_left(self, where: str) -> list[Left]:
+        """How far the real robot goes of what it is told, where wheels roll as they turn."""
+        words = {"ahead": "ahead", "sideways": "sideways", "turning": "in turns"}
+        told = [f"{g:.3g} times as far {words[way]}" for way, g in self.gains().items() if g != 1]
+        why = f"{where} the robot moves as told; the real one moves {', '.join(told)}"
+        return [Left("gains of speed and turning", why)] if told else []
+
+    def wheels_left(self) -> list[Left]:
+        """Wheels that a file needs to stand on, of a robot whose wheels nobody knows."""
+        why = "the model knows none; four mecanum ones without a top speed stand in for them"
+        return [Left("wheels", why)] if self.model.wheel_kind == "none" else []
+
+    def sensor_left(self, why: str, *, partly: bool = False) -> list[Left]:
+        """The camera's bit, if the model has a camera."""
+        has = "sensor" in tomlkit.parse(self.file.text)
+        return [Left("sensor", why, partly=partly)] if has else []
+
+    def left_effects(
+        self,
+        target: str,
+        carried: Mapping[str, Sequence[str]],
+        parts: Mapping[str, str],
+        reasons: Mapping[str, str],
+    ) -> list[Left]:
+        """Effects that are not carried whole; one whose values are all neutral does nothing.
+
+        Args:
+            target: what lacks them.
+            carried: parameters that the file has, by the effect's name; of ALL: each.
+            parts: what it has of another effect, a clause by the effect's name.
+            reasons: why it has nothing of another one, where that is not for want of a place.
+        """
         left = []
-        for instance, card, _ in self.effects():
-            name = card["name"]
-            if name in carried:
+        for instance, card, values in self.effects():
+            name, neutral = card["name"], {p["name"]: p["neutral"] for p in card["parameters"]}
+            acts = [key for key, value in values.items() if value != neutral.get(key)]
+            own = carried.get(name, ())
+            missing = [key for key in acts if key not in own and own is not ALL]
+            if not missing and (acts or not card["texts"]):
                 continue
-            why = (
-                "belongs to a recording's clocks, not to the robot"
-                if card["family"] == OF_A_LOG
-                else f"{target} has nothing for {card['equation']}"
-            )
+            has = [key for key in acts if key not in missing]
+            if card["family"] == OF_A_LOG:
+                why = "belongs to a recording's clocks, not to the robot"
+            elif name in parts:
+                why = parts[name]
+            elif has:
+                why = f"{target} has {' and '.join(has)} alone, not {' and '.join(missing)}"
+            else:
+                why = reasons.get(name, f"{target} has nothing for {card['equation']}")
             share, others = self.share_of(instance)
-            left.append(Left(instance, why, share, others))
+            left.append(Left(instance, why, share, others, partly=name in parts or bool(has)))
         return left
 
     def share_of(self, instance: str) -> tuple[float | None, tuple[str, ...]]:

@@ -20,36 +20,21 @@ class Drive:
     Attributes:
         radius_m: of the wheels, gain of speed put in.
         scale: of the robot's half wheelbase and half track, so that it turns as fast as told.
-        top_mps: highest speed forward; None where the model states none.
-        top_radps: of turning on the spot.
     """
 
     radius_m: float
     scale: float
-    top_mps: float | None
-    top_radps: float | None
 
 
 def drive_of(robot: RobotModel) -> Drive:
-    """Of a robot with its gains."""
-    forward = robot.get("base.forward_gain") * robot.get("theta_a1")
-    yaw = robot.get("base.yaw_gain") * robot.get("theta_a2")
-    top_mps = robot.top_rim_mps
-    turning = None
-    if top_mps:
-        radius_m = robot.get("robot.wheel_radius_m")
-        per_radps = max(abs(w) for w in robot.model.wheel_speeds(0, 0, 1)) * radius_m
-        turning = yaw * top_mps / per_radps
-    return Drive(
-        robot.get("robot.wheel_radius_m") * forward,
-        forward / yaw,
-        forward * top_mps if top_mps else None,
-        turning,
-    )
+    """Numbers of a robot with its gains."""
+    gains = robot.gains()
+    radius_m = robot.get("robot.wheel_radius_m") * gains["ahead"]
+    return Drive(radius_m, gains["ahead"] / gains["turning"])
 
 
 def wheel_gains(robot: RobotModel) -> np.ndarray:
     """(K,) speed of each wheel over what it is told, by the effects `wheel_gain`."""
-    found = [v for _, card, v in robot.effects() if card["name"] == "wheel_gain"]
+    found = robot.values_of("wheel_gain")
     ones = np.ones(len(robot.model.wheels()))
     return np.prod([ones, *(1 + np.array([*v.values()])[: len(ones)] for v in found)], axis=0)

@@ -17,14 +17,14 @@ what the wheels make of that part, a column of G, and damped joints:
 """
 
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.arguments import option
-from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+from twinmill.export.carried import ALL, HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
 from twinmill.export.drive import wheel_gains
+from twinmill.export.steady import CURVES, DUTIES_PCT, STATIC, limits_of, only, rim_table
 
 STEP_S = 0.001
 SETTLE_S = 0.001  # of the body behind its wheels
@@ -33,11 +33,11 @@ DELAY_SLOTS_PER_S = 10_000  # commands that a delay keeps: one each step of 0.1 
 # while the sum is rounded to one side.
 ROUNDING_S = 1e-7
 ASPECT = 4 / 3  # of the camera's picture
-CURVES = ("dead_zone", "speed_curve")
-STATIC = (*CURVES, "wheel_gain", "reverse_asymmetry")  # in the duty table
 LAGS = (*CURVES, "motor_lag", "lag_by_duty")
 PLACED = ("marker_offset", "heading_bias", "collision", "view_angle", "view_pan")
-DUTIES_PCT = np.arange(-100, 101)
+SIGHT = (
+    *("view_range", "missed_detection", "false_detection", "vote", "sensor_delay", "occlusion"),
+)
 USUAL_PCT = 75  # a duty between those that robots drive at
 LONG_S = 20.0  # after which no lag is left
 COUPLING = ("mass_offset",)  # linear in the body's velocity, so in the gears
@@ -96,14 +96,6 @@ def mjcf(robot: RobotModel) -> tuple[str, list[Left]]:
     return ET.tostring(root, encoding="unicode") + "\n", left
 
 
-def rim_table(model: native.Model) -> np.ndarray:
-    """(201, K) steady rim speed (m/s) of each wheel at duties -100..100 %, with STATIC effects."""
-    still = _with(model, STATIC)
-    still.set("base.motor_lag_s", 0.0)
-    commands = np.repeat(DUTIES_PCT[:, None] / 100.0, 4, axis=1)
-    return native.steady(still, commands, [], np.zeros((0, 0)))[0][:, 3 : 3 + len(model.wheels())]
-
-
 def lag_table(model: native.Model) -> np.ndarray:
     """(201,) time constant (s) of a wheel after a change to duties -100..100 %.
 
@@ -111,13 +103,13 @@ def lag_table(model: native.Model) -> np.ndarray:
     not move it, as at the next that does.
     """
     lags_s = np.full(101, np.nan)
-    slow = _with(model, LAGS)
+    slow = only(model, LAGS)
     for duty in range(1, 101):
         way_m, then_m = _ways_m(slow, [duty / 100])
         if then_m > 1e-6:
             lags_s[duty] = LONG_S * (1 - way_m / then_m)
     speed_mps = _ways_m(slow, [USUAL_PCT / 100])[1] / LONG_S
-    rolled = _with(model, (*LAGS, "coasting"))
+    rolled = only(model, (*LAGS, "coasting"))
     lags_s[0] = _ways_m(rolled, [USUAL_PCT / 100, 0.0])[1] / speed_mps
     known = np.isfinite(lags_s)
     lags_s = np.interp(np.arange(101), np.flatnonzero(known), lags_s[known])
@@ -146,17 +138,6 @@ def _ahead(model: native.Model) -> np.ndarray:
     return np.rint([wheel["grip"][0] for wheel in model.wheels()])
 
 
-def _with(model: native.Model, effects: tuple[str, ...]) -> native.Model:
-    """The model with these effects alone, on one clock."""
-    kept = model.copy()
-    for i in reversed(range(len(kept.effects))):
-        if kept.effects[i] not in effects:
-            kept.remove_effect(i)
-    kept.set("clock.offset_s", 0.0)
-    kept.set("clock.rate_ppm", 0.0)
-    return kept
-
-
 def _about(robot: RobotModel, left: list[Left]) -> str:
     ctrl = {
         "duty": "rim speed of the wheel in m/s: look a duty up in <custom>, "
@@ -178,19 +159,27 @@ def _about(robot: RobotModel, left: list[Left]) -> str:
 
 
 def _left(robot: RobotModel) -> list[Left]:
-    carried = [*PLACED, *COUPLING, "motor_lag", "input_delay"]
+    carried = dict.fromkeys((*PLACED, *COUPLING, "motor_lag", "input_delay"), ALL)
+    parts = dict.fromkeys(SIGHT, "no bit of detection is made; its numbers are in <custom>")
+    reasons = {}
     if robot.model.drive == "duty":
-        carried += STATIC
+        carried |= dict.fromkeys(STATIC, ALL)
+        parts |= BY_TABLE
     else:
-        carried.append("wheel_gain")
-    target = "stock MuJoCo"
-    left = [
-        replace(item, why=BY_TABLE.get(item.name, item.why))
-        for item in robot.left_effects(carried, target)
-    ]
+        carried["wheel_gain"] = ALL
+    if robot.model.drive == "wheel_speed":
+        carried["wheel_limit"] = ALL
+    elif robot.model.wheel_kind == "differential":
+        carried["speed_limit"] = ALL
+    else:
+        parts["speed_limit"] = "ahead and sideways are limited each alone, so aslant it is faster"
+    if robot.model.drive == "twist":
+        reasons["wheel_limit"] = "the file pushes the body, and its wheels do not turn"
+    left = robot.left_effects("stock MuJoCo", carried, parts, reasons)
     if robot.get("noise.drive_mps") or robot.get("noise.drive_radps"):
         left.append(Left("noise.drive", "MuJoCo adds no noise by itself; its size is in <custom>"))
-    left.append(Left("sensor", "no bit of detection is made; its numbers are in <custom>"))
+    why = "no bit of detection is made; its numbers are in <custom>"
+    left += robot.sensor_left(why, partly=True)
     left.append(Left("motor torque", "the model tells none: the wheels never slip or stall"))
     return left
 
@@ -203,7 +192,7 @@ def _custom(robot: RobotModel, lags_s: np.ndarray) -> ET.Element:
         for wheel, rim_mps in zip(robot.model.wheels(), rim_table(robot.model).T, strict=True):
             _numeric(custom, f"{wheel['name']}_rim_mps", rim_mps)
         _numeric(custom, "lag_s", lags_s)
-        if (rolls := _values(robot, "coasting")) and not _delay_s(robot):
+        if (rolls := robot.values_of("coasting")) and not _delay_s(robot):
             _numeric(custom, "coasting", list(rolls[-1].values()))
     _numeric(custom, "control_period_s", [robot.get("base.control_period_s")])
     for key in ("sensor_m", "sensor_rad", "drive_mps", "drive_s", "drive_radps", "drive_turn_s"):
@@ -235,7 +224,6 @@ def _body(robot: RobotModel) -> ET.Element:
         mass=_n(robot.get("robot.mass_kg")),
         diaginertia=_n(*robot.hull_inertia_kgm2()),
     )
-    touch_m = max(0.001, radius_m + sum(v["radius_m"] for v in _values(robot, "collision")))
     ET.SubElement(
         body,
         "geom",
@@ -243,7 +231,8 @@ def _body(robot: RobotModel) -> ET.Element:
         type="cylinder",
         pos=middle,
         mass="0",
-        size=_n(touch_m, HULL_HEIGHT_M / 2),
+        size=_n(robot.touch_radius_m, HULL_HEIGHT_M / 2),
+        friction=_n(robot.rubbing),
         rgba="0.2 0.5 0.4 0.6",
     )
     for wheel in robot.model.wheels():
@@ -262,7 +251,7 @@ def _body(robot: RobotModel) -> ET.Element:
             rgba="0.1 0.1 0.1 1",
         )
     ET.SubElement(body, "site", name="drive")
-    x_m, y_m, bias_rad = _marker(robot)
+    x_m, y_m, bias_rad = robot.tracked()
     ET.SubElement(
         body,
         "site",
@@ -306,24 +295,39 @@ def _actuators(robot: RobotModel, lag_s: float) -> ET.Element:
     actuator = ET.Element("actuator")
     held = kv
     kv /= np.sum(rows[:, 0] ** 2)  # together they pull forward at kv
+    rims_mps = limits_of(robot).rims_mps
     unit = robot.get("robot.wheel_radius_m") if robot.model.drive == "wheel_speed" else 1.0
     for k, (wheel, row) in enumerate(zip(wheels, rows, strict=True)):
         own = unit * (1.0 if robot.model.drive == "duty" else wheel_gains(robot)[k])
-        actuator.append(
-            _servo(
-                robot, lag_s, name=wheel["name"], row=row / gains @ apart, kv=kv, gain=float(own)
-            )
+        servo = _servo(
+            robot=robot,
+            lag_s=lag_s,
+            name=wheel["name"],
+            row=row / gains @ apart,
+            kv=kv,
+            gain=float(own),
+            top=_top(robot, rims_mps, k, float(own)),
         )
+        actuator.append(servo)
     if not strafes:  # plain wheels hold the robot sideways
-        actuator.append(_servo(robot, lag_s, name="left", row=apart[1], kv=held, gain=0.0))
+        actuator.append(
+            _servo(robot, lag_s, name="left", row=apart[1], kv=held, gain=0.0, top=None)
+        )
     return actuator
+
+
+def _top(robot: RobotModel, rims_mps: np.ndarray | None, k: int, gain: float) -> float | None:
+    """Highest command of a wheel; one told a rim's speed may be told twice the robot's top."""
+    if rims_mps is None:
+        return None
+    return 2 * float(rims_mps.max()) if robot.model.drive == "duty" else float(rims_mps[k]) / gain
 
 
 def _coupling(robot: RobotModel, strafes: bool) -> np.ndarray:
     """(3, 3) velocity that comes of each part of the wheels' own (forward, left, turn)."""
     commands = np.eye(4)
     plain, coupled = (
-        native.steady(_with(robot.model, effects), commands, [], np.zeros((0, 0)))[0][:, :3]
+        native.steady(only(robot.model, effects), commands, [], np.zeros((0, 0)))[0][:, :3]
         for effects in ((), COUPLING)
     )
     if not strafes:
@@ -335,8 +339,12 @@ def _pushes(robot: RobotModel, lag_s: float) -> ET.Element:
     """One for each part of the velocity that a robot is told; the damped joints hold against it."""
     actuator = ET.Element("actuator")
     pushes = (_damping(robot)[:, None] * _velocity_gains(robot)).T
+    pace = max((v["pace_s_per_m"] for v in robot.values_of("speed_limit")), default=0.0)
     for name, row in zip(("forward", "left", "turn"), pushes, strict=True):
-        actuator.append(ET.Element("general", _signal(robot, lag_s, name, row)))
+        options = _signal(robot, lag_s, name, row)
+        if pace > 0 and name != "turn":
+            options["ctrlrange"] = _n(-1 / pace, 1 / pace)
+        actuator.append(ET.Element("general", options))
     return actuator
 
 
@@ -348,7 +356,7 @@ def _damping(robot: RobotModel) -> np.ndarray:
 
 def _velocity_gains(robot: RobotModel) -> np.ndarray:
     """(3, 3) velocity that comes of each part of a velocity told, once the lags are over."""
-    still = _with(robot.model, ("wheel_gain", *COUPLING))
+    still = only(robot.model, ("wheel_gain", *COUPLING))
     told = np.column_stack([np.eye(3), np.zeros(3)])
     return native.steady(still, told, [], np.zeros((0, 0)))[0][:, :3].T
 
@@ -360,13 +368,22 @@ def _grip(wheel: dict) -> np.ndarray:
 
 
 def _servo(
-    robot: RobotModel, lag_s: float, *, name: str, row: np.ndarray, kv: float, gain: float
+    robot: RobotModel,
+    lag_s: float,
+    *,
+    name: str,
+    row: np.ndarray,
+    kv: float,
+    gain: float,
+    top: float | None,
 ) -> ET.Element:
-    """Pulls along `row` (forward, left, turn) until the speed there is `gain` times its filter."""
+    """Pulls along `row` (forward, left, turn) until the speed there is `gain` times its filter.
+
+    Its command is cut to `top`, if there is one.
+    """
     options = _signal(robot, lag_s, name, row)
-    top_mps = robot.top_rim_mps
-    if top_mps:
-        options["ctrlrange"] = _n(-2 * top_mps, 2 * top_mps)
+    if top is not None:
+        options["ctrlrange"] = _n(-top, top)
     options |= {"gainprm": _n(kv * gain), "biastype": "affine", "biasprm": _n(0, 0, -kv)}
     return ET.Element("general", options)
 
@@ -375,7 +392,7 @@ def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict
     """Of an actuator along `row` (forward, left, turn), with the robot's lag and delay."""
     delay_s = _delay_s(robot)
     options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
-    if lag_s > 1e-6 or _values(robot, "coasting"):
+    if lag_s > 1e-6 or robot.values_of("coasting"):
         options |= {"dyntype": "filterexact", "dynprm": _n(lag_s), "actearly": "true"}
     if delay_s > ROUNDING_S:
         options |= {
@@ -386,14 +403,14 @@ def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict
 
 
 def _delay_s(robot: RobotModel) -> float:
-    return sum(v["delay_s"] for v in _values(robot, "input_delay"))
+    return sum(v["delay_s"] for v in robot.values_of("input_delay"))
 
 
 def _lags_s(robot: RobotModel) -> np.ndarray:
     """(201,) time constants at DUTIES_PCT; of other drives the same everywhere."""
     if robot.model.drive == "duty":
         return lag_table(robot.model)
-    more_s = sum(v["extra_s"] for v in _values(robot, "motor_lag"))
+    more_s = sum(v["extra_s"] for v in robot.values_of("motor_lag"))
     return np.full(len(DUTIES_PCT), max(0.0, robot.get("base.motor_lag_s") + more_s))
 
 
@@ -405,17 +422,6 @@ def _sensors(robot: RobotModel) -> ET.Element:
     ET.SubElement(sensor, "framepos", name="position", noise=_n(noise_m), **marker)
     ET.SubElement(sensor, "framequat", name="orientation", noise=_n(noise_rad), **marker)
     return sensor
-
-
-def _marker(robot: RobotModel) -> tuple[float, float, float]:
-    """Where motion capture sees the robot, in its own frame."""
-    x_m, y_m = (sum(v[k] for v in _values(robot, "marker_offset")) for k in ("x_m", "y_m"))
-    return x_m, y_m, sum(v["bias_rad"] for v in _values(robot, "heading_bias"))
-
-
-def _values(robot: RobotModel, effect: str) -> list[dict[str, float]]:
-    """Of every effect of that name."""
-    return [values for _, card, values in robot.effects() if card["name"] == effect]
 
 
 def _n(*values: float) -> str:

@@ -2,8 +2,9 @@
 """A model as parameters for the controllers of ros2_control; joints as in the URDF."""
 
 from twinmill.arguments import option
-from twinmill.export.carried import Left, RobotModel
+from twinmill.export.carried import ALL, Left, RobotModel
 from twinmill.export.drive import drive_of, wheel_gains
+from twinmill.export.steady import TOPS, limits_of, top_speed_left
 from twinmill.extras import needing
 
 TIMEOUT_S = 0.5  # without a command: stop
@@ -27,8 +28,8 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     name = plugin.split("/")[0]
     left = [
         *_base_left(robot),
-        Left("sensor", "ros2_control moves the robot, and sees nothing"),
-        *robot.left_effects(CARRIED.get(kind, ()), "ros2_control"),
+        *robot.sensor_left("ros2_control moves the robot, and sees nothing"),
+        *robot.left_effects("ros2_control", CARRIED[kind], _parts(robot), {}),
     ]
     data = {
         "controller_manager": {
@@ -43,6 +44,7 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
     said += [
         "Radius and distances undo the real robot's gains: it goes and turns as fast as told.",
         "A simulator without these gains needs the URDF's wheel radius and distances instead.",
+        *HEADS.get(kind, ()),
         "Not carried:",
         *(f"- {item.sentence()}" for item in left),
     ]
@@ -51,7 +53,11 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
 
 def _base_left(robot: RobotModel) -> list[Left]:
     """What such controllers do not know of the base."""
-    left = robot.base_left("ros2_control has no place for it")
+    why = "ros2_control has no place for it"
+    left = robot.base_left(why, "ros2_control has its top speeds alone")
+    if missing := [way for way in _axes(robot).values() if way not in limits_of(robot).body]:
+        so = f"the controller has no limit of speed ({', '.join(missing)})"
+        left.append(top_speed_left(robot, so))
     forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
     if sideways != forward and robot.model.wheel_kind == "mecanum":
         why = (
@@ -60,6 +66,39 @@ def _base_left(robot: RobotModel) -> list[Left]:
         )
         left.append(Left("base.sideways_gain", why))
     return left
+
+
+def _parts(robot: RobotModel) -> dict[str, str]:
+    """What the file has of effects that it does not carry whole."""
+    parts = {"wheel_limit": "the body's top speeds alone; the URDF's joints have the wheels' own"}
+    if robot.model.wheel_kind == "mecanum":
+        parts["speed_limit"] = "its axes are limited each alone, so aslant it is faster"
+    if robot.model.drive == "duty":
+        parts |= dict.fromkeys(TOPS, "ros2_control has only the top speeds that it leaves")
+    return parts
+
+
+def _axes(robot: RobotModel) -> dict[str, str]:
+    """Ways that the robot can go by the controller's axes."""
+    axes = {"linear.x": "ahead", "linear.y": "sideways", "angular.z": "turning"}
+    return {axis: way for axis, way in axes.items() if way in robot.gains()}
+
+
+def _limits(robot: RobotModel) -> dict[str, float]:
+    """https://control.ros.org: what is not set is not limited; slowing down has limits below 0.
+
+    They are of what the controller is told, which sideways is more than what the robot does of it.
+    """
+    limits, gains, told = limits_of(robot), robot.gains(), {}
+    for axis, way in _axes(robot).items():
+        scale = gains["ahead"] / gains[way] if way == "sideways" else 1.0
+        if way in limits.body:
+            lowest, highest = (_short(scale * top) for top in limits.body[way])
+            told |= {f"{axis}.max_velocity": highest, f"{axis}.min_velocity": lowest}
+        if way in limits.accelerations:
+            most = _short(scale * limits.accelerations[way])
+            told |= {f"{axis}.max_acceleration": most, f"{axis}.max_deceleration": -most}
+    return told
 
 
 def _mecanum(robot: RobotModel) -> dict:
@@ -78,6 +117,7 @@ def _mecanum(robot: RobotModel) -> dict:
         },
         "base_frame_id": "base_link",
         "odom_frame_id": "odom",
+        **_limits(robot),
     }
 
 
@@ -91,11 +131,6 @@ def _differential(robot: RobotModel) -> dict:
         sides[f"{side}_wheel_names"] = [f"{wheels[k]['name']}_wheel_joint" for k in own]
         # Wheels of one side that differ slip, and drive as their mean does.
         sides[f"{side}_wheel_radius_multiplier"] = _short(gains[own].mean())
-    limits = {}
-    if drive.top_mps and drive.top_radps:
-        for axis, top in (("linear.x", drive.top_mps), ("angular.z", drive.top_radps)):
-            limits[f"{axis}.max_velocity"] = _short(top)
-            limits[f"{axis}.min_velocity"] = -_short(top)
     return {
         **sides,
         "wheel_separation": _short(2 * drive.scale * robot.get("robot.half_track_m")),
@@ -103,7 +138,7 @@ def _differential(robot: RobotModel) -> dict:
         "cmd_vel_timeout": TIMEOUT_S,
         "base_frame_id": "base_link",
         "odom_frame_id": "odom",
-        **limits,
+        **_limits(robot),
     }
 
 
@@ -111,7 +146,11 @@ def _short(value: float) -> float:
     return float(f"{value:.6g}")
 
 
-CARRIED = {"differential": ("wheel_gain",)}
+CARRIED = {
+    "mecanum": {"acceleration_limit": ALL},
+    "differential": {"wheel_gain": ALL, "acceleration_limit": ALL, "speed_limit": ALL},
+}
+HEADS = {"mecanum": ["mecanum_drive_controller obeys limits from its version 6.8 on."]}
 CONTROLLERS = {
     "mecanum": ("mecanum_drive_controller/MecanumDriveController", _mecanum),
     "differential": ("diff_drive_controller/DiffDriveController", _differential),

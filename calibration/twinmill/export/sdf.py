@@ -5,8 +5,8 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
-from twinmill.export.drive import drive_of
+from twinmill.export.carried import ALL, HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+from twinmill.export.steady import TOPS, limits_of, top_speed_left
 
 VERSION = "1.9"  # Gazebo Fortress and later
 DRIVES = {
@@ -18,6 +18,16 @@ ROLLERS = ("mecanum", "omni3")  # wheels that grip along one line of the floor a
 # A plain wheel's grip sideways over that along. Four of them turn as fast as told while this is
 # less than their track over their wheelbase; with one friction for all ways, a third slower.
 PLAIN_GRIP = 0.5
+CARRIED = {
+    "view_angle": ALL,
+    "view_pan": ALL,
+    "view_range": ("factor",),
+    "marker_offset": ALL,
+    "heading_bias": ALL,
+    "wheel_limit": ALL,
+    "collision": ALL,
+}
+LIMITS = ("speed_limit", "acceleration_limit")  # of the body, as Gazebo's drive of plain wheels has
 # Before the name of the attribute that holds a direction of friction still while its wheel turns.
 # Gazebo's physics compares the letters: Fortress with the first prefix, Garden with either, later
 # ones with the second. For XML they are two attributes only if they have two addresses.
@@ -47,10 +57,18 @@ def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
         mass_kg=robot.hull_mass_kg,
         inertia_kgm2=robot.hull_inertia_kgm2(),
     )
+    hull = base.find("collision")
+    hull.find("geometry/cylinder/radius").text = _n(robot.touch_radius_m)
+    _friction(hull, _n(robot.rubbing), _n(robot.rubbing))
     _camera(base, robot, body_m)
     _supports(base, robot)
-    for wheel in robot.model.wheels():
-        _wheel(model, robot, wheel)
+    if any(robot.tracked()):
+        x_m, y_m, turned_rad = robot.tracked()
+        marker = ET.SubElement(model, "frame", name="marker", attached_to="base_link")
+        _text(marker, "pose", _n(x_m, y_m, wheel_m + HULL_HEIGHT_M, 0, 0, turned_rad))
+    rims_mps = limits_of(robot).rims_mps
+    for k, wheel in enumerate(robot.model.wheels()):
+        _wheel(model, robot, wheel, None if rims_mps is None else rims_mps[k])
     if robot.model.wheel_kind in DRIVES:
         _drive(model, robot)
     ET.indent(root)
@@ -58,28 +76,29 @@ def sdf(robot: RobotModel) -> tuple[str, list[Left]]:
 
 
 def _left(robot: RobotModel) -> list[Left]:
-    left = [*_gains_left(robot), *robot.base_left("SDF has no place for it")]
+    plain = robot.model.wheel_kind == "differential"
+    left = [
+        *robot.wheels_left(),
+        *robot.gains_left("in Gazebo"),
+        *robot.base_left("SDF has no place for it", "SDF has its top speed alone"),
+    ]
     if robot.model.wheel_kind not in DRIVES:
-        left.append(Left("drive", f"Gazebo has none for {robot.model.wheel_kind} wheels"))
-    if robot.model.wheel_kind == "differential" and robot.get("robot.half_wheelbase_m"):
+        why = "the file brings none for such wheels; add Gazebo's VelocityControl to its model"
+        left.append(Left("drive", why))
+    if robot.model.wheel_kind != "none" and limits_of(robot).rims_mps is None:
+        left.append(top_speed_left(robot, "the joints have no limit"))
+    if plain and robot.get("robot.half_wheelbase_m"):
         why = "Gazebo turns four plain wheels in curves about one axle, not about the middle"
         left.append(Left("middle of curves", why))
-    left.append(Left("sensor", "a camera's picture is carried, no bit of detection"))
-    return [*left, *robot.left_effects(("view_angle", "view_pan", "view_range"), "Gazebo")]
-
-
-def _gains_left(robot: RobotModel) -> list[Left]:
-    """How far the real robot goes of what it is told, since Gazebo's wheels roll as they turn."""
-    gains = {
-        "ahead": robot.get("base.forward_gain") * robot.get("theta_a1"),
-        "sideways": robot.get("base.sideways_gain") * robot.get("theta_a1"),
-        "in turns": robot.get("base.yaw_gain") * robot.get("theta_a2"),
-    }
-    if robot.model.wheel_kind in ("differential", "ackermann"):
-        del gains["sideways"]
-    told = [f"{gain:.3g} times as far {way}" for way, gain in gains.items() if gain != 1]
-    why = f"in Gazebo the robot moves as told; the real one moves {', '.join(told)}"
-    return [Left("gains of speed and turning", why)] if told else []
+    left += robot.sensor_left("a camera's picture is carried, no bit of detection", partly=True)
+    parts, reasons = {}, {}
+    if robot.model.drive == "duty":
+        parts = dict.fromkeys(TOPS, "SDF has only the top speed that it leaves")
+    if robot.model.wheel_kind == "mecanum":
+        why = "Gazebo's mecanum drive has one limit for m/s and rad/s"
+        reasons = dict.fromkeys(LIMITS, why)
+    carried = CARRIED | (dict.fromkeys(LIMITS, ALL) if plain else {})
+    return [*left, *robot.left_effects("Gazebo", carried, parts, reasons)]
 
 
 def _camera(base: ET.Element, robot: RobotModel, x_m: float) -> None:
@@ -110,7 +129,7 @@ def _supports(base: ET.Element, robot: RobotModel) -> None:
         _friction(part, "0", "0")
 
 
-def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
+def _wheel(model: ET.Element, robot: RobotModel, wheel: dict, top_mps: float | None) -> None:
     name, radius_m = wheel["name"], robot.get("robot.wheel_radius_m")
     heading_rad = float(np.arctan2(wheel["roll"][1], wheel["roll"][0]))
     pose = (wheel["x_m"], wheel["y_m"], radius_m, -np.pi / 2, 0, heading_rad)
@@ -132,8 +151,8 @@ def _wheel(model: ET.Element, robot: RobotModel, wheel: dict) -> None:
     limit = ET.SubElement(axis, "limit")
     _text(limit, "lower", "-1e16")
     _text(limit, "upper", "1e16")
-    if robot.top_rim_mps:
-        _text(limit, "velocity", _n(robot.top_rim_mps / radius_m))
+    if top_mps:
+        _text(limit, "velocity", _n(top_mps / radius_m))
 
 
 def _grip(collision: ET.Element, robot: RobotModel, wheel: dict) -> None:
@@ -157,7 +176,7 @@ def _friction(collision: ET.Element, along: str, across: str) -> ET.Element:
 
 def _drive(model: ET.Element, robot: RobotModel) -> None:
     """Gazebo's controller: the geometry of the wheels, and the real robot's top speeds."""
-    kind, drive = robot.model.wheel_kind, drive_of(robot)
+    kind, limits = robot.model.wheel_kind, limits_of(robot)
     filename, name = DRIVES[kind]
     plugin = ET.SubElement(model, "plugin", filename=filename, name=name)
     for wheel in robot.model.wheels():
@@ -168,11 +187,16 @@ def _drive(model: ET.Element, robot: RobotModel) -> None:
     if kind == "mecanum":
         _text(plugin, "wheelbase", _n(2 * robot.get("robot.half_wheelbase_m")))
     _text(plugin, "wheel_radius", _n(robot.get("robot.wheel_radius_m")))
-    # The mecanum drive has one number for m/s and rad/s; there the joints' limits hold.
-    if kind == "differential" and drive.top_mps and drive.top_radps:
-        for key, top in (("linear", drive.top_mps), ("angular", drive.top_radps)):
-            _text(plugin, f"min_{key}_velocity", _n(-top))
-            _text(plugin, f"max_{key}_velocity", _n(top))
+    if kind == "mecanum":  # its one limit is of m/s and of rad/s; there the joints' limits hold
+        return
+    for key, way in (("linear", "ahead"), ("angular", "turning")):
+        if way in limits.body:
+            lowest, highest = limits.body[way]
+            _text(plugin, f"min_{key}_velocity", _n(lowest))
+            _text(plugin, f"max_{key}_velocity", _n(highest))
+        if way in limits.accelerations:
+            _text(plugin, f"min_{key}_acceleration", _n(-limits.accelerations[way]))
+            _text(plugin, f"max_{key}_acceleration", _n(limits.accelerations[way]))
 
 
 def _solid(

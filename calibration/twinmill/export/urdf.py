@@ -6,9 +6,20 @@ from copy import deepcopy
 
 import numpy as np
 
-from twinmill.export.carried import HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+from twinmill.export.carried import ALL, HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
+from twinmill.export.steady import TOPS, limits_of, top_speed_left
 
 EFFORT_NM = 1000.0  # a joint must state a limit, and the model knows none
+CARRIED = {
+    "view_pan": ALL,
+    "marker_offset": ALL,
+    "heading_bias": ALL,
+    "wheel_limit": ALL,
+    "collision": ("radius_m",),
+}
+REASONS = dict.fromkeys(
+    ("speed_limit", "acceleration_limit"), "URDF limits joints, and this is a limit of the body"
+)
 
 
 def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
@@ -32,9 +43,11 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
         mass_kg=robot.hull_mass_kg,
         inertia_kgm2=robot.hull_inertia_kgm2(),
     )
+    base.find("collision/geometry/cylinder").set("radius", f"{robot.touch_radius_m:.9g}")
     _supports(base, robot)
-    for wheel in robot.model.wheels():
-        _wheel(root, robot, wheel)
+    rims_mps = limits_of(robot).rims_mps
+    for k, wheel in enumerate(robot.model.wheels()):
+        _wheel(root, robot, wheel, None if rims_mps is None else rims_mps[k])
     pan_rad = robot.model.detection_model()["pan_rad"]
     ET.SubElement(root, "link", name="camera_link")
     place = (body_m, 0, HULL_HEIGHT_M / 2)
@@ -47,21 +60,40 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
         place=place,
         turned=(0, 0, pan_rad),
     )
+    if any(robot.tracked()):
+        x_m, y_m, turned_rad = robot.tracked()
+        ET.SubElement(root, "link", name="marker_link")
+        _joint(
+            root=root,
+            name="marker_joint",
+            kind="fixed",
+            parent="base_link",
+            child="marker_link",
+            place=(x_m, y_m, HULL_HEIGHT_M),
+            turned=(0, 0, turned_rad),
+        )
     ET.indent(root)
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n", left
 
 
 def _left(robot: RobotModel) -> list[Left]:
     why = "URDF holds geometry, masses and limits alone"
+    limits = limits_of(robot)
     left = [
-        Left("gains of speed and turning", why),
-        *robot.base_left(why),
-        Left("sensor", why),
+        *robot.wheels_left(),
+        *robot.gains_left("moved by its joints"),
+        *robot.base_left(why, "URDF has its top speed alone, as the joints' limit"),
+        *robot.sensor_left(why),
     ]
+    if robot.model.wheel_kind != "none" and limits.rims_mps is None:
+        left.append(top_speed_left(robot, "the joints have no limit"))
     if robot.supports_x_m():
         why = "URDF has no friction; tell the program that front_support and rear_support slide"
         left.append(Left("friction", why))
-    return [*left, *robot.left_effects(("view_pan",), "URDF")]
+    parts = {}
+    if robot.model.drive == "duty":
+        parts = dict.fromkeys(TOPS, "URDF has only the top speed that it leaves, in its joints")
+    return [*left, *robot.left_effects("URDF", CARRIED, parts, REASONS)]
 
 
 def _supports(base: ET.Element, robot: RobotModel) -> None:
@@ -73,7 +105,7 @@ def _supports(base: ET.Element, robot: RobotModel) -> None:
             _shape(base, use, place, (0, 0, 0), name=name, shape=_ball(radius_m))
 
 
-def _wheel(root: ET.Element, robot: RobotModel, wheel: dict) -> None:
+def _wheel(root: ET.Element, robot: RobotModel, wheel: dict, top_mps: float | None) -> None:
     """Turns about its axle (z of its link, to the left of where it rolls).
 
     Touches in one point, as a ball does: a cylinder drags its edges through curves.
@@ -102,7 +134,7 @@ def _wheel(root: ET.Element, robot: RobotModel, wheel: dict) -> None:
         turned=turned,
     )
     ET.SubElement(joint, "axis", xyz="0 0 1")
-    if top_mps := robot.top_rim_mps:
+    if top_mps:
         speed = f"{top_mps / radius_m:.6g}"
         ET.SubElement(joint, "limit", effort=f"{EFFORT_NM:g}", velocity=speed)
 

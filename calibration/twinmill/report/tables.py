@@ -10,7 +10,7 @@ import numpy as np
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
-from twinmill.predict.noise import Noise
+from twinmill.predict.noise import LEAST, Noise
 from twinmill.predict.regimes import HORIZON, Regime
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 
@@ -23,6 +23,8 @@ SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
 }  # unit: factor, as a person reads it
+# Times the least noise that a fit assumes, which a log without any shares among sensor and drive.
+UNSEEN = 2
 WORST = 3  # regimes of a group
 TOGETHER = (
     "Known only in combination: the log determines how such quantities go together (the "
@@ -141,20 +143,22 @@ def _phases(robot: RobotComparison) -> list[tuple[str, str]]:
 
 def _noise(noise: Noise, has_heading: bool) -> str:
     """In words: what the sensor adds to a pose, and how the robot itself varies."""
-    at = noise.position
-    if not has_heading:
-        return (
-            f"each measured place is off by {number(1000 * at.sensor, 2)} mm; the robot's speed "
-            f"varies by {number(1000 * at.drive, 2)} mm/s "
-            f"(correlation time {number(at.memory_s, 2)} s)"
-        )
-    heading = noise.heading
-    mm, degrees = number(1000 * at.sensor, 2), number(np.degrees(heading.sensor), 2)
-    mm_s, degrees_s = number(1000 * at.drive, 2), number(np.degrees(heading.drive), 2)
+    channels = [(noise.position, 1000.0, " mm"), (noise.heading, float(np.degrees(1)), "°")]
+    off, varies = [], []
+    for (at, shown, unit), least in zip(channels[: 1 + has_heading], LEAST, strict=False):
+        if at.sensor > UNSEEN * least[0]:
+            off.append(f"{number(shown * at.sensor, 2)}{unit}")
+        how = "by nothing that shows"
+        if at.drive > UNSEEN * least[1]:
+            memory = f"correlation time {number(at.memory_s, 2)} s"
+            how = f"by {number(shown * at.drive, 2)}{unit}/s ({memory})"
+        varies.append(how)
+    if not off and not any("(" in how for how in varies):
+        return "none found"
+    kind, by = "pose" if has_heading else "place", " and ".join(off) or "nothing that shows"
     return (
-        f"each measured pose is off by {mm} mm and {degrees}°; "
-        f"the robot's speed varies by {mm_s} mm/s (correlation time {number(at.memory_s, 2)} s), "
-        f"its turning by {degrees_s}°/s ({number(heading.memory_s, 2)} s)"
+        f"each measured {kind} is off by {by}; "
+        f"the robot's speed varies {', its turning '.join(varies)}"
     )
 
 

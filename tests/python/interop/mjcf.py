@@ -59,7 +59,35 @@ def dm_control(folder: Path) -> Told:
     text = (folder / FILE).read_text()
     physics = mjcf.Physics.from_mjcf_model(mjcf.from_xml_string(text))
     comment = "Not carried:" in mjcf.from_xml_string(text).to_xml_string()
-    return _held_by(physics.model.ptr) | _moves(text, begin) | {"the comment": comment}
+    told = _held_by(physics.model.ptr) | _moves(text, begin) | {"the comment": comment}
+    return told | {"two in an arena of composer": _drives_in_an_arena(text)}
+
+
+def _drives_in_an_arena(text: str) -> bool:
+    """The second of two is told to drive: it alone does, after its delay, at its speed."""
+    from dm_control import composer, mjcf
+
+    class Robot(composer.Entity):
+        def _build(self, name: str) -> None:
+            self._model = mjcf.from_xml_string(text)
+            self._model.model = name
+
+        @property
+        def mjcf_model(self):
+            return self._model
+
+    arena = composer.Arena()
+    first, second = Robot("R00"), Robot("R01")
+    for k, robot in enumerate((first, second)):
+        arena.attach(robot).pos = [0, k, 0]
+    physics = mjcf.Physics.from_mjcf_model(arena.mjcf_model)
+    physics.bind(second.mjcf_model.find_all("actuator")).ctrl = SPEED_MPS
+    at, stands = (physics.bind(one.mjcf_model.find("joint", "x")) for one in (second, first))
+    physics.step(round((DELAY_S - 0.002) / physics.timestep()))
+    waits = abs(at.qvel.item()) < 1e-6
+    physics.step(round(1 / physics.timestep()))
+    moves = abs(at.qvel.item() / (FORWARD_GAIN * SPEED_MPS) - 1) < 0.001
+    return waits and moves and abs(stands.qpos.item()) < 1e-6
 
 
 @writes("MJCF", "MJX (JAX)", "mujoco-mjx==3.17.0", "jax==0.10.2", ours=_write)

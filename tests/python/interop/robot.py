@@ -9,7 +9,8 @@ LAG_S, DELAY_S, FORWARD_GAIN = 0.06, 0.03, 0.97
 BODY_RADIUS_M, WHEEL_RADIUS_M = 0.1, 0.0325
 MARKER_M = (0.02, -0.01)
 WHEELS = ("fl", "fr", "rl", "rr")
-TOP_RADPS = 0.36 / WHEEL_RADIUS_M
+TOP_MPS = 0.36
+TOP_RADPS = TOP_MPS / WHEEL_RADIUS_M
 DRAKE = "drake==1.51.1"
 
 TEXT = f"""
@@ -24,7 +25,7 @@ mass_kg = {MASS_KG}
 drive = "duty"
 wheels = "mecanum"
 duty_pct = [0, 100]
-wheel_speed_mps = [0, 0.36]
+wheel_speed_mps = [0, {TOP_MPS}]
 motor_lag_s = {LAG_S}
 control_period_s = 0.022
 forward_gain = {FORWARD_GAIN}

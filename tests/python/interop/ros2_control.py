@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 from interop.cells import Cell, Told, writes
-from interop.robot import FORWARD_GAIN, TEXT, WHEEL_RADIUS_M, WHEELS, write
+from interop.robot import FORWARD_GAIN, TEXT, TOP_MPS, WHEEL_RADIUS_M, WHEELS, write
 from interop.rosbag import ROS2
 
 KINDS = (
@@ -48,6 +48,14 @@ def rcl(folder: Path) -> Told:
     plain = _parameters(folder / "differential.yaml")
     left = [f"{wheel}_wheel_joint" for wheel in WHEELS if wheel.endswith("l")]
     radius_m = WHEEL_RADIUS_M * FORWARD_GAIN
+    tops = [
+        told(node, f"{axis}.max_velocity")
+        for told, node, axes in (
+            (mecanum, name, ("linear.x", "linear.y")),
+            (plain, "diff_drive_controller", ("linear.x",)),
+        )
+        for axis in axes
+    ]
     joints = [mecanum(name, f"{k}_wheel_command_joint_name") for k in ("front_left", "rear_right")]
     return {
         "rate, a whole number": mecanum("controller_manager", "update_rate") == ("integer", 45),
@@ -57,6 +65,7 @@ def rcl(folder: Path) -> Told:
         "radius of mecanum wheels": _is(mecanum(name, "kinematics.wheels_radius"), radius_m),
         "no offset, a number": _is(mecanum(name, "kinematics.base_frame_offset.x"), 0),
         "radius of plain wheels": _is(plain("diff_drive_controller", "wheel_radius"), radius_m),
+        "top speeds, numbers": all(_is(top, TOP_MPS * FORWARD_GAIN) for top in tops),
         "joints, a list": plain("diff_drive_controller", "left_wheel_names") == ("strings", left),
     }
 

@@ -109,8 +109,23 @@ def duckdb_csv(folder: Path) -> Told:
 
 @writes("Parquet", "DuckDB", DUCKDB, ours=_write("parquet"))
 def duckdb_parquet(folder: Path) -> Told:
-    """`FROM 'pose.parquet'`."""
-    return _of_duckdb(folder, "parquet")
+    """`FROM 'pose.parquet'`, and each command with the last pose before it."""
+    import duckdb
+
+    poses, told = (f"'{folder / FOLDER}/{name}.parquet'" for name in ("pose", "telemetry"))
+    joined = duckdb.sql(
+        f"SELECT told.fl_pct, pose.x_m FROM {told} told ASOF JOIN {poses} pose "
+        "ON told.robot_id = pose.robot_id AND told.t_s >= pose.t_s ORDER BY told.t_s"
+    )
+    wanted = [
+        (50 * (k >= drive.STANDS), drive.x_m(k) if drive.seen(k) else None)
+        for k in range(drive.COUNT)
+    ]
+    alike = all(
+        duty == row[0] and (row[1] is None if x is None else abs(row[1] - x) < 1e-9)
+        for row, (duty, x) in zip(joined.fetchall(), wanted, strict=True)
+    )
+    return _of_duckdb(folder, "parquet") | {"`ASOF JOIN` of poses and commands": alike}
 
 
 def _of_duckdb(folder: Path, ending: str) -> Told:
