@@ -6,12 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from twinmill.defaults import Certainty, Verdict
+from twinmill.inference.discrepancy import NODES
 from twinmill.inference.posterior import Belief, beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Table
 from twinmill.model.parameters import catalogue_name, instance_of
 
 LARGEST_GROUP = 4  # names: more help nobody
+OF_SIZE = PRIORS.form / np.sqrt(NODES)  # error of an effect's size where its formula is off
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,8 @@ def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[f
     """Numbers of an effect and their standard deviations, over all sets of effects that hold it.
 
     The spread between sets counts, too: which others are missing is not known for certain. So does
-    what a real robot's physics differ from the formula.
+    what a real robot's physics differ from the formula: over a log the size of an effect is the
+    mean of errors that are independent at NODES speeds.
     """
     weight: dict[tuple[str, ...], float] = {}
     for b in every:
@@ -177,9 +180,7 @@ def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[f
     for label in own:
         values, stds = np.array([table.numbers[e][label] for e in sets]).T
         mean = float(shares @ values)
-        spread = float(
-            np.hypot(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)), PRIORS.form * mean)
-        )
+        spread = float(np.hypot(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)), OF_SIZE * mean))
         found[label.split(".", 1)[1]] = mean, spread
     return found
 

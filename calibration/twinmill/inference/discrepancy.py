@@ -23,7 +23,7 @@ GROWS = 1.01 * STEP**2  # times its size in one log, up to which a wander is as 
 # known mean the one that says least; the rest is too small to be seen, or too large for a formula.
 BINS = np.r_[SIZES[0] / STEP, np.sqrt(SIZES[1:] * SIZES[:-1]), SIZES[-1] * STEP]
 OF_FORM = -np.diff(np.exp(-BINS / PRIORS.form))
-FORMS = 2  # of that error
+FORMS = 6  # of that error
 NODES = 7  # of a curve over speed: as a table of duties has
 LATEST = 10  # steps that a response to a command may last
 
@@ -69,16 +69,25 @@ def kernels(m: Motion) -> list[Kernel]:
 def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
     """FORMS arrays (K, W, 3): what an effect's formula may miss, for a relative error of one.
 
-    The effect's own change, times a smooth function of how fast the robot is, or of time; without
-    its size, which is the effect's own number.
+    The effect's own change, times a smooth function of how fast the robot is along its fastest
+    axis, of how fast it travels or turns, of time, place or heading; without its size, which is the
+    effect's own number.
 
     Args:
         change: (W, 3) of the prediction by the effect, m and rad.
         m: the motion.
     """
-    fast = _hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES)
-    waves, share = _waves(m.t_s, 30.0, 15.0)
-    forms = fast, np.sqrt(share)[:, None] * waves
+    travel = np.hypot(m.moved[:, 0], m.moved[:, 1])
+    in_time, of_time = _waves(m.t_s, 6.0, 3.0)
+    in_place, of_place = _over_floor(m, 6)
+    forms = (
+        _hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES),
+        _hats(travel, m.top[3], NODES),
+        _hats(np.abs(m.moved[:, 2]), m.top[4], NODES),
+        np.sqrt(of_time)[:, None] * in_time,
+        np.sqrt(of_place)[:, None] * in_place,
+        _harmonics(m.heading, (1, 2, 3, 4)) / np.sqrt(8),
+    )
     weight = (change**2).sum(axis=1) / max(np.sum(change**2), 1e-300)
     return tuple((f - (f @ weight)[:, None])[:, :, None] * change for f in forms)
 

@@ -23,7 +23,7 @@ class Priors(Numbers):
     sheet: float = number(
         0.15, "error of a data sheet's speeds, and of a discrepancy in another log, relative"
     )
-    form: float = number(0.05, "mean error of an effect's formula, relative to its size: a guess")
+    form: float = number(0.15, "mean error of an effect's formula, relative to its size: a guess")
     moments: float = number(0.05, "expected share of half seconds in which something happens")
     sudden: float = number(0.5, "gain error at such a moment; push over the usual speed")
     sure: float = number(0.9, "posterior probability from which an answer is called sure")
