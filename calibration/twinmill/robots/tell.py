@@ -270,6 +270,8 @@ def _stop(
         fleet.listen(REPEAT_S)
         if enough():
             break
+    told = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
+    fleet.listen(OTHERS_S, lambda: all(_says_since(robot, command.seq) for robot in told))
     return answers(fleet, command, robots or set(fleet.robots))
 
 
@@ -284,6 +286,14 @@ def reached_s(fleet: Fleet, passed_s: float) -> float:
         return passed_s
     begin_s = fleet.reach.begin_s
     return 0.0 if begin_s is None else time.monotonic() - begin_s
+
+
+def _says_since(robot: Robot, seq: int) -> bool:
+    """It has signed how it is since it obeyed; by what it had stood before stands in that."""
+    ack = robot.signed_acks.get(seq)
+    if not (ack and robot.link):
+        return not ack
+    return robot.link.session != ack.session or robot.link.session_us > ack.session_us
 
 
 class Hosts:
