@@ -17,6 +17,7 @@ from twinmill_cli.options import Arm, KeyFile, LcmUrl
 from twinmill_cli.output import AsJson, decide, print_object, say
 from twinmill_cli.swarm_door import (
     BusPrefix,
+    KeyThere,
     Robots,
     check_behavior,
     check_bus,
@@ -255,7 +256,7 @@ def _select(
 def _status(
     *,
     once: Annotated[bool, typer.Option("--once", help="Print one table and end.")] = False,
-    key: KeyFile = None,
+    key: KeyThere = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: BusPrefix = None,
     as_json: AsJson = False,

@@ -28,6 +28,15 @@ Robots = Annotated[
         "--robots", metavar="IDS", help="Only these, as 1,2,5; without, all that are there."
     ),
 ]
+KeyThere = Annotated[
+    Path | None,
+    typer.Option(
+        "--key",
+        metavar="FILE",
+        help="The operator's key, by which answers are believed; none is made. Default: "
+        "twinmill/swarm.key in ~/.config.",
+    ),
+]
 BusPrefix = Annotated[
     str | None,
     typer.Option("--channel-prefix", help="As given to twin_run, to speak to a twin alone."),

@@ -15,10 +15,11 @@ from typer.core import TyperCommand
 
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import KeyFile, LcmUrl
+from twinmill_cli.options import LcmUrl
 from twinmill_cli.output import AsJson, decide
 from twinmill_cli.swarm_door import (
     BusPrefix,
+    KeyThere,
     Robots,
     check_bus,
     key_if_there,
@@ -71,7 +72,7 @@ def stop(
             "pass. Repeatable.",
         ),
     ] = None,
-    key: KeyFile = None,
+    key: KeyThere = None,
     lcm_url: LcmUrl = URL,
     channel_prefix: BusPrefix = None,
     as_json: AsJson = False,
