@@ -10,7 +10,7 @@ from twinmill.robots import key as keys
 from twinmill.robots import tell
 from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
 from twinmill.terminal import PlainConsole
-from twinmill_cli import characterise, swarm_door
+from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_screen import status_table
 from twinmill_cli.swarm_verdict import of_busy
 
@@ -103,6 +103,20 @@ def test_no_start_leaves_it_to_a_robots_file_how_long_it_needs_no_operator(monke
     for options in ({}, {"link_timeout_ms": 0}):
         tell.start(fleet, {1}, "", ahead_s=0.4, partial=False, **options)
     assert set(sent) == {0, 2000} and sent[0] == 2000
+
+
+@pytest.mark.parametrize("words", [["start"], ["arm"], ["select", "milling"], ["status", "--once"]])
+def test_where_this_computer_has_no_network_no_robot_is_asked_for(
+    monkeypatch, tmp_path, twinmill, words
+):
+    """They were asked whether they are switched on."""
+    fleet = fleet_of()
+    fleet.bus.fault = "wlan0: not connected"
+    for module in (swarm, swarm_door):
+        monkeypatch.setattr(module, "Fleet", lambda *_, **__: fleet)
+    code, _, err = twinmill("swarm", *words, "--key", tmp_path / "key")
+    assert code == 1 and "this computer has no network (wlan0: not connected)" in err
+    assert "switched on" not in err
 
 
 @pytest.mark.parametrize("arm", [[], ["--arm"]])

@@ -296,6 +296,8 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     known = fleet.robots
     fleet.listen(RUN_PERIOD_S - 1, lambda: known and all(r.run for r in known.values()))
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
+    if not robots and fleet.fault:
+        say(f"this computer has no network ({fleet.fault}).")
     if as_json:
         print_object({"robots": [r.to_json() for r in robots], "key_fault": key_fault or None})
     else:

@@ -481,6 +481,11 @@ class Fleet:
         """How far that got what was said to all since `reach_anew`; other buses do not tell."""
         return getattr(self.bus, "reach", Reach())
 
+    @property
+    def fault(self) -> str:
+        """Why nobody outside of this computer can be heard now; empty if somebody may be."""
+        return getattr(self.bus, "fault", "")
+
     def reach_anew(self) -> None:
         """From here on."""
         if hasattr(self.bus, "reach"):

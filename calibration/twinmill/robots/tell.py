@@ -122,6 +122,10 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
         return robots
     fleet.listen(FIND_S)
     if not fleet.here():
+        if fleet.fault:
+            raise ValueError(
+                f"no robot was heard in {FIND_S:g} s: this computer has no network ({fleet.fault})."
+            )
         raise ValueError(
             f"no robot was heard in {FIND_S:g} s; are they switched on and on this network, is "
             f"{option('lcm_url')} that of their configuration, and does the network carry "
