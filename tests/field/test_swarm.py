@@ -8,7 +8,7 @@ import typer
 from network import run_session
 
 from twinmill.robots.tell import make_command
-from twinmill_cli.swarm import parse_robots
+from twinmill_cli.swarm_door import parse_robots
 
 needs_programs = pytest.mark.skipif(
     not os.environ.get("TURBOPI"), reason="TURBOPI does not name the program"

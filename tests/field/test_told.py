@@ -59,7 +59,18 @@ FAULTS = {
     ),
     "hung_up": Fault("terminal closed", (), 1),
     "ctrl_z": Fault("Ctrl-Z", ("All stand.",), 0),
-    "killed": Fault("tool killed (SIGKILL)", (), -9, LINK_LOST_S),
+    "killed": Fault(
+        "tool killed (SIGKILL); robots whose file says `link_timeout_ms = 0`",
+        ("they stop by themselves 2 s after they have lost this command.",),
+        -9,
+        LINK_LOST_S,
+    ),
+    "away_until_its_link_is_lost": Fault(
+        "R03's network is away for 3 s, and Ctrl-C meanwhile",
+        ("All stand; R03 stood before: it had lost its link to this command.",),
+        1,
+        LINK_LOST_S,
+    ),
     "slept": Fault(
         "laptop sleeps for 3 s", ("All stand: R01, R02: it had lost its link",), 1, LINK_LOST_S
     ),
@@ -170,6 +181,49 @@ FAULTS = {
         ),
         1,
         is_brief=True,
+    ),
+    "ctrl_c_while_it_looks": Fault(
+        "Ctrl-C of a `swarm start` that looks who is there",
+        ("Ended by a signal: nothing was said to any robot.",),
+        130,
+        NEVER,
+    ),
+    "stop_without_a_network": Fault(
+        "`swarm stop` on a computer without a network",
+        ("nothing leaves this computer", "NOTHING LEFT THIS COMPUTER", "Network is unreachable"),
+        1,
+        NEVER,
+    ),
+    "start_with_a_key_that_others_may_read": Fault(
+        "`swarm start` with a key file of mode 644",
+        ("others may read it (mode 644): `chmod 600", "Nothing was said to any robot."),
+        1,
+        NEVER,
+    ),
+    "stop_with_a_key_that_others_may_read": Fault(
+        "`swarm stop` with a key file of mode 644 (from its first packet)",
+        (
+            "NOT ALL STAND: R01, R02: no stop was confirmed.",
+            "No robot's signature could be checked: ",
+            "others may read it (mode 644): `chmod 600",
+        ),
+        1,
+    ),
+    "stop_mistyped": Fault(
+        '`swarm stop --robots "1;2"` (from its first packet)',
+        ("1;2: must be numbers in 0..99", "So all robots are told to stop.", "All stand."),
+        2,
+    ),
+    "stop_of_an_empty_list": Fault(
+        '`swarm stop --robots ""` (from its first packet)',
+        ("an empty list: must be numbers", "So all robots are told to stop.", "All stand."),
+        2,
+    ),
+    "url_mistyped": Fault(
+        "`swarm start --lcm-url udp://239.255.76.67:7667`",
+        ("'--lcm-url': udp://239.255.76.67:7667: begins with none of",),
+        2,
+        NEVER,
     ),
     "robots_mistyped": Fault(
         '`swarm start --robots "1;2"`', ("'--robots': 1;2: must be numbers in 0..99",), 2, NEVER

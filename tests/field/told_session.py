@@ -25,6 +25,7 @@ from pathlib import Path
 
 import turbopi
 from keyring import operator_key, robot_options
+from link_session import Machine
 from robot_process import ZERO, Robot, wait_until
 
 from twinmill.data.bus import UdpBus
@@ -44,6 +45,7 @@ TRIES = 3  # to start
 STAYS_S = 0.5  # a robot that was stopped
 AT_THE_INSTANT_S = 0.3  # before it: who falls silent then is not missed before it
 HALTED_S = 0.5  # in which the held table wants to be drawn twice
+BUS_PORT = f":{7667:04X} "  # as /proc/net/udp has it
 START = ("start", "--arm", "--robots", "1,2")
 
 
@@ -51,10 +53,18 @@ class Operator:
     """`twinmill swarm` as a process: at a terminal of its own, which can be halted, or on pipes."""
 
     def __init__(
-        self, key: Path, *words: str, terminal: bool = True, clock_ahead_s: int = 0, **options
+        self,
+        key: Path,
+        *words: str,
+        terminal: bool = True,
+        clock_ahead_s: int = 0,
+        elsewhere: bool = False,
+        **options,
     ):
         program = (CLOCK.format(clock_ahead_s) if clock_ahead_s else "") + COMMAND
         command = [sys.executable, "-c", program, "swarm", *words, "--key", str(key)]
+        if elsewhere:  # a computer without any network
+            command = ["unshare", "--net", *command]
         self.said = ""
         self.keyboard, self._closed = None, False
         if terminal:
@@ -119,13 +129,15 @@ class Field:
         self.robots = {i: self.robot(i, str(i)) for i in IDS}
         self.operator: Operator | None = None
 
-    def robot(self, robot_id: int, name: str, *options: str) -> Robot:
+    def robot(self, robot_id: int, name: str, machine: Machine | None = None) -> Robot:
         (self.folder / name).mkdir()
-        words = ["--lcm-url", URL, *robot_options(self.folder, robot_id), *options]
+        words = ["--lcm-url", URL, *robot_options(self.folder, robot_id)]
         # Frames are not missed for ten seconds: it is the fault alone that stops the wheels.
         words += ["--set", "restart_ms=100", "--set", "frame_timeout_ms=10000"]
-        turbopi_program = shlex.split(os.environ["TURBOPI"])
-        return self.stack.enter_context(Robot(turbopi_program, self.folder / name, *words))
+        # Its own file has no say in how long it drives on without its operator.
+        words += ["--set", "link_timeout_ms=0"]
+        program = [*(machine.enter if machine else []), *shlex.split(os.environ["TURBOPI"])]
+        return self.stack.enter_context(Robot(program, self.folder / name, *words))
 
     def start(self, *words: str, **options) -> Operator:
         """Robots drive, held."""
@@ -252,6 +264,29 @@ class Field:
         fault_s = time.monotonic()
         operator.process.kill()
         return self.row(fault_s, operator.end())
+
+    def away_until_its_link_is_lost(self) -> dict:
+        """R03's network is gone as the stop is said, and comes back before that gives up."""
+        machine = Machine()
+        self.stack.callback(machine.end)
+        machine.cable("wlan0", 1)
+        self.robots[3] = self.robot(3, "3", machine)
+        time.sleep(1)
+        self.operator = operator = Operator(
+            self.key_file, "start", "--arm", "--robots", "1,3", terminal=False
+        )
+        assert wait_until(lambda: "Ctrl-C stops them" in operator.plain, 20), operator.plain
+        time.sleep(0.5)
+        fault_s = time.monotonic()
+        machine.cut("wlan0")
+        operator.process.send_signal(signal.SIGINT)
+        time.sleep(LINK_TIMEOUT_S + 1)
+        machine.cable("wlan0", 1)
+        row = self.row(fault_s, operator.end(), [1, 3])
+        self.robots.pop(3).process.terminate()
+        machine.cut("wlan0")
+        time.sleep(1)
+        return row
 
     def slept(self) -> dict:
         """As a laptop whose lid is shut."""
@@ -595,6 +630,64 @@ class Field:
             operator.process.send_signal(signal.SIGINT)
             time.sleep(0.002)
         return self.row(fault_s, operator.end())
+
+    def ctrl_c_while_it_looks(self) -> dict:
+        """Once it is on the bus and has said nothing: it hears who is there for a second."""
+        begin_s = time.monotonic()
+        with self.hearing_commands() as commands:
+            self.operator = operator = Operator(
+                self.key_file, "start", "--robots", "1,9", terminal=False
+            )
+            sockets = Path("/proc/net/udp")
+            before = sockets.read_text().count(BUS_PORT)
+            assert wait_until(lambda: sockets.read_text().count(BUS_PORT) > before, 20)
+            operator.process.send_signal(signal.SIGINT)
+            code = operator.end()
+        return self._unmoved(begin_s, code) | {"commands": len(commands)}
+
+    def stop_without_a_network(self) -> dict:
+        """Of its own computer alone: nothing that it says can reach a robot."""
+        begin_s = time.monotonic()
+        self.operator = Operator(
+            self.key_file, "stop", "--timeout-s", "1", terminal=False, elsewhere=True
+        )
+        return self._unmoved(begin_s, self.operator.end())
+
+    def start_with_a_key_that_others_may_read(self) -> dict:
+        begin_s = time.monotonic()
+        self.operator = Operator(self._open_key(), "start", terminal=False)
+        return self._unmoved(begin_s, self.operator.end())
+
+    def stop_with_a_key_that_others_may_read(self) -> dict:
+        return self._stopped_by("--timeout-s", "2", key=self._open_key())
+
+    def _open_key(self) -> Path:
+        key = self.folder / "open.key"
+        key.write_bytes(self.key_file.read_bytes())
+        key.chmod(0o644)
+        return key
+
+    def stop_mistyped(self) -> dict:
+        return self._stopped_by("--robots", "1;2")
+
+    def stop_of_an_empty_list(self) -> dict:
+        return self._stopped_by("--robots", "")
+
+    def _stopped_by(self, *words: str, key: Path | None = None) -> dict:
+        """Robots that are held, by another command."""
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s:
+            self.operator = Operator(key or self.key_file, "stop", *words, terminal=False)
+            code = self.operator.end()
+        operator.end()
+        return self.row(stops_s[0], code)
+
+    def url_mistyped(self) -> dict:
+        begin_s = time.monotonic()
+        self.operator = Operator(
+            self.key_file, "start", "--lcm-url", "udp://239.255.76.67:7667", terminal=False
+        )
+        return self._unmoved(begin_s, self.operator.end())
 
     def robots_mistyped(self) -> dict:
         begin_s = time.monotonic()

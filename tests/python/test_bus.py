@@ -6,7 +6,8 @@ import time
 
 import pytest
 
-from twinmill.data.bus import HEADER, MAGIC_SHORT, SKIP_S, UdpBus
+from twinmill.data import bus as buses
+from twinmill.data.bus import HEADER, MAGIC_SHORT, SKIP_S, Reach, UdpBus, check_url, open_bus
 
 WAIT_MS = 200
 SLACK_S = 0.3  # the machine may be busy with other tests
@@ -63,3 +64,52 @@ def test_what_waits_behind_packets_of_others_is_taken_without_waiting(bus):
         say(channel)
     assert bus.handle_timeout(0) and heard == ["R03_LINK"]
     assert not bus.handle_timeout(0)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "took", "errors", "ttl", "says"),
+    [
+        # A laptop at its access point; unplugged, which takes packets and loses them; switched off.
+        ({"lo": "own", "wlan0": "out"}, {"lo", "wlan0"}, {}, 1, (1, {"wlan0"}, "")),
+        ({"lo": "own", "eth0": "lost"}, {"lo", "eth0"}, {}, 1, (0, set(), "eth0: not connected")),
+        ({"lo": "own", "wlan0": "lost"}, {"lo"}, {"wlan0": "down"}, 1, (0, set(), "wlan0: down")),
+        # One network of two is enough; tunnels that nobody set up are none.
+        ({"eth0": "out", "wlan0": "lost"}, {"eth0"}, {"wlan0": "down"}, 1, (1, {"eth0"}, "")),
+        ({"lo": "own", "tunl0": "none"}, {"lo"}, {"tunl0": "down"}, 1, (1, {"lo"}, "")),
+        ({"lo": "own"}, set(), {"lo": "down"}, 1, (0, set(), "lo: down")),
+        ({}, set(), {}, 1, (0, set(), "no network")),
+        ({"lo": "own", "eth0": "out"}, {"eth0"}, {}, 0, (1, {"this computer alone (ttl=0)"}, "")),
+    ],
+)
+def test_how_far_a_message_got_is_what_the_kernel_says_of_the_networks_that_took_it(
+    monkeypatch, bus, kinds, took, errors, ttl, says
+):
+    """IFF_RUNNING is what tells a network without a carrier from one that carries."""
+    bus, _ = bus
+    monkeypatch.setattr(buses, "_kind", kinds.get)
+    bus._ttl, bus.reach = ttl, Reach()
+    bus._note(took, errors)
+    assert (bus.reach.out, bus.reach.networks, bus.reach.fault) == says and bus.reach.said == 1
+
+
+def test_a_network_of_this_machine_is_known_by_its_flags():
+    assert buses._kind("lo") == "own" and buses._kind("no such") == "none"
+
+
+@pytest.mark.parametrize(
+    "url", ["udp://1.2.3.4:7667", "239.255.76.67:7667", "udpm://10.0.0.1:1", "udpm://?ttl=x", "x"]
+)
+def test_a_malformed_url_is_told_apart_from_a_network_that_is_not_there(url):
+    with pytest.raises(RuntimeError):
+        check_url(url)
+
+
+def test_a_stop_can_wait_for_a_network(monkeypatch):
+    monkeypatch.setattr(UdpBus, "_member", lambda *_: False)
+    with pytest.raises(RuntimeError, match="no network"):
+        open_bus("udpm://239.255.76.67:7998?ttl=0")
+    waits = open_bus("udpm://239.255.76.67:7998?ttl=0", needs_network=False)
+    with pytest.raises(OSError, match="no network"):
+        waits.publish("A", b"")
+    waits._ear.close()
+    waits._mouth.close()

@@ -585,15 +585,18 @@ def compared_in(brief_coasting_robot):
     return run
 
 
-def test_ctrl_c_while_it_starts_leaves_no_traceback():
+@pytest.mark.parametrize("module", ["typer", "twinmill_cli.output", "twinmill.robots.tell"])
+def test_ctrl_c_while_it_starts_is_one_sentence(module):
     """From the first line of ours on: the interpreter's own start is not ours."""
-    seen = "import sys; sys.addaudithook(lambda e, a: e == 'import' and a[0] == 'typer' and stop())"
+    seen = f"lambda event, args: event == 'import' and args[0] == '{module}' and stop()"
+    seen = f"import sys; sys.addaudithook({seen})"
     stop = "import os, signal; stop = lambda: os.kill(os.getpid(), signal.SIGINT)"
-    run = "from twinmill_cli.main import main; main()"
+    run = "sys.argv[0] = 'twinmill'; from twinmill_cli.main import main; main()"
     ended = subprocess.run(
-        [sys.executable, "-c", f"{stop}; {seen}; {run}"],
+        [sys.executable, "-c", f"{stop}; {seen}; {run}", "swarm", "start"],
         capture_output=True,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", "")
+    sentence = "twinmill: Stopped before it began: nothing was done, and nothing was sent.\n"
+    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", sentence)

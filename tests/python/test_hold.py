@@ -118,6 +118,38 @@ def test_silence_is_said(held, monkeypatch):
     assert "not heard any more" in words(TABLE) and not robots.is_over
 
 
+@pytest.mark.parametrize(
+    ("then", "reason", "is_meant"),
+    [
+        ({"flags": TELEMETRY.STATUS_LINK_LOST | TELEMETRY.STATUS_LATCHED}, hold.LINK_LOST, False),
+        ({"flags": TELEMETRY.STATUS_LATCHED}, hold.DRIVES, True),
+        ({"session": SESSION + 1, "flags": TELEMETRY.STATUS_LATCHED}, hold.RESTARTED, False),
+    ],
+)
+def test_by_what_a_robot_stood_is_asked_after_the_stop_that_reached_it_too_late(
+    held, then, reason, is_meant
+):
+    """A network that is away until the link is lost, and back before the stop gives up."""
+    robots, _, words = held
+    words(TABLE, stands=False)
+    robots.settle()
+    assert robots.ends()["R03"] is hold.DRIVES
+    words(STOPPED, **then)
+    robots._told[3] = hold.DRIVES  # nothing of it was told yet
+    assert robots.ends()["R03"] is reason and reason.is_meant == is_meant
+
+
+def test_who_stands_as_the_stop_is_said_stood_by_itself(held):
+    """Be it that nothing was told of it yet."""
+    robots, _, words = held
+    words(TABLE, stands=False)
+    words(STOPPED)
+    robots._told[3] = hold.DRIVES
+    assert robots.ends()["R03"] is hold.DRIVES
+    robots.settle()
+    assert robots.ends()["R03"] is hold.BY_BUTTON
+
+
 def test_a_robot_with_another_key_is_heard_and_not_believed(held, monkeypatch):
     robots, robot, words = held
     monkeypatch.setattr(hold, "SILENT_S", -1.0)

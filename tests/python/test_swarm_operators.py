@@ -7,14 +7,16 @@ import pytest
 import turbopi
 
 from twinmill.robots import key as keys
+from twinmill.robots import tell
 from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
 from twinmill.terminal import PlainConsole
-from twinmill_cli import characterise, swarm
+from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_screen import status_table
 from twinmill_cli.swarm_verdict import of_busy
 
 KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
 VERBS = turbopi.signed_command_t
+VERBS_START = turbopi.swarm_command_t.VERB_START
 
 
 class Bus:
@@ -60,13 +62,70 @@ def hold(fleet: Fleet, robot_id: int, *, key=KEY, session=SESSION, made_us=0) ->
     fleet.bus.hear("SWARM_SIGNED", keys.sign(keys.of_robot(key, robot_id), sealed.encode()))
 
 
+@pytest.mark.parametrize(
+    ("mode", "timeout_ms", "says"),
+    [
+        (DRIVING, 0, (0.0, False, None)),
+        (DRIVING, 2000, (2.0, True, False)),
+        (TELEMETRY.MODE_STOPPED, 0, (None, None, None)),
+    ],
+)
+def test_status_tells_of_a_link_only_where_a_robot_drives(mode, timeout_ms, says):
+    """What holds of one that stands, the next start says: 0.0 was taken for untethered."""
+    data = robot(1, mode, timeout_ms).to_json()
+    assert (data["link_timeout_s"], data["tethered"], data["held"]) == says
+
+
+def test_a_start_says_what_the_robot_has_signed_since_and_not_what_it_said_before():
+    """It may have driven before, for another operator with another time."""
+    fleet, command = fleet_of(known := robot(1, DRIVING, 0)), tell.make_command(VERBS_START)
+    ack = turbopi.signed_ack_t()
+    ack.session, ack.session_us, ack.accepted, ack.verb = SESSION, 500, True, VERBS_START
+    ack.command_utime_us, known.signed_acks[command.seq] = command.utime_us, ack
+    known.link.session_us = 400
+    (before,) = tell.answers(fleet, command, {1})
+    known.link.session_us, known.link.link_timeout_ms = 600, 2000
+    (since,) = tell.answers(fleet, command, {1})
+    assert (before.link_timeout_s, before.untethered) == (None, None)
+    assert (since.link_timeout_s, since.untethered) == (2.0, False)
+
+
+def test_no_start_leaves_it_to_a_robots_file_how_long_it_needs_no_operator(monkeypatch):
+    """Its `link_timeout_ms` may be 0: it would drive on once the link is lost, unasked."""
+    fleet, sent = fleet_of(robot(1)), []
+
+    def send(_, command, *__, link_timeout_ms=-1):
+        if command.verb == VERBS_START:
+            sent.append(link_timeout_ms)
+
+    monkeypatch.setattr(Fleet, "send_signed", send)
+    monkeypatch.setattr(tell, "stop", lambda *_, **__: [])
+    for options in ({}, {"link_timeout_ms": 0}):
+        tell.start(fleet, {1}, "", ahead_s=0.4, partial=False, **options)
+    assert set(sent) == {0, 2000} and sent[0] == 2000
+
+
+@pytest.mark.parametrize("words", [["start"], ["arm"], ["select", "milling"], ["status", "--once"]])
+def test_where_this_computer_has_no_network_no_robot_is_asked_for(
+    monkeypatch, tmp_path, twinmill, words
+):
+    """They were asked whether they are switched on."""
+    fleet = fleet_of()
+    fleet.bus.fault = "wlan0: not connected"
+    for module in (swarm, swarm_door):
+        monkeypatch.setattr(module, "Fleet", lambda *_, **__: fleet)
+    code, _, err = twinmill("swarm", *words, "--key", tmp_path / "key")
+    assert code == 1 and "this computer has no network (wlan0: not connected)" in err
+    assert "switched on" not in err
+
+
 @pytest.mark.parametrize("arm", [[], ["--arm"]])
 def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
     monkeypatch, tmp_path, twinmill, arm
 ):
     """Nobody was told to start: so there is no stop that a missing robot would have to confirm."""
     fleet = fleet_of(robot(1))
-    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
     words = ["start", "--robots", "1,9", *arm, "--key", tmp_path / "key"]
     code, _, err = twinmill("swarm", *words)
     assert code == 1 and "R09: not heard" in err
@@ -78,7 +137,7 @@ def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, tmp_path,
     strange = robot(1, DRIVING)
     strange.link = None
     fleet = fleet_of(strange)
-    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
     code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", tmp_path / "key")
     assert code == 1 and "R01: nothing was started: signs nothing with this operator's key" in err
     assert fleet.bus.said == []

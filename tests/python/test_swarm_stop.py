@@ -1,23 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill swarm stop` where nobody answers: a person sees at once what it waits for."""
 
+import json
 import os
 import signal
 import time
 
-from twinmill_cli import swarm
+import pytest
+
+from twinmill.data.bus import Reach
+from twinmill.robots import tell
+from twinmill.robots.fleet import Fleet
+from twinmill_cli import swarm_door, swarm_stop
+from twinmill_cli.swarm_signals import saying_nothing
+from twinmill_cli.swarm_verdict import Saying, of_stop
 
 
 def test_a_stop_that_nobody_hears_says_at_once_what_it_waits_for(monkeypatch, tmp_path, twinmill):
     monkeypatch.setenv("HOME", str(tmp_path))
-    begin_s, said_s = time.monotonic(), []
-    words = swarm._waiting_words
+    begin_s, said_s, words, stop = [], [], swarm_stop.waiting_words, swarm_stop.tell.stop
+
+    def begin(*given, **options):
+        begin_s.append(time.monotonic())
+        return stop(*given, **options)
 
     def timed(*given):
-        said_s.append(time.monotonic() - begin_s)
+        said_s.append(time.monotonic() - begin_s[0])
         return words(*given)
 
-    monkeypatch.setattr(swarm, "_waiting_words", timed)
+    monkeypatch.setattr(swarm_stop.tell, "stop", begin)
+    monkeypatch.setattr(swarm_stop, "waiting_words", timed)
     url = "udpm://239.255.76.67:7999?ttl=0"
     code, out, _ = twinmill("swarm", "stop", "--lcm-url", url, "--timeout-s", "2")
     assert code == 1 and len(said_s) == 1 and said_s[0] < 1.5
@@ -28,7 +40,7 @@ def test_a_stop_outlives_the_terminal_that_it_came_from(monkeypatch, tmp_path, t
     """As where ssh breaks off while robots out of reach have not yet signed."""
     monkeypatch.setenv("HOME", str(tmp_path))
     ended = []
-    monkeypatch.setattr(swarm, "_waiting_words", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
+    monkeypatch.setattr(swarm_stop, "waiting_words", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
     before = signal.signal(signal.SIGHUP, lambda *_: ended.append("hung up"))
     try:
         code, out, _ = twinmill("swarm", "stop", "--lcm-url", "memq://", "--timeout-s", "2")
@@ -47,8 +59,8 @@ def test_who_never_commanded_a_robot_gets_no_key_by_stopping_or_looking(
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     url = "udpm://239.255.76.67:7999?ttl=0"
     for words in (["stop", "--timeout-s", "0.5"], ["status", "--once"]):
-        code, _, err = twinmill("swarm", *words, "--lcm-url", url)
-        assert code == 1 and "there is no key here" in err
+        code, out, err = twinmill("swarm", *words, "--lcm-url", url)
+        assert code == 1 and "there is no key here" in out + err
     assert not list(tmp_path.rglob("*.key"))
 
 
@@ -66,9 +78,159 @@ def test_a_word_that_nobody_reads_keeps_no_stop_waiting():
     kept = os.dup(2)
     os.dup2(writes, 2)
     try:
-        with swarm.saying_nothing() as say:
+        with saying_nothing() as say:
             say("stop is said")
     finally:
         os.dup2(kept, 2)
     for handle in (reads, writes, kept):
         os.close(handle)
+
+
+@pytest.mark.parametrize("robots", ["", "1;2", "1-2", "R01", "100", "1,1"])
+def test_a_selection_that_cannot_be_read_stops_all_and_says_so(
+    monkeypatch, tmp_path, twinmill, robots
+):
+    """Who asks for a stop means one: who was meant is asked later."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told = []
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    words = ["--robots", robots, "--lcm-url", "memq://", "--json"]
+    code, out, _ = twinmill("swarm", "stop", *words)
+    said = json.loads(out)
+    assert code == 2 and told == [set()] and not said["ok"]
+    assert "'--robots'" in said["sentence"] and "all robots are told to stop" in said["sentence"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--lcm-url", "udp://1.2.3.4:7667"],
+        ["--lcm-url", "udpm://239.255.76.67:7667?ttl=x"],
+        ["--lcm-url", "udpm://10.0.0.1:7667"],
+        ["--timeout-s", "nan"],
+        ["--robot", "1"],
+    ],
+)
+def test_a_stop_that_is_refused_says_that_nothing_was_stopped(twinmill, words):
+    code, _, err = twinmill("swarm", "stop", *words)
+    assert code == 2 and "NOTHING WAS STOPPED" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "mode", "says"),
+    [
+        ("ab" * 32, 0o644, "others may read it (mode 644): `chmod 600"),
+        ("ab" * 20, 0o600, "this has 40 characters"),
+        ("zz" * 32, 0o600, "hexadecimal digits (0-9, a-f)"),
+        ("\udcff\udcfe", 0o600, "this has 2 characters"),
+    ],
+)
+@pytest.mark.parametrize("verb", ["start", "arm", "stop", "status"])
+def test_a_key_that_cannot_be_used_is_named_with_its_remedy(
+    monkeypatch, tmp_path, twinmill, verb, text, mode, says
+):
+    """Its robots were told apart from others by it, and were said to have another key."""
+    key = tmp_path / "swarm.key"
+    key.write_bytes(text.encode(errors="surrogateescape"))
+    key.chmod(mode)
+    more = ["--timeout-s", "0.5"] if verb == "stop" else []
+    words = [verb, "--lcm-url", "memq://", "--key", key, "--json", *more]
+    code, out, err = twinmill("swarm", *words)
+    assert code == 1 and f"--key {key}" in out + err and says in out + err
+    said = json.loads(out)
+    if verb in ("start", "arm"):
+        assert "Nothing was said to any robot." in said["sentence"]
+    if verb == "stop":
+        assert "No robot's signature could be checked: " in said["sentence"]
+    if verb == "status":
+        assert says in said["key_fault"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["start", "--robots", ""],
+        ["start", "--robots", "1,2,1"],
+        ["start", "--behavior", ""],
+        ["start", "--channel-prefix", ""],
+        ["start", "--untethered", "--link-timeout-s", "3"],
+        ["start", "--lcm-url", "udp://1.2.3.4:7667"],
+        ["arm", "--robots", ""],
+        ["arm", "--lcm-url", "239.255.76.67:7667"],
+        ["select", ""],
+        ["select", "milling", "--robots", "100"],
+        ["status", "--lcm-url", "udpm://nowhere"],
+    ],
+)
+def test_what_is_malformed_is_refused_at_the_door(monkeypatch, tmp_path, twinmill, words):
+    """Before a robot, or a key, is looked for."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    code, out, err = twinmill("swarm", *words)
+    assert code == 2 and not out and len(err.splitlines()) == 1, err
+    assert not list(tmp_path.rglob("*.key"))
+
+
+@pytest.mark.parametrize(("verb", "words"), [("start", []), ("arm", []), ("select", ["milling"])])
+def test_ctrl_c_before_a_robot_was_told_anything_says_so(
+    monkeypatch, tmp_path, twinmill, verb, words
+):
+    """While it looks who is there: nothing at all was said."""
+
+    class Quiet:
+        """Ctrl-C comes while nobody is heard."""
+
+        def subscribe(self, *_):
+            pass
+
+        def handle_timeout(self, _):
+            os.kill(os.getpid(), signal.SIGINT)
+            return False
+
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, key: Fleet("", "", lambda _: Quiet(), key))
+    options = ["--key", tmp_path / "key", "--json"]
+    code, out, err = twinmill("swarm", verb, *words, *options)
+    sentence = "Ended by a signal: nothing was said to any robot."
+    assert code == 130 and err == f"twinmill: {sentence}\n"
+    assert json.loads(out) == {"verb": verb, "ok": False, "sentence": sentence, "robots": []}
+
+
+def test_a_stop_that_no_network_takes_says_so_and_is_tried_until_one_does(monkeypatch):
+    """The error of the kernel is told, and how often; once it is gone the stop goes out."""
+    bus = LostBus(fails=20)
+    fleet = Fleet("", connect=lambda _: bus)
+    given = tell.stop(fleet, set(), 0.3)
+    reach = fleet.reach
+    verdict = of_stop(given, Saying(0.3, tell.reached_s(fleet, 0.3), reach=reach))
+    assert verdict.code == 1 and reach.out == 0 and reach.said > 2
+    assert (
+        f"NOTHING LEFT THIS COMPUTER (eth0: Network is unreachable; tried {reach.said} times"
+        in (verdict.sentence)
+    )
+    assert "said all the time" not in verdict.sentence and "--host" not in verdict.sentence
+    words = swarm_stop.waiting_words(fleet, set(), tell.Hosts(()), 0.3)
+    assert words.startswith("nothing leaves this computer (eth0: Network is unreachable)")
+    tell.stop(fleet, set(), 1.0)
+    assert 0 < fleet.reach.out < fleet.reach.said
+
+
+class LostBus:
+    """A network that is gone for a number of packets, and then comes back."""
+
+    def __init__(self, fails):
+        self.reach, self.fails = Reach(), fails
+
+    def subscribe(self, *_):
+        pass
+
+    def handle_timeout(self, timeout_ms):
+        time.sleep(timeout_ms / 1e3)
+        return False
+
+    def publish(self, *_):
+        self.fails -= 1
+        if self.fails < 0:
+            self.reach.note({"eth0"}, "")
+            return
+        self.reach.note(set(), "eth0: Network is unreachable")
+        raise OSError("the bus cannot be reached")

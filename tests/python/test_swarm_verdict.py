@@ -7,20 +7,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from twinmill.data.bus import Reach
 from twinmill.robots.countdown import NOT_BEGUN, STOPPED, Dropouts
 from twinmill.robots.fleet import Heard
 from twinmill.robots.hold import (
     BY_BUTTON,
     BY_COMMAND,
     DRIVES,
+    DRIVES_ANEW,
     LINK_LOST,
     RESTARTED,
     SILENT,
     of_taken,
 )
 from twinmill.robots.tell import NEVER_HEARD, Answer, Start
-from twinmill_cli import swarm
+from twinmill_cli.swarm_end import finish
 from twinmill_cli.swarm_verdict import (
+    Saying,
     Verdict,
     of_arm,
     of_clocks,
@@ -52,14 +55,20 @@ REFUSED = answer(3, accepted=False, reason="no behaviour 'dance'", mode="stopped
 UNSIGNED = answer(4, signed=False, mode="stopped", stands=True)
 UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="")
 FAULTY = answer(6, mode="fault", alarms=["camera lost"])
+LOST = answer(8, mode="stopped", stands=True, lost_link=True)
+LOOSE = answer(9, link_timeout_s=0.0)
+SHORT = answer(1, link_timeout_s=2.0)
 DOUBLE = answer(7, mode="stopped", stands=True, is_double=True)
 
 
-def begun(*answers: Answer, stopped=(), late=(), out=None, taken=()) -> Start:
+def begun(*answers: Answer, stopped=(), late=(), out=None, taken=(), **sent) -> Start:
     dropouts, called_off = Dropouts(out or {}, frozenset(taken)), bool(stopped or out)
-    return Start(0, list(answers), {}, called_off, list(stopped), list(late), dropouts)
+    return Start(0, list(answers), {}, called_off, list(stopped), list(late), dropouts, **sent)
 
 
+CUT = Saying(0.4, 0.4, is_cut_short=True)
+CAUGHT = Reach(said=300, fault="eth0: not connected")
+CAME_BACK = Reach(100, 40, 1.0, {"eth0"}, "eth0: not connected")
 BY_START = Heard(9, 1, 7, 8, "start milling at 12:00:01")
 TAKEN, TAKEN_AND_LOST = of_taken(BY_START), of_taken(BY_START, LINK_LOST)
 
@@ -68,8 +77,12 @@ TAKEN, TAKEN_AND_LOST = of_taken(BY_START), of_taken(BY_START, LINK_LOST)
 SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
     (of_stop([STANDS], is_of_some=True), "R02 stands.", 0),
-    (of_stop([STANDS], unheard=["robot9"]), "NOT ALL STAND: Nothing was heard from robot9", 1),
-    (of_stop([], unheard=["robot9"]), "No robot was heard in 10 s", 1),
+    (
+        of_stop([STANDS], Saying(unheard=["robot9"])),
+        "NOT ALL STAND: Nothing was heard from robot9",
+        1,
+    ),
+    (of_stop([], Saying(unheard=["robot9"])), "No robot was heard in 10 s", 1),
     (of_stop([STANDS], is_of_some=True).beside(["R01"]), "R02 stands. R01 drives, and was", 0),
     (of_stop([]), "No robot was heard in 10 s", 1),
     (of_stop([STANDS, GOOD]), "NOT ALL STAND: R01: no stop was confirmed.", 1),
@@ -80,51 +93,70 @@ SENTENCES = [
     (of_arm([REFUSED, GOOD]), "Not all are armed: R03", 1),
     (of_select([GOOD], "milling"), "All chose milling.", 0),
     (of_select([REFUSED, GOOD], "dance"), "Not all did: R03 did not obey", 1),
-    (of_start(begun(GOOD), untethered=False), "Started at", 0),
-    (of_start(begun(GOOD), untethered=True), "Started at", 0),
-    (of_start(begun(REFUSED, GOOD), untethered=False), "Started at", 1),
-    (of_start(begun(FAULTY, GOOD), untethered=False), "Started at", 1),
-    (of_start(begun(STANDS), untethered=False), "NOBODY DRIVES, though it is", 1),
-    (of_start(begun(STANDS, late=[STANDS]), untethered=True), "NOBODY STARTED: R02 did not in", 1),
-    (of_start(begun(GOOD, STANDS, late=[STANDS]), untethered=True), "Started at", 1),
-    (of_start(begun(REFUSED), untethered=False), "NOBODY STARTED: R03 refused", 1),
-    (of_start(begun(REFUSED, stopped=[STANDS]), untethered=False), "Called off: R03 refused", 1),
+    (of_start(begun(GOOD)), "Started at", 0),
+    (of_start(begun(SHORT)), "Started at", 0),
+    (of_start(begun(LOOSE)), "Started at", 1),
+    (of_start(begun(LOOSE, link_timeout_ms=0)), "Started at", 0),
+    (of_start(begun(SHORT, link_timeout_ms=0)), "Started at", 1),
+    (of_start(begun(REFUSED, GOOD)), "Started at", 1),
+    (of_start(begun(FAULTY, GOOD)), "Started at", 1),
+    (of_start(begun(STANDS)), "NOBODY DRIVES, though it is", 1),
+    (of_start(begun(STANDS, late=[STANDS])), "NOBODY STARTED: R02 did not in", 1),
+    (of_start(begun(GOOD, STANDS, late=[STANDS])), "Started at", 1),
+    (of_start(begun(REFUSED)), "NOBODY STARTED: R03 refused", 1),
+    (of_start(begun(REFUSED, stopped=[STANDS])), "Called off: R03 refused", 1),
     (
-        of_start(begun(UNHEARD, GOOD, stopped=[STANDS]), untethered=False),
+        of_start(begun(UNHEARD, GOOD, stopped=[STANDS])),
         "Called off: R05 did not acknowledge in time",
         1,
     ),
     (
-        of_start(begun(GOOD, stopped=[STANDS], out={1: STOPPED, 2: STOPPED}), untethered=False),
+        of_start(begun(GOOD, stopped=[STANDS], out={1: STOPPED, 2: STOPPED})),
         "Called off: R01, R02 were stopped by another command. All were told to stop: All stand.",
         1,
     ),
     (
-        of_start(begun(GOOD, stopped=[STANDS], out={1: NOT_BEGUN}), untethered=False),
+        of_start(begun(GOOD, stopped=[STANDS], out={1: NOT_BEGUN})),
         "Called off: R01 was not driving when the others had begun. All were told to stop: All",
         1,
     ),
     (
-        of_start(begun(GOOD, out={1: "taken over"}, taken=[1], stopped=[STANDS]), untethered=False),
+        of_start(begun(GOOD, out={1: "taken over"}, taken=[1], stopped=[STANDS])),
         "Called off: R01 was taken over. R01: left to that operator. The others were told to stop:"
         " R02 stands.",
         1,
     ),
     (
-        of_start(begun(GOOD, out={1: "taken over"}, taken=[1]), untethered=False),
+        of_start(begun(GOOD, out={1: "taken over"}, taken=[1])),
         "Called off: R01 was taken over. R01: left to that operator.",
         1,
     ),
     (
-        of_stop([STANDS, GOOD], 2.5, is_cut_short=True),
+        of_stop([STANDS, GOOD], Saying(2.5, 2.5, is_cut_short=True)),
         "NOT ALL STAND: R01: no stop was confirmed. SWITCH OFF BY HAND what still drives. Ended by "
         "a signal after 2.5 s. R02 confirmed it.",
         1,
     ),
-    (of_stop([], 0.4, is_cut_short=True), "No robot was heard in 0.4 s; stop was said all the", 1),
-    (of_stop([STANDS], 0.4, is_cut_short=True), "R02 stands; others may not have been heard", 1),
-    (of_stop([STANDS], 1.4, is_cut_short=True), "All stand.", 0),
-    (of_stop([STANDS], 0.4, is_cut_short=True, is_of_some=True), "R02 stands.", 0),
+    (of_stop([], CUT), "No robot was heard in 0.4 s; stop was said all the time.", 1),
+    (of_stop([STANDS], CUT), "R02 stands; others may not have been heard yet.", 1),
+    (of_stop([STANDS], Saying(1.4, 1.4, is_cut_short=True)), "All stand.", 0),
+    (of_stop([STANDS], CUT, is_of_some=True), "R02 stands.", 0),
+    (
+        of_stop([], Saying(reach=CAUGHT)),
+        "NOTHING LEFT THIS COMPUTER (eth0: not connected; tried",
+        1,
+    ),
+    (of_stop([STANDS], Saying(10, 0.0, reach=CAUGHT)), "R02 stands; others may not have been", 1),
+    (of_stop([STANDS], Saying(reach=CAUGHT), is_of_some=True), "R02 stands. NOTHING LEFT", 0),
+    (of_stop([STANDS], Saying(10, 4.0, reach=CAME_BACK)), "All stand. 60 of 100 times it did", 0),
+    (of_stop([], Saying(reach=CAME_BACK)), "No robot was heard in 10 s; stop was said on eth0.", 1),
+    (
+        of_stop([UNSIGNED], Saying(key_fault="No signature could be checked: --key k: ...")),
+        "NOT ALL STAND: R04: no stop was confirmed. SWITCH OFF BY HAND what still drives. No "
+        "signature could be checked: --key k",
+        1,
+    ),
+    (of_stop([STANDS, LOST]), "All stand. R08 stood before: it had lost its operator.", 0),
     (of_end(WELL, {"R01": TAKEN, "R02": DRIVES}, WELL), "All stand; R01 was taken over by", 1),
     (of_end(WELL, {"R01": TAKEN_AND_LOST}, None), "All stand: R01: taken over by another", 1),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
@@ -141,7 +173,22 @@ SENTENCES = [
         1,
     ),
     (of_end(WELL, {"R01": RESTARTED, "R02": DRIVES}, WELL), "All stand; R01 stood before: its", 1),
-    (of_end(WELL, {"R01": BY_BUTTON, "R02": DRIVES}, WELL), "All stand.", 0),
+    (
+        of_end(WELL, {"R01": BY_BUTTON, "R02": DRIVES}, WELL),
+        "All stand; R01 stood before: its b",
+        0,
+    ),
+    (
+        of_end(WELL, {"R01": LINK_LOST, "R02": DRIVES}, WELL),
+        "All stand; R01 stood before: it had",
+        1,
+    ),
+    (
+        of_end(WELL, {"R01": SILENT, "R02": DRIVES}, WELL),
+        "All stand; R01 had not been heard for",
+        1,
+    ),
+    (of_end(WELL, {"R01": DRIVES_ANEW}, WELL), "All stand; R01 drove after its program was", 1),
     (of_end(WELL, {"R01": BY_COMMAND, "R02": BY_BUTTON}, None), "All stand: R01: stopped", 0),
     (of_end(WELL, {"R01": BY_COMMAND, "R02": LINK_LOST}, None), "All stand: R01: stopped", 1),
 ]
@@ -154,14 +201,36 @@ def test_each_sentence_has_its_code(verdict, begins, code):
 
 
 def test_a_fault_is_told_apart_from_driving():
-    said = of_start(begun(FAULTY, GOOD), untethered=False).sentence
+    said = of_start(begun(FAULTY, GOOD)).sentence
     assert "but not all: R06 with a fault" in said
 
 
+def test_what_a_start_says_of_a_lost_link_is_what_the_robots_have_signed():
+    """A robot whose file says `link_timeout_ms = 0` had driven on, and 2 s were told."""
+    well, loose = of_start(begun(SHORT)).sentence, of_start(begun(SHORT, LOOSE)).sentence
+    assert "they stop by themselves 2 s after they have lost this command." in well
+    assert "R09 drives on for ever without this command" in loose
+    assert "R01 has not signed yet" in of_start(begun(GOOD)).sentence
+    assert LOOSE.to_json()["untethered"] is True and SHORT.to_json()["link_timeout_s"] == 2.0
+    assert GOOD.to_json()["untethered"] is None
+
+
+@pytest.mark.parametrize(
+    "verdict",
+    [
+        of_arm([REFUSED, UNHEARD]),
+        of_select([REFUSED, UNHEARD], "dance"),
+        of_start(begun(REFUSED, UNHEARD, GOOD)),
+        of_start(begun(REFUSED, UNHEARD, stopped=[STANDS], out={})),
+    ],
+)
+def test_each_sentence_stands_alone(verdict):
+    """Whoever reads JSON sees no table above it."""
+    assert "above" not in verdict.sentence and "no behaviour 'dance'" in verdict.sentence
+
+
 def test_what_is_called_off_says_whether_all_stand():
-    still, moving = (
-        of_start(begun(REFUSED, stopped=[a]), untethered=False) for a in (STANDS, GOOD)
-    )
+    still, moving = (of_start(begun(REFUSED, stopped=[a])) for a in (STANDS, GOOD))
     assert "All stand." in still.sentence and "NOT ALL STAND: R01" in moving.sentence
 
 
@@ -185,14 +254,14 @@ answers = st.builds(
 @given(st.lists(answers, max_size=4))
 def test_all_stand_is_said_with_code_0_and_only_of_robots_that_have_signed_it(given):
     verdict = of_stop(given)
-    assert verdict.ok == (verdict.sentence == "All stand.")
+    assert verdict.ok == verdict.sentence.startswith("All stand.")
     sure = [a.accepted and a.signed and a.stands and not a.is_double for a in given]
     assert verdict.ok == (bool(given) and all(sure))
 
 
 @given(st.lists(answers, min_size=1, max_size=4))
 def test_a_start_is_well_only_where_all_have_signed_it_and_drive(given):
-    verdict = of_start(begun(*given), untethered=False)
+    verdict = of_start(begun(*given))
     drive = [a.accepted and a.signed and a.mode in ("running", "script") for a in given]
     assert (
         verdict.ok
@@ -206,10 +275,10 @@ def test_a_start_is_well_only_where_all_have_signed_it_and_drive(given):
 def test_the_table_of_robots_changes_nothing_of_the_verdict(capsys, verdict, last):
     """The last robot of the table had decided."""
     given = [REFUSED, UNSIGNED, last]
-    assert swarm._finish("stop", given, verdict, {}, as_json=True) == verdict.code
+    assert finish("stop", given, verdict, {}, as_json=True) == verdict.code
     data = json.loads(capsys.readouterr().out)
     assert (data["ok"], data["sentence"]) == (verdict.ok, verdict.sentence)
-    assert swarm._finish("stop", given, verdict, {}, as_json=False) == verdict.code
+    assert finish("stop", given, verdict, {}, as_json=False) == verdict.code
     assert verdict.sentence in capsys.readouterr().out
 
 

@@ -11,7 +11,7 @@ import pytest
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.terminal import PlainConsole
-from twinmill_cli.swarm import ended_by_signals
+from twinmill_cli.swarm_signals import ended_by_signals
 from twinmill_cli.voice import Voice
 
 BLOCKED_S = 0.3

@@ -1,14 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Command lines: logs, import, calibration, the swarm."""
 
-import _signal  # the part of `signal` that takes no time to import
+from twinmill_cli import early
 
-HEARD = _signal.getsignal(_signal.SIGINT)
-if HEARD is _signal.default_int_handler:
-    try:
-        _signal.signal(_signal.SIGINT, _signal.SIG_DFL)  # ends what follows without a traceback
-    except ValueError:  # not in the main thread
-        HEARD = None
+early.begin()  # until a command begins, or the end of this module
 
 import gc  # noqa: E402
 import os  # noqa: E402
@@ -18,9 +13,9 @@ import os  # noqa: E402
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 gc.disable()  # nothing of what is imported is garbage, and to look for it takes long
-import twinmill_cli.lazy  # noqa: E402, F401 what all need, Typer above all
+from twinmill_cli import ending, lazy, spelling  # noqa: E402, F401 what all need, Typer above all
 
 gc.freeze()
 gc.enable()
-if HEARD is _signal.default_int_handler:
-    _signal.signal(_signal.SIGINT, HEARD)
+if not early.is_program():
+    early.end()

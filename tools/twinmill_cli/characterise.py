@@ -49,8 +49,9 @@ if working():  # not for --help
     from twinmill.terminal import progress_bar
     from twinmill_cli.keyboard import any_key
     from twinmill_cli.ros_script import write_script
-    from twinmill_cli.swarm import check_clocks, ended_by_signals, refuse_doubles
-    from twinmill_cli.swarm_verdict import of_stop
+    from twinmill_cli.swarm_door import check_clocks, refuse_doubles
+    from twinmill_cli.swarm_signals import ended_by_signals
+    from twinmill_cli.swarm_verdict import Saying, of_stop
     from twinmill_cli.voice import Voice
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
@@ -283,7 +284,7 @@ class Run:
                 given = tell.stop(self.fleet, {self.robot_id})
                 with self.fleet.unwatched():
                     self.fleet.listen(AFTER_S)
-        stopped = of_stop(given)
+        stopped = of_stop(given, Saying(reach=self.fleet.reach))
         return why if stopped.ok else "; ".join(filter(None, [why, stopped.sentence]))
 
     def _listen(self) -> None:

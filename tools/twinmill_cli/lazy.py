@@ -15,6 +15,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
+from twinmill_cli import early
 
 HELP = {"-h", "--help"}
 
@@ -56,7 +57,11 @@ class LazyCommand(TyperCommand):
         """The subcommand itself."""
         app = typer.Typer()
         gc.disable()  # see __init__.py
-        module = import_module(self.module)
+        early.begin()
+        try:
+            module = import_module(self.module)
+        finally:
+            early.end()
         gc.freeze()
         gc.enable()
         module.register(app)

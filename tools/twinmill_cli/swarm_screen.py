@@ -17,8 +17,9 @@ from twinmill_cli.swarm_verdict import CLOCK_WARN_S
 
 def answer_table(given: list[Answer]) -> Fitting:
     """One row a robot: what it answered to a command."""
-    table = Table(box=box.SIMPLE_HEAD)
-    for column in ("robot", "acknowledged", "now"):
+    table = Table(box=box.SIMPLE_HEAD, show_edge=False)
+    is_start = any(answer.link_timeout_s is not None for answer in given)
+    for column in ("robot", "acknowledged", "now", *(["link"] if is_start else [])):
         table.add_column(column)
     for answer in given:
         obeyed = answer.accepted and answer.signed
@@ -26,12 +27,24 @@ def answer_table(given: list[Answer]) -> Fitting:
         gone = answer.last_heard_s is not None and answer.last_heard_s > GONE_S
         mode = f"not heard for {answer.last_heard_s:.0f} s" if gone else answer.mode or "?"
         now = Text("; ".join([mode, *answer.alarms]), "red" if gone or answer.alarms else "")
-        table.add_row(f"R{answer.robot_id:02d}", said, now)
+        table.add_row(f"R{answer.robot_id:02d}", said, now, *([_kept(answer)] if is_start else []))
     return Fitting(table)
 
 
-def status_table(robots: list[Robot]) -> Fitting | Text:
-    """One row a robot: how it is."""
+def _kept(answer: Answer) -> Text:
+    """For how long it drives on without its operator, as it has signed."""
+    if answer.link_timeout_s is None:
+        return Text("?")
+    return Text("untethered" if answer.untethered else f"{answer.link_timeout_s:g} s")
+
+
+def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text:
+    """One row a robot: how it is.
+
+    Args:
+        robots: to be shown.
+        has_key: what they sign could be checked.
+    """
     if not robots:
         return Text("No robot is heard.")
     table = Table(box=None, padding=(0, 1, 0, 0))
@@ -56,7 +69,7 @@ def status_table(robots: list[Robot]) -> Fitting | Text:
                 "red" if abs(robot.clock_s) > CLOCK_WARN_S else "",
             ),
             Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
-            _link(robot),
+            _link(robot) if has_key else Text("not checked: no key"),
             Text("; ".join(robot.alarms), "bold red"),
         )
     return Fitting(table)

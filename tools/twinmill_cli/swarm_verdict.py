@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 
+from twinmill.data.bus import Reach
 from twinmill.robots.countdown import STOPPED
 from twinmill.robots.fleet import Robot
 from twinmill.robots.hold import State
@@ -41,49 +42,109 @@ class Verdict:
         return Verdict(self.ok, f"{self.sentence} {', '.join(driving)} {verb}, and was not asked.")
 
 
-def of_stop(
-    given: list[Answer],
-    timeout_s: float = 10.0,
-    *,
-    is_of_some: bool = False,
-    unheard: Sequence[str] = (),
-    is_cut_short: bool = False,
-) -> Verdict:
+@dataclass(frozen=True)
+class Saying:
+    """How a stop was said.
+
+    Attributes:
+        passed_s: for how long.
+        reached_s: for how long it left this computer; None: it need not have been said for longer.
+        unheard: machines that were told by name, and from which no robot spoke.
+        is_cut_short: a signal ended it.
+        reach: how far it got.
+        key_fault: a sentence on why no robot's signature could be checked; empty: they were.
+    """
+
+    passed_s: float = 10.0
+    reached_s: float | None = None
+    unheard: Sequence[str] = ()
+    is_cut_short: bool = False
+    reach: Reach = field(default_factory=Reach)
+    key_fault: str = ""
+
+    @property
+    def hint(self) -> str:
+        """Advice where a robot was not heard."""
+        if self.unheard:
+            names = ", ".join(self.unheard)
+            return f"Nothing was heard from {names}: is the name or address right?"
+        return "Where the network carries no multicast, give a robot's address: swarm stop --host."
+
+    @property
+    def lost(self) -> str:
+        """A sentence on what did not leave this computer; empty where all did."""
+        tries, fails = self.reach.said, self.reach.said - self.reach.out
+        if not fails:
+            return ""
+        if not self.reach.out:
+            return f"NOTHING LEFT THIS COMPUTER ({self.reach.fault}; tried {tries} times)."
+        return f"{fails} of {tries} times it did not leave this computer ({self.reach.fault})."
+
+    @property
+    def cut(self) -> str:
+        """A sentence on what ended it early; empty where nothing did."""
+        return f"Ended by a signal after {self.passed_s:.1f} s." if self.is_cut_short else ""
+
+    @property
+    def unanswered(self) -> str:
+        """Sentences where no robot was heard at all."""
+        heard = f"No robot was heard in {round(self.passed_s, 1):g} s"
+        if self.reach.said and not self.reach.out:
+            by_hand = "Stop robots by their buttons, or from a computer that has a network."
+            return _joined(self.lost, f"{heard}.", by_hand)
+        where = f" on {', '.join(sorted(self.reach.networks))}" if self.reach.networks else ""
+        time = "" if self.lost else " all the time"
+        return _joined(f"{heard}; stop was said{time}{where}.", self.lost)
+
+
+def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool = False) -> Verdict:
     """All stand, or which robots must be stopped by hand.
 
     Args:
         given: what they answered.
-        timeout_s: for how long it was said.
+        how: it was said.
         is_of_some: these alone were asked, and others may be there.
-        unheard: machines that were told by name, and from which no robot spoke.
-        is_cut_short: a signal ended it after that time.
     """
-    hint = "Where the network carries no multicast, give a robot's address: swarm stop --host."
-    if unheard:
-        hint = f"Nothing was heard from {', '.join(unheard)}: is the name or address right?"
-    cut = f"Ended by a signal after {timeout_s:.1f} s." if is_cut_short else ""
+    how = how or Saying()
     if not given:
-        words = f"No robot was heard in {round(timeout_s, 1):g} s; stop was said all the time."
-        return Verdict(False, _joined(words, cut, hint))
+        reached = how.reach.out or not how.reach.said
+        hint = how.hint if reached or how.unheard else ""
+        return Verdict(False, _joined(how.unanswered, how.cut, hint, how.key_fault))
     double = [a for a in given if a.is_double]
     unconfirmed = [a for a in given if not ((a.accepted and a.signed and a.stands) or a.is_double)]
-    verb = "stands" if len(given) == 1 else "stand"
     if not double and not unconfirmed:
-        if unheard:
-            words = f"NOT ALL STAND: {hint} Whoever was heard stands."
-            return Verdict(False, _joined(words, cut))
-        if is_cut_short and not is_of_some and timeout_s < STOP_LEAST_S:
-            words = f"{_names(given)} {verb}; others may not have been heard yet."
-            return Verdict(False, _joined(words, cut))
-        return Verdict(True, f"{_names(given)} {verb}." if is_of_some else "All stand.")
+        return _of_standing(given, how, is_of_some=is_of_some)
     told = [f"{_names(unconfirmed)}: no stop was confirmed"] if unconfirmed else []
     told += [f"{_names(double)}: two robots have this number, one may drive"] if double else []
-    words = f"NOT ALL STAND: {'; '.join(told)}. SWITCH OFF BY HAND what still drives."
     silent = [a for a in unconfirmed if a.reason == NEVER_HEARD]
-    words += f" {_names(silent)}: {NEVER_HEARD}." if silent else ""
     sure = [a for a in given if a not in unconfirmed and a not in double]
-    cut += f" {_names(sure)} confirmed it." if cut and sure else ""
-    return Verdict(False, _joined(words, cut, hint if silent or unheard else ""))
+    return Verdict(
+        False,
+        _joined(
+            f"NOT ALL STAND: {'; '.join(told)}. SWITCH OFF BY HAND what still drives.",
+            how.key_fault if unconfirmed else "",
+            f"{_names(silent)}: {NEVER_HEARD}." if silent else "",
+            how.lost,
+            how.cut,
+            f"{_names(sure)} confirmed it." if how.cut and sure else "",
+            how.hint if silent or how.unheard else "",
+        ),
+    )
+
+
+def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdict:
+    """All that answered have confirmed the stop; others may be there."""
+    names = f"{_names(given)} {'stands' if len(given) == 1 else 'stand'}"
+    lost_link = [a for a in given if a.lost_link]
+    before = f"{_names(lost_link)} stood before: it had lost its operator." if lost_link else ""
+    if how.unheard:
+        words = f"NOT ALL STAND: {how.hint} Whoever was heard stands."
+        return Verdict(False, _joined(words, before, how.lost, how.cut))
+    too_short = how.reached_s is not None and how.reached_s < STOP_LEAST_S
+    if too_short and not is_of_some:
+        words = f"{names}; others may not have been heard yet."
+        return Verdict(False, _joined(words, before, how.lost, how.cut))
+    return Verdict(True, _joined(f"{names}." if is_of_some else "All stand.", before, how.lost))
 
 
 def _joined(*sentences: str) -> str:
@@ -148,7 +209,8 @@ def of_arm(given: list[Answer]) -> Verdict:
     """Who may be started."""
     wrong = _disobeyed(given)
     if wrong:
-        return Verdict(False, f"Not all are armed: {_names(wrong)} did not obey, see above.")
+        words = f"Not all are armed: {_names(wrong)} did not obey{_because(wrong)}."
+        return Verdict(False, words)
     return Verdict(True, "All are armed.")
 
 
@@ -156,17 +218,16 @@ def of_select(given: list[Answer], behavior: str) -> Verdict:
     """Who does what was chosen."""
     wrong = _disobeyed(given)
     if wrong:
-        words = f"Not all did: {_names(wrong)} did not obey, see above{_hint(given)}."
+        words = f"Not all did: {_names(wrong)} did not obey{_because(wrong)}{_hint(given)}."
         return Verdict(False, words)
     return Verdict(True, f"All chose {behavior}.")
 
 
-def of_start(begun: Start, untethered: bool) -> Verdict:
+def of_start(begun: Start) -> Verdict:
     """Who drives."""
     given = begun.answers
     if begun.called_off:
         return _of_called_off(begun)
-    going_on = "They drive on by themselves." if untethered else "Ctrl-C stops them."
     at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
     faulty = [a for a in given if a.mode == "fault"]
     standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
@@ -176,18 +237,48 @@ def of_start(begun: Start, untethered: bool) -> Verdict:
     idle = [a for a in standing if a.robot_id not in late]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING]
     told = [
-        f"{_names(faulty)} with a fault, and will drive once it is over" if faulty else "",
-        f"{_names(idle)} did not" if idle else "",
+        f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
+        if faulty
+        else "",
+        f"{_names(idle)} did not{_because(idle)}" if idle else "",
         f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
-        f"{_names(unsure)} drive without having confirmed it" if unsure else "",
+        f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
+        *_odd_links(begun),
     ]
     if not any(told):
-        return Verdict(True, f"Started at {at}. {going_on}")
+        return Verdict(True, f"Started at {at}. {_going_on(begun)}")
     missing = "; ".join(filter(None, told))
-    words = f"Started at {at}, but not all: {missing}, see above. {going_on}"
+    words = f"Started at {at}, but not all: {missing}. {_going_on(begun)}"
     if begun.late:
         words = f"{words} {of_stop(begun.late, is_of_some=True).sentence}"
     return Verdict(False, words)
+
+
+def _going_on(begun: Start) -> str:
+    """How robots that drive stop, as was asked for, and who has not signed that yet."""
+    if begun.link_timeout_ms == 0:
+        words = "They drive on by themselves"
+    else:
+        words = "Ctrl-C stops them; they stop by themselves "
+        words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
+    waiting = [a for a in begun.answers if a.mode in DRIVING and a.link_timeout_s is None]
+    return f"{words}{f', which {_names(waiting)} has not signed yet' if waiting else ''}."
+
+
+def _odd_links(begun: Start) -> list[str]:
+    """Words on robots that have signed another time without their operator than was sent."""
+    asked_s = begun.link_timeout_ms / 1e3
+    return [
+        f"R{a.robot_id:02d} drives on "
+        f"{f'for {a.link_timeout_s:g} s' if a.link_timeout_s else 'for ever'} without this command"
+        for a in begun.answers
+        if a.link_timeout_s is not None and a.link_timeout_s != asked_s
+    ]
+
+
+def _alarms(given: list[Answer]) -> str:
+    words = "; ".join(sorted({alarm for a in given for alarm in a.alarms}))
+    return f" ({words})" if words else ""
 
 
 def _of_called_off(begun: Start) -> Verdict:
@@ -212,7 +303,9 @@ def _of_nobody(begun: Start, at: str) -> str:
         return f"NOBODY STARTED: {_names(begun.late)} did not in time. Told to stop: {stopped}"
     if len(_disobeyed(begun.answers)) == len(begun.answers):
         return f"NOBODY STARTED: {_why(begun.answers)}."
-    return f"NOBODY DRIVES, though it is {at}: see above. Ctrl-C stops them."
+    waiting = [a for a in begun.answers if a.accepted and a.signed]
+    words = f"{_names(waiting)} accepted the start, and may begin late by a clock that is behind"
+    return f"NOBODY DRIVES, though it is {at}: {words}. Ctrl-C stops them."
 
 
 def of_end(
@@ -234,7 +327,7 @@ def of_end(
         return stopped
     early: dict[State, list[str]] = {}
     for name, state in states.items():
-        if state.is_taken or (state.stands and not (stopped and state.is_meant)):
+        if state.stands or state.before:
             early.setdefault(state, []).append(name)
     told = [_told_early(names, state, bool(stopped)) for state, names in early.items()]
     if begun is None:
@@ -251,7 +344,7 @@ def of_end(
 def _told_early(names: list[str], state: State, is_stopped: bool) -> str:
     """Sentence on robots that had ended before they were stopped."""
     if not state.stands:
-        return f"{', '.join(names)} {state.words}"
+        return f"{', '.join(names)} {state.before}"
     return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {state.words}"
 
 
@@ -278,8 +371,21 @@ def _why(given: list[Answer]) -> str:
     """Why not all start."""
     refused = [a for a in given if a.accepted is False]
     if refused:
-        return f"{_names(refused)} refused, see above{_hint(given)}"
-    return f"{_names(_disobeyed(given))} did not acknowledge in time"
+        return f"{_names(refused)} refused{_because(refused)}{_hint(given)}"
+    silent = _disobeyed(given)
+    return f"{_names(silent)} did not acknowledge in time{_because(silent)}"
+
+
+def _because(given: list[Answer]) -> str:
+    """Reasons that robots gave, or that are known of them; by name where they differ."""
+    by: dict[str, list[Answer]] = {}
+    for answer in given:
+        if answer.reason:
+            by.setdefault(answer.reason, []).append(answer)
+    if len(by) == 1:
+        return f" ({next(iter(by))})"
+    each = "; ".join(f"{_names(who)}: {reason}" for reason, who in by.items())
+    return f" ({each})" if each else ""
 
 
 def _hint(given: list[Answer]) -> str:

@@ -11,6 +11,7 @@ import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill.arguments import spelled
 from twinmill.counted import counted
 from twinmill.swarm.axes import ALIASES, QUANTITIES
+from twinmill_cli import early
 from twinmill_cli.ending import leave
 from twinmill_cli.options import SpreadM, Start
 from twinmill_cli.output import AsJson, busy, deliver
@@ -122,6 +123,7 @@ def main() -> None:
 
 
 def _run(words: list[str]) -> int:
+    early.end()
     with spelled(typed):
         return app(words, prog_name="twin_sweep", standalone_mode=False)
 

@@ -5,6 +5,7 @@ The receiver of LCM's C library does not check all that a packet claims (program
 1.5.3 ended). Here a packet that is not as it should be is dropped.
 """
 
+import fcntl
 import re
 import select
 import socket
@@ -12,6 +13,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -29,17 +31,38 @@ DATAGRAM_MAX = 65535
 RECEIVE_BUFFER_BYTES = 2 << 20
 SKIP_S = 0.01  # beyond a time-out, to get past what nobody subscribed to
 REJOIN_S = 1.0  # networks come and go: Wi-Fi is made anew, a cable is unplugged
+KINDS = ("udpm", "tcpq", "memq", "file")  # of buses that LCM's library has
+# From Linux's <linux/sockios.h>, <net/if.h> and <net/if_arp.h>.
+SIOCGIFFLAGS, SIOCGIFHWADDR = 0x8913, 0x8927
+IFF_LOOPBACK, IFF_RUNNING, ARPHRD_ETHER = 0x8, 0x40, 1
 
 
-def open_bus(url: str) -> Any:
+def open_bus(url: str, *, needs_network: bool = True) -> Any:
     """A UdpBus, or what the library has for other kinds of buses, as file:// and tcpq://.
+
+    Args:
+        url: of the bus.
+        needs_network: else the bus waits for one, and what is said meanwhile fails.
 
     Raises:
         RuntimeError: there is no such bus.
     """
+    check_url(url)
     if url == "" or url.startswith("udpm:"):
-        return UdpBus(url)
+        bus = UdpBus(url)
+        if needs_network and not bus.has_network:
+            raise RuntimeError("no network")
+        return bus
     return lcm.LCM(url)
+
+
+def check_url(url: str) -> None:
+    """Raises RuntimeError if no bus has such a URL; whether it can be joined is not asked."""
+    kind = urlsplit(url).scheme
+    if url and kind not in KINDS:
+        raise RuntimeError(f"{url}: begins with none of {', '.join(f'{k}://' for k in KINDS)}")
+    if kind == "udpm":
+        _parse_url(url)
 
 
 def parse_packet(packet: bytes) -> tuple[str, bytes] | None:
@@ -86,11 +109,43 @@ class Senders:
         return len(list(groupby(sender for _, sender in self._recent))) > 2
 
 
+@dataclass
+class Reach:
+    """How far that got what was said to all.
+
+    Attributes:
+        said: how often something was.
+        out: how often of these a network took it that leads out of this computer, or the one
+            network that there is.
+        begin_s: when it first did, by time.monotonic(); None: never.
+        networks: those that took it.
+        fault: why it did not get out, the last time that it did not.
+    """
+
+    said: int = 0
+    out: int = 0
+    begin_s: float | None = None
+    networks: set[str] = field(default_factory=set)
+    fault: str = ""
+
+    def note(self, networks: set[str], fault: str) -> None:
+        """Something was said."""
+        self.said += 1
+        self.networks |= networks
+        if not networks:
+            self.fault = fault
+            return
+        self.out += 1
+        if self.begin_s is None:
+            self.begin_s = time.monotonic()
+
+
 class UdpBus:
     """Speaks and hears on every network that this machine is on; otherwise as lcm.LCM.
 
     Attributes:
         sender: who sent the message that a handler was called for last, (host, port).
+        reach: how far that got what was published; another one may be put in its place.
     """
 
     def __init__(self, url: str = ""):
@@ -100,24 +155,36 @@ class UdpBus:
             url: udpm://ADDRESS:PORT?ttl=N, as LCM has it.
 
         Raises:
-            RuntimeError: it is no such URL, or there is no network.
+            RuntimeError: it is no such URL, or there can be no socket.
         """
-        self.group, ttl = _parse_url(url)
+        self.group, self._ttl = _parse_url(url)
         self.sender: Address | None = None
+        self.reach = Reach()
         self._handlers: list[tuple[re.Pattern, Handler]] = []
         self._sequence = 0
         try:
             self._ear = _listening_socket(self.group[1])
             self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, ttl)
+            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self._ttl)
             self._mouth.setblocking(False)
         except OSError as error:
             raise RuntimeError(str(error)) from error
         self._joined: set[int] = set()
         self._join_s = 0.0
         self._renew()
-        if not self._joined:
-            raise RuntimeError("no network")
+
+    @property
+    def has_network(self) -> bool:
+        """It is on one, be it this computer's own."""
+        return bool(self._joined)
+
+    @property
+    def fault(self) -> str:
+        """Why nothing leaves this computer; empty if something does, or nothing is meant to."""
+        kinds = {name: _kind(name) for _, name in socket.if_nameindex()}
+        if self._ttl == 0 or "out" in kinds.values():
+            return ""
+        return _not_connected(kinds)
 
     def _renew(self) -> None:
         """Joins the group on networks that are new, and forgets those that are gone."""
@@ -154,17 +221,31 @@ class UdpBus:
         Raises:
             OSError: it could be said on none.
         """
-        packet, errors, said = self._packet(channel, data), [], False
+        packet, errors, took = self._packet(channel, data), {}, set()
+        names = dict(socket.if_nameindex())
         for index in sorted(self._joined):
             interface = struct.pack("=4s4si", bytes(4), bytes(4), index)
             try:
                 self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
                 self._mouth.sendto(packet, self.group)
-                said = True
+                took.add(names.get(index, ""))
             except OSError as error:
-                errors.append(error)
-        if not said:
-            raise OSError(f"the bus cannot be reached: {errors[0] if errors else 'no network'}")
+                errors[names.get(index, "")] = error.strerror
+        self._note(took, errors)
+        if not took:
+            raise OSError(f"the bus cannot be reached: {self.reach.fault}")
+
+    def _note(self, took: set[str], errors: dict[str, str]) -> None:
+        """Keeps how far a message got: a network without a carrier takes all, and loses it."""
+        kinds = {name: _kind(name) for name in took}
+        faults = [f"{n}: {why}" for n, why in errors.items() if _kind(n) != "none"]
+        faults += filter(None, [_not_connected(kinds)])
+        out = {name for name, kind in kinds.items() if kind == "out"}
+        if self._ttl == 0 and took:
+            out = {"this computer alone (ttl=0)"}
+        elif not (out or faults):
+            out = took
+        self.reach.note(out, ", ".join(faults) or "no network")
 
     def tell(self, host: str, channel: str, data: bytes) -> None:
         """Says something to one machine alone: some wireless networks carry nothing else.
@@ -223,6 +304,33 @@ def _parse_url(url: str) -> tuple[Address, int]:
     if not multicast or not 0 <= ttl <= 255:
         raise RuntimeError(f"{url}: no multicast address or no ttl in 0..255")
     return address, ttl
+
+
+def _kind(name: str) -> str:
+    """A network by its name: this computer's "own", "out" of it, "lost" its carrier, or "none"."""
+    flags = _asked(SIOCGIFFLAGS, name)
+    if flags & IFF_LOOPBACK:
+        return "own"
+    if flags & IFF_RUNNING:
+        return "out"
+    # Kernels make tunnels that nobody set up.
+    return "lost" if _asked(SIOCGIFHWADDR, name) == ARPHRD_ETHER else "none"
+
+
+def _asked(request: int, name: str) -> int:
+    """Answer of the kernel, a number of two bytes; 0 of a network that is gone."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker:
+        try:
+            answer = fcntl.ioctl(asker, request, struct.pack("16sH22x", name.encode(), 0))
+        except OSError:
+            return 0
+    (number,) = struct.unpack_from("H", answer, 16)
+    return number
+
+
+def _not_connected(kinds: dict[str, str]) -> str:
+    """Words on the networks without a carrier, or on none."""
+    return ", ".join(f"{name}: not connected" for name in sorted(kinds) if kinds[name] == "lost")
 
 
 def _listening_socket(port: int) -> socket.socket:

@@ -14,7 +14,7 @@ from typing import Any
 import turbopi
 
 from twinmill.arguments import option
-from twinmill.data.bus import Senders, open_bus
+from twinmill.data.bus import Reach, Senders, open_bus
 from twinmill.defaults import URL
 from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
@@ -49,6 +49,8 @@ COMMANDS = {
     turbopi.signed_command_t.VERB_ARM: "arm",
 }
 FRESH_US = 3_000_000  # FW_COMMAND_FRESH_US: robots obey no older word
+# How long robots drive on without their operator unless he says otherwise; firmware's default, too.
+LINK_TIMEOUT_MS = 2000
 HOLD_S = 0.1  # so often robots that were started hear that the operator is there
 
 
@@ -156,6 +158,11 @@ class Robot:
         return self.link.session_us + round(1e6 * (time.monotonic() - self.link_s))
 
     @property
+    def link_timeout_s(self) -> float | None:
+        """How long it drives on without its operator, 0: for ever; None as `is_tethered`."""
+        return self.link.link_timeout_ms / 1e3 if self.drives else None
+
+    @property
     def is_armed(self) -> bool | None:
         """It may be started; None if it has not signed that."""
         return bool(self.link.armed) if self.link else None
@@ -163,7 +170,13 @@ class Robot:
     @property
     def is_tethered(self) -> bool | None:
         """It stops when its operator is lost; None if it does not drive or has not signed that."""
-        return self.link.link_timeout_ms > 0 if self.drives else None
+        return self.link_timeout_s > 0 if self.drives else None
+
+    @property
+    def lost_link(self) -> bool:
+        """It stands, as it has signed, because it had lost its operator."""
+        link = self.link
+        return bool(link and link.status_flags & TELEMETRY.STATUS_LINK_LOST and not self.drives)
 
     @property
     def drives(self) -> bool:
@@ -239,7 +252,7 @@ class Robot:
             "armed": self.is_armed,
             "tethered": self.is_tethered,
             "held": self.is_held,
-            "link_timeout_s": self.link.link_timeout_ms / 1e3 if self.link else None,
+            "link_timeout_s": self.link_timeout_s,
             "battery_V": t.battery_V if t else None,
             "camera": self.camera,
             "clock_ahead_s": self.clock_s,
@@ -412,7 +425,13 @@ class Fleet:
                     robot.hold_s = time.monotonic()
 
     def send_signed(
-        self, command: Any, robot: Robot, session: int, counter: int, *, link_timeout_ms: int = -1
+        self,
+        command: Any,
+        robot: Robot,
+        session: int,
+        counter: int,
+        *,
+        link_timeout_ms: int = LINK_TIMEOUT_MS,
     ) -> None:
         """Says a command once to one robot that has been heard, with the operator's signature.
 
@@ -421,7 +440,7 @@ class Fleet:
             robot: for whom it is; it must have a link.
             session: for which of its sessions.
             counter: above that of all commands that it has obeyed; copies have the same.
-            link_timeout_ms: as in signed_command_t.
+            link_timeout_ms: of a start, as in signed_command_t.
 
         Raises:
             OSError: there is no way to.
@@ -451,6 +470,26 @@ class Fleet:
             self.bus.publish(channel, command.encode())
         elif hasattr(self.bus, "tell"):  # other buses know no machines
             self.bus.tell(host, channel, command.encode())
+
+    @property
+    def has_key(self) -> bool:
+        """What robots sign can be told from what anybody says."""
+        return self._key is not None
+
+    @property
+    def reach(self) -> Reach:
+        """How far that got what was said to all since `reach_anew`; other buses do not tell."""
+        return getattr(self.bus, "reach", Reach())
+
+    @property
+    def fault(self) -> str:
+        """Why nobody outside of this computer can be heard now; empty if somebody may be."""
+        return getattr(self.bus, "fault", "")
+
+    def reach_anew(self) -> None:
+        """From here on."""
+        if hasattr(self.bus, "reach"):
+            self.bus.reach = Reach()
 
     def here(self) -> set[int]:
         """Robots that are there now."""

@@ -19,12 +19,14 @@ class State:
 
     Attributes:
         words: to go on behind its name; of one that stands, why it does.
+        before: the same of one that has been stopped since, if that was not as it should be.
         stands: it has signed so, and will not drive on by itself.
         is_meant: somebody wished it so: it drives, or was stopped by a person or its script.
         is_taken: another operator has commanded it since, and it is his.
     """
 
     words: str
+    before: str = ""
     stands: bool = False
     is_meant: bool = False
     is_taken: bool = False
@@ -38,13 +40,34 @@ class State:
 
 
 DRIVES = State("drives", is_meant=True)
-WAITS = State("has accepted the start, and has not driven yet: its clock may be behind")
-DRIVES_AS_UNHEARD = State("drives, and obeyed another operator whose words were not heard here")
-DRIVES_ANEW = State("drives, though its program was started anew: it has autostart")
-SILENT = State("is not heard any more: nobody knows whether it stands")
-UNSIGNED = State("signs nothing with this operator's key any more: nobody knows whether it stands")
-DOUBLE = State("is two robots of one number, or hears another: nobody knows which does what")
-UNCONFIRMED = State("says that it stands, but not that its motor board took zero")
+WAITS = State(
+    "has accepted the start, and has not driven yet: its clock may be behind",
+    "had accepted the start, and had not driven yet",
+)
+DRIVES_AS_UNHEARD = State(
+    "drives, and obeyed another operator whose words were not heard here",
+    "had obeyed another operator whose words were not heard here",
+)
+DRIVES_ANEW = State(
+    "drives, though its program was started anew: it has autostart",
+    "drove after its program was started anew: it has autostart",
+)
+SILENT = State(
+    "is not heard any more: nobody knows whether it stands",
+    "had not been heard for a while",
+)
+UNSIGNED = State(
+    "signs nothing with this operator's key any more: nobody knows whether it stands",
+    "had signed nothing with this operator's key for a while",
+)
+DOUBLE = State(
+    "is two robots of one number, or hears another: nobody knows which does what",
+    "had been two robots of one number, or heard another",
+)
+UNCONFIRMED = State(
+    "says that it stands, but not that its motor board took zero",
+    "had said that it stood, and not that its motor board had taken zero",
+)
 RESTARTED = State("its program was started anew", stands=True)
 LINK_LOST = State("it had lost its link to this command", stands=True)
 LINK_LOST_TO_OTHER = State("it had lost its link to that operator", stands=True)
@@ -57,7 +80,7 @@ def of_taken(command: Heard, then: State | None = None) -> State:
     """A robot that was taken over by another operator, and why it stands by now."""
     words = f"taken over by another operator ({command.words})"
     if not then:
-        return State(f"was {words}", is_taken=True)
+        return State(f"was {words}", f"was {words}", is_taken=True)
     became = LINK_LOST_TO_OTHER if then is LINK_LOST else then
     return State(f"{words}, then {became.words}", stands=True, is_taken=True)
 
@@ -99,7 +122,10 @@ class Held:
             is_blind = link.status_flags & TELEMETRY.STATUS_FRAME_STALE
             blind = "no new picture of its camera" if is_blind else "a part of it does not answer"
             what = ", ".join(robot.alarms) or blind
-            return State(f"has a fault: {what}; it may drive again once that is over")
+            return State(
+                f"has a fault: {what}; it may drive again once that is over",
+                f"had a fault: {what}",
+            )
         if link.mode != TELEMETRY.MODE_STOPPED:
             self._drove[robot.robot_id] = link.mode
             if taken:
@@ -157,6 +183,25 @@ class Held:
     def states(self) -> dict[str, State]:
         """What was told last, by the robots' names."""
         return {f"R{i:02d}": state for i, state in self._told.items()}
+
+    def settle(self) -> None:
+        """Before a stop: who stands by now does so for a reason of its own, told or not."""
+        for robot in self.robots:
+            state = self._state(robot)
+            if state.stands:
+                self._told[robot.robot_id] = state
+
+    def ends(self) -> dict[str, State]:
+        """After a stop: `states`, but for those that the stop reached when they stood already."""
+        return {f"R{robot.robot_id:02d}": self._end(robot) for robot in self.robots}
+
+    def _end(self, robot: Robot) -> State:
+        told = self._told[robot.robot_id]
+        if told.stands or told.is_taken:
+            return told
+        if robot.link.session != self._sessions[robot.robot_id]:
+            return RESTARTED if told is not DRIVES_ANEW else told
+        return LINK_LOST if robot.lost_link else told
 
     @property
     def is_over(self) -> bool:

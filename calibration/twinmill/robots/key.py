@@ -3,6 +3,7 @@
 
 import hmac
 import os
+import re
 import secrets
 from contextlib import suppress
 from hashlib import blake2b
@@ -14,8 +15,13 @@ KEY_BYTES, TAG_BYTES = 32, 16
 
 
 def default_path() -> Path:
-    """Where the user's own key is."""
-    config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    """Where the user's own key is; raises ValueError if there is no home folder."""
+    try:
+        config = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    except RuntimeError as error:
+        raise ValueError(
+            f"{option('key')}: must be given, since this user has no home folder."
+        ) from error
     return Path(config) / "twinmill" / "swarm.key"
 
 
@@ -23,12 +29,18 @@ def load_or_make(path: Path | None = None) -> bytes:
     """The operator's key; one is made if there is none yet.
 
     Raises:
-        ValueError: the file is no key, or others may read it.
-        OSError: it cannot be read or made.
+        ValueError: the file is no key, or others may read it, or none can be made.
+        OSError: it cannot be read.
     """
     file = path or default_path()
     if not file.exists():
-        _make(file)
+        try:
+            _make(file)
+        except OSError as error:
+            raise ValueError(
+                f"{option('key', str(file))}: there is no key here, and none can be made "
+                f"({error.strerror}); copy the operator's, and name it."
+            ) from error
     return load(file)
 
 
@@ -48,16 +60,20 @@ def load(path: Path | None = None) -> bytes:
         )
     if not file.is_file():
         raise ValueError(f"{option('key', str(file))}: is no file; name the file of a key.")
-    if file.stat().st_mode & 0o077:
+    mode = file.stat().st_mode & 0o777
+    if mode & 0o077:
         raise ValueError(
-            f"{option('key', str(file))}: others may read it; make a new one (remove it, and flash "
-            "the robots "
-            "again), or chmod 600 if nobody has."
+            f"{option('key', str(file))}: others may read it (mode {mode:o}): `chmod 600 {file}` "
+            "if nobody has, else make a new one (remove it, and flash the robots again)."
         )
-    text = file.read_text().strip()
-    if len(text) != 2 * KEY_BYTES or set(text) - set("0123456789abcdef"):
-        raise ValueError(f"{option('key', str(file))}: is not {2 * KEY_BYTES} hexadecimal digits.")
-    return bytes.fromhex(text)
+    text = file.read_bytes().strip()
+    if not re.fullmatch(rb"[0-9a-f]{%d}" % (2 * KEY_BYTES), text):
+        raise ValueError(
+            f"{option('key', str(file))}: is no key, which is {2 * KEY_BYTES} hexadecimal digits "
+            f"(0-9, a-f), and this has {len(text)} characters; copy the operator's file again, or "
+            "make a new one (remove it, and flash the robots again)."
+        )
+    return bytes.fromhex(text.decode())
 
 
 def _make(file: Path) -> None:

@@ -18,7 +18,7 @@ import turbopi
 
 from twinmill.arguments import option
 from twinmill.robots.countdown import NOT_BEGUN, Dropouts, find_dropouts, stopped_by_another
-from twinmill.robots.fleet import Fleet, Robot
+from twinmill.robots.fleet import LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
 ALL = -1
@@ -33,7 +33,9 @@ TELL_S = 0.3  # most robots have signed by then; a person waits in silence no lo
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
+STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 NEVER_HEARD = "was never heard"
+NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
     "signs nothing with this operator's key: `twinmill robot flash` brings robots theirs; has it "
     "another "
@@ -54,6 +56,9 @@ class Answer:
         is_double: two robots speak as this one.
         alarms: what a person must know of it, loudest first.
         last_heard_s: how long ago it said anything; None if it never did.
+        link_timeout_s: of a start that it accepted: how long it drives on without hearing this
+            operator, as it has signed since; 0: for ever.
+        lost_link: it has signed that it stood because it had lost its operator.
     """
 
     robot_id: int
@@ -65,10 +70,17 @@ class Answer:
     is_double: bool
     alarms: list[str]
     last_heard_s: float | None = None
+    link_timeout_s: float | None = None
+    lost_link: bool = False
+
+    @property
+    def untethered(self) -> bool | None:
+        """It drives on for ever without its operator; None where it has not said so."""
+        return None if self.link_timeout_s is None else self.link_timeout_s == 0
 
     def to_json(self) -> dict:
         """As printed."""
-        return vars(self)
+        return vars(self) | {"untethered": self.untethered}
 
 
 @dataclass
@@ -77,14 +89,14 @@ class Order:
 
     Attributes:
         message: swarm_command_t.
-        link_timeout_ms: as in signed_command_t.
+        link_timeout_ms: of a start, as in signed_command_t.
         counter: above those of all commands that its robots have obeyed; 0: not known yet.
         sessions: of the robots that it was signed for: a robot that starts anew meanwhile does not
             obey what was meant for the one before.
     """
 
     message: Any
-    link_timeout_ms: int = -1
+    link_timeout_ms: int = LINK_TIMEOUT_MS
     counter: int = 0
     sessions: dict[int, int] = field(default_factory=dict)
 
@@ -110,6 +122,10 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
         return robots
     fleet.listen(FIND_S)
     if not fleet.here():
+        if fleet.fault:
+            raise ValueError(
+                f"no robot was heard in {FIND_S:g} s: this computer has no network ({fleet.fault})."
+            )
         raise ValueError(
             f"no robot was heard in {FIND_S:g} s; are they switched on and on this network, is "
             f"{option('lcm_url')} that of their configuration, and does the network carry "
@@ -141,7 +157,7 @@ def tell(
     robots: set[int],
     *,
     until_s: float,
-    link_timeout_ms: int = -1,
+    link_timeout_ms: int = LINK_TIMEOUT_MS,
     enough: Callable[[], object] = lambda: False,
 ) -> list[Answer]:
     """Repeats one command to some robots until each has answered, or time.monotonic() is until_s.
@@ -154,7 +170,7 @@ def tell(
         robots: whom to tell.
         until_s: when to give up.
         link_timeout_ms: of a start: how long robots drive on without hearing the operator; 0: for
-            ever; -1: as they are configured.
+            ever. A robot's configuration has no say in it.
         enough: what else ends it.
     """
     order = Order(command, link_timeout_ms)
@@ -201,7 +217,8 @@ def stop(
 
     By multicast, and to each machine that speaks as one of them: whatever else is wrong on the bus
     or with what is heard there, this goes out. It is said to the end, whatever the fleet's watch
-    would raise.
+    would raise, and though no network takes it: that may come back. `fleet.reach` tells how far it
+    got.
 
     Args:
         fleet: where they are; robots that it held are held no more.
@@ -214,9 +231,6 @@ def stop(
 
     Returns:
         What each answered.
-
-    Raises:
-        OSError: it could never be said.
     """
     with fleet.unwatched():
         hosts = hosts or Hosts(())
@@ -234,9 +248,8 @@ def _stop(
 ) -> list[Answer]:
     command = make_command(VERBS.VERB_STOP)
     fleet.held -= robots or set(fleet.held)
-    begin_s = time.monotonic()
-    error: OSError | None = None
-    was_said = was_told = False
+    fleet.reach_anew()
+    begin_s, was_told = time.monotonic(), False
 
     def open_robots() -> set[int]:
         return {
@@ -249,29 +262,42 @@ def _stop(
         return bool(robots or fleet.robots) and not open_robots() and not hosts.unheard(fleet)
 
     while (passed_s := time.monotonic() - begin_s) < timeout_s:
-        if stopped() and (robots or passed_s > STOP_LEAST_S):
+        if stopped() and (robots or reached_s(fleet, passed_s) > STOP_LEAST_S):
             break
         if passed_s > TELL_S and not (was_told or stopped()):
             was_told = True
             waiting(open_robots())
-        try:
-            for command.robot_id in sorted(robots or {ALL}):
+        for command.robot_id in sorted(robots or {ALL}):
+            with suppress(OSError):
                 fleet.send(command)
-            was_said = True
-        except OSError as failure:
-            error = failure
-        _say_to_hosts(fleet, command, robots, hosts.addresses)
+        hosts.tell(fleet, command, robots)
         fleet.listen(REPEAT_S)
         if enough():
             break
-    if error and not was_said:
-        raise error
+    told = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
+    fleet.listen(OTHERS_S, lambda: all(_says_since(robot, command.seq) for robot in told))
     return answers(fleet, command, robots or set(fleet.robots))
 
 
 def _says_that_it_stands(robot: Robot, seq: int) -> bool:
     """Enough to go on to the next; a robot without our key can do no better than say so."""
     return robot.confirms(seq) or (not robot.link and seq in robot.acks and robot.stands)
+
+
+def reached_s(fleet: Fleet, passed_s: float) -> float:
+    """For how long a stop has left this computer, where it was said for that long."""
+    if not fleet.reach.said:
+        return passed_s
+    begin_s = fleet.reach.begin_s
+    return 0.0 if begin_s is None else time.monotonic() - begin_s
+
+
+def _says_since(robot: Robot, seq: int) -> bool:
+    """It has signed how it is since it obeyed; by what it had stood before stands in that."""
+    ack = robot.signed_acks.get(seq)
+    if not (ack and robot.link):
+        return not ack
+    return robot.link.session != ack.session or robot.link.session_us > ack.session_us
 
 
 class Hosts:
@@ -283,31 +309,44 @@ class Hosts:
 
     def __init__(self, names: Sequence[str]):
         self._address_of = dict.fromkeys(names, "")
+        self._faults: dict[str, str] = {}
         for name in names:
             threading.Thread(target=self._look_up, args=(name,), daemon=True).start()
 
     def _look_up(self, name: str) -> None:
-        with suppress(OSError, UnicodeError):  # no such machine: it will not be heard
+        try:
             self._address_of[name] = socket.gethostbyname(name)
+        except (OSError, UnicodeError):
+            self._faults[name] = "there is no machine of that name"
 
-    @property
-    def addresses(self) -> set[str]:
-        """Those found so far."""
-        return set(self._address_of.values()) - {""}
+    def tell(self, fleet: Fleet, command, robots: set[int]) -> None:
+        """Says a command to them, and to the machines that speak as some robots, or all."""
+        asked = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
+        speaking = {host for robot in asked for host in robot.senders.hosts}
+        for host in speaking - set(self._address_of.values()):
+            with suppress(OSError):  # it shows in what is not answered
+                _say_to(fleet, command, robots, host)
+        for name, address in self._address_of.items():
+            if address:
+                self._faults.pop(name, None)
+                try:
+                    _say_to(fleet, command, robots, address)
+                except OSError as error:
+                    self._faults[name] = error.strerror or str(error)
 
     def unheard(self, fleet: Fleet) -> list[str]:
-        """Names of those from which no robot has spoken."""
+        """Those from which no robot has spoken, and why they were not told, where they were not."""
         heard = {host for robot in fleet.robots.values() for host in robot.senders.hosts}
-        return [name for name, address in self._address_of.items() if address not in heard]
+        return [
+            f"{name} ({self._faults[name]})" if name in self._faults else name
+            for name, address in self._address_of.items()
+            if address not in heard
+        ]
 
 
-def _say_to_hosts(fleet: Fleet, command, robots: set[int], hosts: set[str]) -> None:
-    """The same to single machines; those that cannot be reached show in what is not answered."""
-    asked = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
-    for host in {*hosts, *(host for robot in asked for host in robot.senders.hosts)}:
-        for command.robot_id in sorted(robots or {ALL}):
-            with suppress(OSError):
-                fleet.send(command, host)
+def _say_to(fleet: Fleet, command, robots: set[int], host: str) -> None:
+    for command.robot_id in sorted(robots or {ALL}):
+        fleet.send(command, host)
 
 
 @dataclass(frozen=True)
@@ -323,6 +362,7 @@ class Start:
         late: what those answered to a stop that had accepted, were to drive on by themselves, and
             had not begun.
         dropouts: robots that had accepted, and for which it was called off.
+        link_timeout_ms: that was sent with it; 0: they drive on without their operator.
     """
 
     utime_us: int
@@ -332,6 +372,7 @@ class Start:
     stopped: list[Answer] = field(default_factory=list)
     late: list[Answer] = field(default_factory=list)
     dropouts: Dropouts = field(default_factory=Dropouts)
+    link_timeout_ms: int = LINK_TIMEOUT_MS
 
 
 def start(
@@ -342,7 +383,7 @@ def start(
     ahead_s: float,
     partial: bool,
     verb: int = VERBS.VERB_START,
-    link_timeout_ms: int = -1,
+    link_timeout_ms: int = LINK_TIMEOUT_MS,
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
@@ -404,9 +445,12 @@ def start(
         for i in robots
         if (robot := fleet.robots.get(i)) and command.seq in robot.signed_acks
     }
+    if not called_off:
+        fleet.listen(OTHERS_S, lambda: _all_say_how_long(fleet, command, robots))
     # An answer that came after the start was called off does not tell why it was.
     final = given if called_off else answers(fleet, command, robots)
-    return Start(command.start_utime_us, final, sessions, called_off, stopped, late, out)
+    begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out)
+    return Start(*begun, link_timeout_ms)
 
 
 def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
@@ -414,7 +458,7 @@ def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
     return all(
         i in fleet.robots
         and any(
-            ack.accepted and ack.verb in (VERBS.VERB_START, VERBS.VERB_SCRIPT) and seq in fleet.said
+            ack.accepted and ack.verb in STARTS and seq in fleet.said
             for seq, ack in fleet.robots[i].signed_acks.items()
         )
         for i in robots
@@ -430,17 +474,18 @@ def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
     """What each of some robots answered to a command."""
-    return [_answer(fleet.robots.get(i) or Robot(i), command) for i in sorted(robots)]
+    unsigned = NO_SIGNATURE if fleet.has_key else NO_KEY
+    return [_answer(fleet.robots.get(i) or Robot(i), command, unsigned) for i in sorted(robots)]
 
 
-def _answer(robot: Robot, command) -> Answer:
+def _answer(robot: Robot, command, unsigned: str) -> Answer:
     signed = robot.signed_acks.get(command.seq)
     if signed and (signed.command_utime_us, signed.verb) != (command.utime_us, command.verb):
         signed = None
     ack = signed or robot.acks.get(command.seq)
-    reason = ack.reason if ack else _why_silent(robot)
+    reason = ack.reason if ack else _why_silent(robot, unsigned)
     if ack and not signed:
-        reason = reason or NO_SIGNATURE
+        reason = reason or unsigned
     return Answer(
         robot_id=robot.robot_id,
         accepted=bool(ack.accepted) if ack else None,
@@ -451,7 +496,23 @@ def _answer(robot: Robot, command) -> Answer:
         is_double=robot.is_double,
         alarms=robot.alarms,
         last_heard_s=time.monotonic() - robot.heard_s if robot.heard_s else None,
+        link_timeout_s=_link_timeout_s(robot, signed) if command.verb in STARTS else None,
+        lost_link=robot.lost_link,
     )
+
+
+def _all_say_how_long(fleet: Fleet, command, robots: set[int]) -> bool:
+    """Those that accepted a start have signed for how long they need no operator."""
+    given = answers(fleet, command, robots)
+    return all(a.link_timeout_s is not None for a in given if a.accepted and a.signed)
+
+
+def _link_timeout_s(robot: Robot, ack) -> float | None:
+    """In force since a start, as the robot's newest link says that was signed later."""
+    link = robot.link
+    if not (ack and ack.accepted and link and link.session == ack.session):
+        return None
+    return link.link_timeout_ms / 1e3 if link.session_us > ack.session_us else None
 
 
 def _stands(robot: Robot, command) -> bool:
@@ -461,10 +522,10 @@ def _stands(robot: Robot, command) -> bool:
     return robot.stands and robot.is_here
 
 
-def _why_silent(robot: Robot) -> str:
+def _why_silent(robot: Robot, unsigned: str) -> str:
     if not robot.heard_s:
         return NEVER_HEARD
-    return "no answer" if robot.link else NO_SIGNATURE
+    return "no answer" if robot.link else unsigned
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:

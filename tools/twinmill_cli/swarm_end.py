@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is printed when a command to the swarm has ended."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.console import Group
+
+from twinmill_cli.output import deliver, say
+from twinmill_cli.swarm_screen import answer_table
+from twinmill_cli.swarm_verdict import DRIVING
+
+if TYPE_CHECKING:
+    from twinmill.robots.fleet import Fleet
+    from twinmill.robots.tell import Answer
+    from twinmill_cli.swarm_verdict import Verdict
+
+
+def driving(fleet: Fleet, asked: set[int]) -> list[str]:
+    """Robots that drive and were not asked; nobody was asked where all were."""
+    others = [fleet.robots[i] for i in sorted(set(fleet.robots) - asked)] if asked else []
+    return [f"R{r.robot_id:02d}" for r in others if r.mode in DRIVING and r.is_here]
+
+
+def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_json: bool) -> int:
+    """Prints what came of a command, if need be on stderr alone. Returns its exit code."""
+    robots = [answer.to_json() for answer in given]
+    data = {"verb": verb, "ok": verdict.ok, "sentence": verdict.sentence, **data, "robots": robots}
+    text = Group(*([answer_table(given)] if given else []), verdict.sentence)
+    try:
+        deliver(data, text, as_json)
+    except OSError:
+        say(verdict.sentence)
+        raise
+    return verdict.code

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Signals and messages while robots are commanded: neither cuts short what keeps wheels still."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from twinmill_cli.output import print_object, say
+
+if TYPE_CHECKING:
+    from twinmill.robots.fleet import Fleet
+
+# All by which a terminal, a shell or a session that ends asks a program to end or to pause.
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+# What became of robots where a command was ended that had said something, by its verb.
+BECAME = {
+    "start": "nothing was started; robots were told that they may be (--arm)",
+    "arm": "robots were told that they may be started, and not all had answered; nothing moves",
+    "select": "robots were told what to do, and not all had answered; those that drive drive on",
+}
+
+
+@contextmanager
+def counting_signals(numbers: Sequence[int] = ENDING) -> Iterator[list[int]]:
+    """Signals that ask for the end do nothing but stand in a list."""
+    asked: list[int] = []
+    before = [signal.signal(number, lambda n, _: asked.append(n)) for number in numbers]
+    try:
+        yield asked
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
+
+
+@contextmanager
+def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[Sequence[int]]:
+    """Signals that ask for the end raise KeyboardInterrupt where the fleet listens, only there.
+
+    So nothing can be cut short but waiting, and a stop not even by a second signal. What kills,
+    robots notice by themselves. Gives the signals that came.
+
+    Args:
+        fleet: whose watch it is; what it was before goes on.
+        check: raises what else is to end it.
+    """
+    with counting_signals() as asked, watched(fleet, asked, check):
+        yield asked
+
+
+@contextmanager
+def watched(
+    fleet: Fleet, asked: Sequence[int], check: Callable[[], None] = lambda: None
+) -> Iterator[None]:
+    """Listening ends by KeyboardInterrupt once a signal stands in the list."""
+    watch = fleet.watch
+
+    def look() -> None:
+        if asked:
+            raise KeyboardInterrupt
+        watch()
+        check()
+
+    fleet.watch = look
+    try:
+        yield
+    finally:
+        fleet.watch = watch
+
+
+@contextmanager
+def commanding(
+    verb: str, make: Callable[[], Fleet], *, as_json: bool, numbers: Sequence[int] = ENDING
+) -> Iterator[Fleet]:
+    """A fleet, and one sentence if a signal ends what is done with it: what was said to robots.
+
+    Args:
+        verb: the command's name.
+        make: joins the bus.
+        as_json: an object is printed, too.
+        numbers: signals that end it.
+    """
+    fleet = None
+    with counting_signals(numbers) as asked:
+        try:
+            fleet = make()
+            with watched(fleet, asked):
+                yield fleet
+        except KeyboardInterrupt:
+            became = BECAME[verb] if fleet and fleet.said else "nothing was said to any robot"
+            sentence = f"Ended by a signal: {became}."
+            if as_json:
+                print_object({"verb": verb, "ok": False, "sentence": sentence, "robots": []})
+            say(sentence)
+            raise
+
+
+@contextmanager
+def saying_nothing() -> Iterator[Callable[[str], None]]:
+    """No library's message keeps a stop waiting, as on a full pipe or after Ctrl-S.
+
+    Gives a function that says a sentence where there is room for it, and else says nothing.
+    """
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+
+    def say_if_heard(sentence: str) -> None:
+        with suppress(OSError):
+            if select.select([], [kept], [], 0)[1]:
+                os.write(kept, f"twinmill: {sentence}\n".encode())
+
+    try:
+        yield say_if_heard
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)

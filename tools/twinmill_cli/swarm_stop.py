@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`twinmill swarm stop`: said to all that can be reached, whatever else is wrong."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from twinmill.defaults import URL
+from twinmill_cli.lazy import working
+from twinmill_cli.options import LcmUrl
+from twinmill_cli.output import AsJson, decide
+from twinmill_cli.swarm_door import (
+    BusPrefix,
+    KeyThere,
+    Robots,
+    check_bus,
+    key_if_there,
+    names,
+    parse_robots,
+)
+from twinmill_cli.swarm_signals import counting_signals, saying_nothing
+
+if working():  # not for --help
+    from twinmill.data.bus import open_bus
+    from twinmill.robots import tell
+    from twinmill.robots.fleet import Fleet
+    from twinmill_cli.swarm_end import driving, finish
+    from twinmill_cli.swarm_verdict import Saying, Verdict, of_stop
+    from twinmill_cli.voice import Voice
+
+WRONG_COMMAND_LINE = 2
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """A command line that is refused says that nothing was stopped."""
+    try:
+        yield
+    except typer.TyperException as error:
+        if error.exit_code != WRONG_COMMAND_LINE:
+            raise
+        raise typer.BadParameter(f"{error.format_message()} NOTHING WAS STOPPED.") from error
+
+
+class StopCommand(TyperCommand):
+    """A stop whose options cannot be read stops nothing, but for --robots, and says so."""
+
+    def make_context(self, *words: Any, **options: Any) -> typer.Context:
+        """Typer's; raises typer.BadParameter."""
+        with _refusing():
+            return super().make_context(*words, **options)
+
+
+def stop(
+    *,
+    robots: Robots = None,
+    timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.5, help="Give up after.")] = 10.0,
+    host: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--host",
+            metavar="HOST",
+            help="Tell this machine, too, though it was never heard: where multicast does not "
+            "pass. Repeatable.",
+        ),
+    ] = None,
+    key: KeyThere = None,
+    lcm_url: LcmUrl = URL,
+    channel_prefix: BusPrefix = None,
+    as_json: AsJson = False,
+) -> int:
+    """Stop robots: said again until each has signed that it stands.
+
+    They start again only after `twinmill swarm arm`, or by their button. Where --robots cannot be
+    read, all are stopped, and the exit code is 2.
+
+    Example: twinmill swarm stop
+    """
+    voice = Voice()
+    with counting_signals() as signals:
+        asked, misread = _selected(robots)
+        with _refusing():
+            check_bus(lcm_url, channel_prefix or None)
+        operator_key, fault = key_if_there(key)
+        with saying_nothing() as say:
+            for words in filter(None, [misread, fault]):
+                say(words)
+            hosts = tell.Hosts(host or ())
+            connect = partial(open_bus, needs_network=False)
+            fleet = Fleet(lcm_url, channel_prefix or "", connect, operator_key)
+            begin_s = time.monotonic()
+            given = tell.stop(
+                fleet,
+                asked,
+                timeout_s,
+                hosts=hosts,
+                waiting=lambda left: say(waiting_words(fleet, left, hosts, timeout_s)),
+                enough=lambda: _ends_a_stop(signals),
+            )
+            passed_s = time.monotonic() - begin_s
+            reached_s = tell.reached_s(fleet, passed_s)
+            if asked:
+                fleet.listen(tell.OTHERS_S)
+        is_cut_short = _ends_a_stop(signals) and passed_s < timeout_s
+        how = Saying(
+            passed_s=passed_s if is_cut_short else timeout_s,
+            reached_s=reached_s,
+            unheard=hosts.unheard(fleet),
+            is_cut_short=is_cut_short,
+            reach=fleet.reach,
+            key_fault=f"No robot's signature could be checked: {fault}" if fault else "",
+        )
+        verdict = of_stop(given, how, is_of_some=bool(asked)).beside(driving(fleet, asked))
+        code = WRONG_COMMAND_LINE if misread else verdict.code
+        if misread:
+            verdict = Verdict(False, f"{misread} {verdict.sentence}")
+        voice.tell(lambda: finish("stop", given, verdict, {}, as_json=as_json))
+        decide(code)
+        voice.end(code, signals)
+    voice.check()
+    return code
+
+
+def _selected(robots: str | None) -> tuple[set[int], str]:
+    """The robots to stop, all where that cannot be read, and a sentence on it."""
+    try:
+        return parse_robots(robots), ""
+    except typer.BadParameter as error:
+        return set(), f"{error.format_message()} So all robots are told to stop."
+
+
+def _ends_a_stop(signals: Sequence[int]) -> bool:
+    """A person or program gave up waiting; a lost terminal ends no stop."""
+    return any(number != signal.SIGHUP for number in signals)
+
+
+def waiting_words(fleet: Fleet, left: set[int], hosts: tell.Hosts, timeout_s: float) -> str:
+    """Reason why a stop still waits."""
+    unheard = hosts.unheard(fleet)
+    where = f" from {', '.join(unheard)}" if unheard else ""
+    whom = f"{names(left)} to sign that they stand" if left else f"a robot to be heard{where}"
+    if fleet.reach.said and not fleet.reach.out:
+        return (
+            f"nothing leaves this computer ({fleet.reach.fault}); tried again all the time, up to "
+            f"{timeout_s:g} s."
+        )
+    return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
