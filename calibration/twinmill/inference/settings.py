@@ -8,7 +8,7 @@ from twinmill.settings import Numbers, number
 
 @dataclass(frozen=True)
 class Priors(Numbers):
-    """Prior knowledge; none was set on a case. Sizes are standard deviations."""
+    """Prior knowledge; no case set a number. Sizes are standard deviations."""
 
     effects: float = number(1.0, "expected number of missing effects, over the whole catalogue")
     further: float = number(0.1, "factor on the prior odds of each effect after the first")
@@ -23,7 +23,7 @@ class Priors(Numbers):
     sheet: float = number(
         0.15, "error of a data sheet's speeds, and of a discrepancy in another log, relative"
     )
-    form: float = number(0.15, "mean error of an effect's formula, relative to its size: a guess")
+    form: float = number(0.15, "mean error of an effect's formula, relative to its size")
     moments: float = number(0.05, "expected share of half seconds in which something happens")
     sudden: float = number(0.5, "gain error at such a moment; push over the usual speed")
     sure: float = number(0.9, "posterior probability from which an answer is called sure")
