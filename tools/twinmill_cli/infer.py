@@ -66,7 +66,7 @@ def _infer(
     force: Force = False,
     as_json: AsJson = False,
 ) -> list[Inference]:
-    """Give the probability of each effect that a model may lack, and of something nameless.
+    """Posterior probability of each effect that a model may lack, and of an unknown cause.
 
     Effects of the catalogue, dependences without a name (on time, place, heading,
     speed, turns, the past, single moments) and nothing at all compete by their
