@@ -7,11 +7,13 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
+import twinmill as tm
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import Comparison, compare
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, show, write_report
 from twinmill.report.sections import comparison_section, steps_section
+from twinmill.report.tables import _clocks, _date
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 
@@ -122,3 +124,23 @@ def test_no_word_of_a_table_is_lost_in_a_narrow_terminal(section, columns):
         heads = {word for column in table.columns for word in column.split()}
         assert told | heads <= words
         assert max(map(len, console.file.getvalue().splitlines())) <= columns
+
+
+def test_noise_of_a_wrong_model_is_called_so(section):
+    """The model given lacks the robot's coasting."""
+    assert dict(section.facts)["noise"].endswith("include the model's error")
+
+
+def test_a_simulated_log_has_no_date():
+    """The twin starts all its logs at one instant."""
+    (run,) = tm.simulate(n=1, duration_s=12).measurements()
+    assert _date(run) == "simulated"
+
+
+@pytest.mark.parametrize(
+    ("offset_s", "said"), [(0.151, "151 ms later than"), (-0.02, "20.0 ms earlier than")]
+)
+def test_the_clocks_offset_says_which_stamp_is_later(offset_s, said):
+    """docs/conventions.md: t_capture = t_robot + offset."""
+    robot = SimpleNamespace(measurement=SimpleNamespace(same_clock=False), time_offset_s=offset_s)
+    assert said in _clocks(robot)

@@ -240,9 +240,9 @@ def _explain(
 ) -> Explanation:
     """Diagnose, add the effects found, and write the new model; cross-validated at each step.
 
-    If an error remains that no effect explains, and a formula for it was validated
-    on data used neither to choose nor to fit it, the formula is added last, if
-    that lowers the held-out error.
+    If an error remains that no effect explains, and a formula for it was
+    validated on data used neither to choose nor to fit it, the formula is added
+    last, if that lowers the held-out error.
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
     """

@@ -316,7 +316,7 @@ def terminal_explanation(
     """
     return Group(
         *([Text(result.now, show.STYLES["good"]), Text("Without it:")] if result.now else []),
-        *_said(result.diagnosis),
+        *_said(_as_fitted(result)),
         Text(),
         show.table(tables.steps(_labelled(result.steps, bool(result.diagnosis.apart)))),
         *([show.table(tables.parameters(result.parameters))] if result.parameters else []),
@@ -326,6 +326,16 @@ def terminal_explanation(
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
+
+
+def _as_fitted(result: Explanation) -> Diagnosis:
+    """The diagnosis with the estimates of the last fit, so that each has one standard error."""
+    last = {e.name: e for e in result.parameters}
+    findings = [
+        replace(f, parameters=[last.get(e.name, e) for e in f.parameters])
+        for f in result.diagnosis.findings
+    ]
+    return replace(result.diagnosis, findings=findings)
 
 
 def section(
@@ -373,7 +383,7 @@ def explanation_section(
     result: Explanation, commands: show.Commands = (), not_written: str = ""
 ) -> Section:
     """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
-    page = section(result.diagnosis, commands, result.steps)
+    page = section(_as_fitted(result), commands, result.steps)
     return replace(
         page,
         verdict="\n".join([*([f"{result.now} Without it:"] if result.now else []), page.verdict]),

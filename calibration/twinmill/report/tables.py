@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from twinmill.data.measurement import Measurement
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
@@ -74,8 +75,6 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
     robot = comparison.shown
     measurement, noise = robot.measurement, robot.modelled.noise
     track = measurement.track
-    recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
-    date = f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
     others = len(comparison.robots) - 1
     why = "which the model misses most" if comparison.about is None else "which it was added to"
     return [
@@ -86,7 +85,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         ),
         (
             "recorded",
-            f"{date}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
+            f"{_date(measurement)}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
             f"{len(track.pose)} poses used, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
@@ -97,6 +96,14 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         *_wheel_angles(robot),
         *_phases(robot),
     ]
+
+
+def _date(measurement: Measurement) -> str:
+    """Date of a recording; the twin's own start is a fixed one, the same in every run."""
+    if measurement.simulated:
+        return "simulated"
+    recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
+    return f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
 
 
 def _clocks(robot: RobotComparison) -> str:
