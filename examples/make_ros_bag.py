@@ -6,6 +6,7 @@ most, as ros2_control's diff_drive_controller limits it. Put your own bag in its
 """
 
 import numpy as np
+
 import twinmill as tm
 
 STEP_S, DURATION_S = 0.001, 60.0
