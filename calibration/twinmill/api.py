@@ -2,15 +2,14 @@
 """The library that `import twinmill as tm` gives: logs, models, and comparisons of the two.
 
 Lengths in m, angles in rad, times in s; frames, signs and clocks as in the page Conventions. The
-example of a method goes on where that of its class, or of the function that made it, ends. All
-functions leave their arguments and the disk as they are: a fit returns a new `Model`, which
-`Model.save` writes. An argument of another kind than is asked for is a TypeError.
+example of a method continues that of its class, or of the function that made the object. Functions
+leave their arguments and the disk as they are: a fit returns a new `Model`, which `Model.save`
+writes. An argument of a wrong type raises TypeError.
 
 Notebooks show what `plot` returns. In a script `matplotlib.pyplot.figure(result.plot())` and then
 `matplotlib.pyplot.show()` open a window, and `result.plot().savefig("plot.png")` writes a file.
 
-Objects cannot be pickled: give paths to other processes, and let them return what `to_json` or
-`table` gives.
+Logs, models and results can be pickled, and so be sent to other processes.
 """
 
 import logging
@@ -147,7 +146,7 @@ Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 
-LOGGER = logging.getLogger("twinmill")  # what is being done, and what is odd in the input
+LOGGER = logging.getLogger("twinmill")  # progress, and problems of the input
 LOGGER.addHandler(logging.NullHandler())
 
 
@@ -162,10 +161,10 @@ def _one_thread(call: Callable[Given, Result]) -> Callable[Given, Result]:
 
 
 class Log(Shown):
-    """One recorded run, or several: what robots were told, and where they were.
+    """One recorded run, or several: commands and poses of robots.
 
-    `load` reads files, `from_arrays` and `from_frames` take numbers. Of a steady-state table
-    `table` gives the rows; it has no commands, paths or swarm.
+    `load` reads files, `from_arrays` and `from_frames` take numbers. `table` gives the rows of a
+    steady-state table, which has no commands, paths or swarm.
 
     Attributes:
         paths: the files of the runs; names of those that are in no file.
@@ -312,11 +311,11 @@ class Log(Shown):
         """Cleaned runs, one for each robot in each log.
 
         Args:
-            model: tells what commands do, so that they are checked against the motion; compare,
-                fit, add and diagnose give theirs. None: they are not checked.
+            model: predicts the motion, against which commands are checked; compare, fit, add and
+                diagnose give theirs. None: no such check.
 
         Returns:
-            A list of runs; its `findings` say what is wrong with the others.
+            A list of runs; its `findings` describe the problems of the others.
 
         Raises:
             BadInputError: all logs are unusable; the message says why.
@@ -360,7 +359,7 @@ class Log(Shown):
 
     @property
     def warnings(self) -> list[str]:
-        """Sentences on what is odd in the files, or that the twin said of a simulated run.
+        """Warnings about the files, or of the twin about a simulated run.
 
         Examples:
             >>> tm.load("run.lcmlog").warnings
@@ -450,10 +449,10 @@ class Log(Shown):
         """Measures of the swarm's behaviour over time.
 
         Args:
-            model: whose range of sight and radius of the body scale the metrics.
+            model: its view range and body radius scale the metrics.
 
         Returns:
-            log, t_s, the metrics, and class: what the last 10 s look like.
+            log, t_s, the metrics, and class: the behaviour over the last 10 s.
 
         Raises:
             LogError: a log has not two robots with poses at the same time.
@@ -566,23 +565,23 @@ class Log(Shown):
         n_seeds: int = 50,
         behavior: str | None = None,
     ) -> "SwarmComparison":
-        """Tells whether the recorded swarm behaves as the twin's swarms do.
+        """Tests whether the recorded swarm behaves as the twin's swarms do.
 
         Paths of a swarm are chaotic, so metrics over time are compared: the recorded run is ranked
         among runs of the twin that start from the same poses.
 
         Args:
             model: of all robots; a model, or the name of one; None is TurboPi's.
-            n_seeds: runs of the twin, 39 at least: fewer cannot tell anything.
-            behavior: of all robots; None: what the log says.
+            n_seeds: runs of the twin, 39 at least: fewer cannot reach significance.
+            behavior: of all robots; None: as in the log.
 
         Returns:
             Verdict, p-values and the bands of the twin's runs.
 
         Raises:
             LogError: these are several logs, or there are not two robots at the same time.
-            ValueError: the log is too short, does not say what the robots play, or there are too
-                few runs.
+            ValueError: the log is too short, does not name the behaviour, or there are too few
+                runs.
 
         Examples:
             >>> swarm = tm.simulate(n=3, duration_s=20)
@@ -760,13 +759,13 @@ class Model(Shown):
             temporary.write_text(self.file.text)
 
     def compare(self, log: "Log | str | Path") -> "Comparison":
-        """Tells how well the model predicts a log.
+        """Measures the model's prediction errors on a log.
 
         Args:
             log: a log, or the path of one.
 
         Returns:
-            As `compare`, which says more.
+            See `compare`.
 
         Raises:
             LogError: the log cannot be used; one sentence.
@@ -782,10 +781,10 @@ class Model(Shown):
 
         Args:
             log: a log, the path of one, or a list of these.
-            options: as of `fit`, which says more: hold, free, priors, settings.
+            options: hold, free, priors and settings of `fit`.
 
         Returns:
-            As `fit`, which says more.
+            See `fit`.
 
         Raises:
             LogError: the log cannot be used; one sentence.
@@ -804,21 +803,21 @@ class Model(Shown):
         robot: int | None = None,
         **texts: str,
     ) -> "Addition":
-        """Adds an effect, fits it with all the rest, and judges it on data it was not fitted to.
+        """Adds an effect, fits it with all other parameters, and cross-validates it.
 
         Args:
-            effect: name from the catalogue, of one robot also `gains`; or what `python_effect`
-                made.
-            log: what it is fitted to.
+            effect: name from the catalogue, with `robot` also `gains`; or an effect made by
+                `python_effect`.
+            log: data of the fit.
             robot: number of the robot that alone has it; by default all have.
-            texts: of the effect `equation`: adds_to, formula, state_rate and second_rate.
+            texts: adds_to, formula, state_rate and second_rate of the effect `equation`.
 
         Returns:
             Scores without and with the effect, and the new model.
 
         Raises:
-            ValueError: there is no such effect, a text makes no sense, or it is of the camera and
-                to be one robot's.
+            ValueError: there is no such effect, a text cannot be parsed, or an effect of the camera
+                was to be one robot's.
 
         Examples:
             >>> added = tm.Model.load("turbopi.toml").add("coasting", "run.lcmlog")
@@ -850,7 +849,7 @@ class Model(Shown):
         return _told(Addition(result), measurements)
 
     def numbers(self, effect: PythonEffect) -> dict[str, float]:
-        """Values of an effect that is written in Python, by the names that it has for them.
+        """Values of an effect that is written in Python, by its own names of the parameters.
 
         Raises:
             ValueError: the model does not have it.
@@ -866,7 +865,7 @@ class Model(Shown):
         return {own: self[name] for own, name in effect.names(self.file.model).items()}
 
     def set(self, values: Mapping[str, float]) -> "Model":
-        """Sets numbers by hand; what fits told of these is forgotten.
+        """Sets parameters by hand; their standard errors from fits are dropped.
 
         Args:
             values: by full name, in the unit of `table`; six digits are kept.
@@ -902,19 +901,19 @@ class Model(Shown):
 
         Args:
             path: new file.
-            to: `mjcf`, `sdf`, `urdf`, `ros2_control` or `json`, which alone has all.
-            robot: with what the model states of this robot alone; None: of all.
+            to: `mjcf`, `sdf`, `urdf`, `ros2_control` or `json`, which alone is complete.
+            robot: number of the robot whose own parameters are used; None: those of all.
             ranges: write intervals and 100 samples of the fitted numbers, too: files of the same
                 name that end in `_ranges.yaml`, `_ranges.json` and `_ranges.npz`.
             force: replace what is there.
 
         Returns:
-            A sentence for each part of the model that the file cannot carry, then what is odd in
-            the ranges.
+            A sentence for each part of the model that the format cannot represent, then warnings
+            about the ranges.
 
         Raises:
             ValueError: there is no such format, a file is there or cannot be written, or the
-                format cannot carry this robot at all.
+                format cannot represent this robot at all.
 
         Examples:
             >>> from tempfile import mkdtemp
@@ -938,15 +937,15 @@ class Model(Shown):
         formula: bool = True,
         progress: Callable[[str], None] | None = None,
     ) -> "Explanation":
-        """Diagnoses, and adds what is found.
+        """Diagnoses, and adds the effects that are found.
 
         Args:
             log: a log, or the path of one.
-            formula: as of `explain`, which says more.
-            progress: the same.
+            formula: see `explain`.
+            progress: see `explain`.
 
         Returns:
-            As `explain`.
+            See `explain`.
 
         Raises:
             LogError: the log cannot be used; one sentence.
@@ -958,14 +957,14 @@ class Model(Shown):
         return explain(log, self, formula=formula, progress=progress)
 
     def next_run(self, log: "Log | str | Path", **options: Any) -> "NextRun":
-        """Designs the run that best tells apart what these logs cannot.
+        """Designs the run that best discriminates between effects that these logs cannot.
 
         Args:
             log: a log, or the path of one.
-            options: as of `next_run`, which says more.
+            options: of `next_run`.
 
         Returns:
-            As `next_run`.
+            See `next_run`.
 
         Raises:
             LogError: the log cannot be used; one sentence.
@@ -983,10 +982,10 @@ class Model(Shown):
 
         Args:
             log: a log, or the path of one.
-            options: as of `diagnose`, which says more.
+            options: of `diagnose`.
 
         Returns:
-            As `diagnose`.
+            See `diagnose`.
 
         Raises:
             LogError: the log cannot be used; one sentence.
@@ -1012,8 +1011,8 @@ class Fit(Reported):
         before: comparison of the model as given with the log.
         after: comparison of the new model, on the same noise.
         score: of the new model on the log it was fitted to.
-        log_likelihood: Gaussian, of errors over their floors, with the scale of each data set at
-            its best, without priors.
+        log_likelihood: Gaussian, of errors over the noise floor, maximised over the scale of each
+            data set, without priors.
         nobs: number of independent errors; residuals are more, and overlap.
         converged: the fit ended before its last round.
 
@@ -1047,8 +1046,8 @@ class Fit(Reported):
     def stderr(self) -> pd.Series:
         """Standard errors by name: half a 95 % interval over 1.96.
 
-        They are from left-out blocks, widened by Student's t for few of these, and include what
-        priors leave open. All tables, files and intervals have these.
+        From the jackknife over blocks of 8 s, widened by Student's t where blocks are few, and by
+        the influence of the priors. All tables, files and intervals have these.
 
         Examples:
             >>> bool((fitted.stderr**2 - np.diag(fitted.covariance())).abs().max() < 1e-12)
@@ -1060,7 +1059,7 @@ class Fit(Reported):
         """Covariance of the estimates.
 
         Returns:
-            A square table, in products of the units; `stderr` squared on its diagonal.
+            A square table, in products of the units; the diagonal has `stderr` squared.
 
         Examples:
             >>> fitted.covariance().shape == (len(fitted.params), len(fitted.params))
@@ -1070,7 +1069,7 @@ class Fit(Reported):
         return pd.DataFrame(told.values, index=told.names, columns=told.names)
 
     def conf_int(self, alpha: float = 0.05) -> pd.DataFrame:
-        """Intervals that miss a parameter with a chance of alpha, by Student's t.
+        """Confidence intervals at the level 1 - alpha, by Student's t.
 
         Args:
             alpha: 0.05 for 95 %.
@@ -1094,8 +1093,8 @@ class Fit(Reported):
         """Measured less predicted, of the fitted model.
 
         Returns:
-            log, robot_id, t_s (where the prediction starts), horizon_s (how far it goes), channel,
-            unit, residual and floor (the error that counts as one; both in the unit).
+            log, robot_id, t_s (start of the prediction), horizon_s, channel, unit, residual and
+            floor (the noise floor; both in the unit).
 
         Examples:
             >>> fitted.residuals()["channel"].unique().tolist()
@@ -1130,8 +1129,8 @@ class Fit(Reported):
 
         Returns:
             name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
-            the log does not tell the quantity, and the prior holds it), together (it tells the
-            quantity with others, and not alone).
+            the log does not determine the quantity, only its prior), together (determined in
+            combination with others, not alone).
 
         Examples:
             >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
@@ -1140,7 +1139,7 @@ class Fit(Reported):
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
 
     def plot(self) -> Figure:
-        """Errors before and after, over the time predicted ahead.
+        """Errors before and after, over the horizon.
 
         Returns:
             A figure of matplotlib, as of `Comparison.plot`.
@@ -1206,8 +1205,8 @@ class Addition(Reported):
 
         Returns:
             name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
-            the log does not tell the quantity, and the prior holds it), together (it tells the
-            quantity with others, and not alone).
+            the log does not determine the quantity, only its prior), together (determined in
+            combination with others, not alone).
 
         Examples:
             >>> list(added.table().columns)[:4]
@@ -1248,8 +1247,8 @@ class Finding(Shown):
 
     Attributes:
         effect: its name.
-        parameters: estimates by name, with all else that was found.
-        share: of the squared error above the noise that it takes away, on data not fitted to.
+        parameters: estimates by name, from a fit with all other findings.
+        share: of the squared held-out error above the noise floor that it removes.
         certainty: sure, group or doubtful.
         score_heldout: of the model with it, on data that was not fitted to.
 
@@ -1269,7 +1268,7 @@ class Finding(Shown):
         """All results of the diagnosis for this effect.
 
         Returns:
-            An entry of findings[] of `twinmill diagnose --json`, and what ranking[] has beside.
+            An entry of findings[] of `twinmill diagnose --json`, with the fields of ranking[].
 
         Examples:
             >>> d.best.to_json()["certainty"]
@@ -1278,7 +1277,7 @@ class Finding(Shown):
         return plain({**self._ranked.to_json(), **self._result.to_json()})
 
     def add_to(self, model: Model | str | Path) -> Model:
-        """Adds the effect to a model, all fitted to the log of the diagnosis.
+        """Adds the effect to a model, fitted with all other parameters to the diagnosed log.
 
         Args:
             model: that lacks it, or the name of one.
@@ -1288,7 +1287,7 @@ class Finding(Shown):
 
         Raises:
             ValueError: the model has the effect already, and that of the diagnosis had not; or the
-                effect is made for another drive.
+                effect is for another kind of command.
 
         Examples:
             >>> d.best.add_to(tm.Model.load("fitted.toml")).effects
@@ -1348,10 +1347,10 @@ class Diagnosis(Reported):
         """The effects that explain most, best first.
 
         Returns:
-            effect, found, score_heldout, share_explained, p_value, group (effects of one number
-            look alike in this log), takes_away and certainty (of what was found, as `share` and
-            `certainty` of `Finding`), estimates (with standard errors; of what was not found, when
-            it was tried alone).
+            effect, found, score_heldout and share_explained (of the search step that tried it),
+            p_value, group (effects with the same number cannot be distinguished in this log),
+            takes_away and certainty (of findings: `share` and `certainty` of `Finding`), estimates
+            (with standard errors; of effects that were not found, from the step that tried them).
 
         Examples:
             >>> d.table().loc[0, "effect"]
@@ -1394,16 +1393,16 @@ class Diagnosis(Reported):
         floor_m: tuple[float, float] = (2.0, 2.0),
         max_duty: float = 1.0,
     ) -> "NextRun":
-        """Designs the run that best tells apart what this diagnosis leaves open.
+        """Designs the run that best discriminates between the effects in question.
 
         Args:
             duration_s: longest run.
-            floor_m: free floor, along and across the robot at its start.
-            max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
-                highest in its logs.
+            floor_m: free area, along and across the robot at its start, m.
+            max_duty: highest duty of a wheel, 0.2 to 1; for velocity commands, share of the highest
+                in the logs.
 
         Returns:
-            As `next_run`, without a second diagnosis.
+            See `next_run`; there is no second diagnosis.
 
         Raises:
             ValueError: no script can be within these limits, or none shows what is in question.
@@ -1429,7 +1428,7 @@ class Diagnosis(Reported):
 
 
 class Explanation(Reported):
-    """A model with the effects that were found, and the diagnosis behind it.
+    """A model with the effects that were found, and the diagnosis that found them.
 
     Attributes:
         model: the new one.
@@ -1465,8 +1464,8 @@ class Explanation(Reported):
         """The model as given, then with each finding.
 
         Returns:
-            effect (`as given` first; `refit` is of stale numbers, `equation` a formula that was
-            proven) and score_heldout.
+            effect (`as given` first; `refit` stands for stale parameters of the base, `equation`
+            for a validated formula) and score_heldout.
 
         Examples:
             >>> explained.steps()["score_heldout"].is_monotonic_decreasing
@@ -1531,16 +1530,16 @@ def load(*paths: str | Path) -> Log:
 
 @_one_thread
 def compare(log: Log | str | Path, model: Model | str | Path | None = None) -> Comparison:
-    """Tells how well a model predicts a log.
+    """Measures a model's prediction errors on a log, relative to the noise floor.
 
-    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and 2 s later.
+    Predictions start from measured poses; errors are taken 0.1, 0.2, 0.5, 1 and 2 s later.
 
     Args:
         log: a log, or the path of one.
         model: a model, or the name of one; None is TurboPi's.
 
     Returns:
-        The score with its errors, floors and regimes, of each robot.
+        The score, with errors, noise floors and regimes of each robot.
 
     Raises:
         LogError: the log cannot be judged; one sentence.
@@ -1581,7 +1580,7 @@ def compare_runs(
         healthy: more healthy runs, on other days, which calibrate the alarm on this robot.
         robot: its number, where logs have several.
         alarm_rate: share of comparisons without a change that may be called changed.
-        progress: is told in words what is being done.
+        progress: called with a sentence on each step.
 
     Returns:
         What changed, with intervals, and what differs without being a change.
@@ -1622,18 +1621,18 @@ def fit(
 ) -> Fit:
     """Fits a model, and the parameters of its effects, to a log.
 
-    By default it moves what the log can tell: gains, speeds of duties and lag of the base, and the
-    numbers of all effects. Names are those of `Model.table`, or an effect or a table as a whole:
-    `coasting`, `base.wheel_speed_mps`.
+    By default these are free: gains, wheel speeds by duty and lag of the base, as far as the log
+    determines them, and the parameters of all effects. Names are those of `Model.table`, or of an
+    effect or a table as a whole: `coasting`, `base.wheel_speed_mps`.
 
     Args:
         log: a log, the path of one, or a list of these.
-        model: where the fit begins; a model, or the name of one; None is TurboPi's.
-        hold: names of what keeps its value, fitted by default or not.
-        free: names of what alone is fitted, any number of base and robot; None: the default.
+        model: start of the fit; a model, or the name of one; None is TurboPi's.
+        hold: names of parameters that keep their values, free by default or not.
+        free: names of the only free parameters, of base, robot or effects; None: the default.
         priors: mean and standard deviation of normal priors by name, in place of the usual ones,
             which are wide and about the model's value.
-        settings: when the fit ends.
+        settings: convergence criteria.
 
     Returns:
         The new model, its parameters with uncertainties, and both comparisons.
@@ -1688,15 +1687,15 @@ def compare_models(
     *,
     refit: bool = True,
 ) -> pd.DataFrame:
-    """Ranks models by how well they predict what they were not fitted to.
+    """Ranks models by six-fold cross-validation.
 
-    Each is fitted to the logs with one of six parts left out in turn, and predicts that part.
-    Blocks of 8 s count as independent.
+    Each model is fitted to all folds but one and predicts that one, in turn. Blocks of 8 s count as
+    independent.
 
     Args:
         models: two at least, or a dictionary of them by name.
         log: a log, the path of one, or a list of these.
-        refit: fit each model to the parts that are not left out; False: all predict as they are.
+        refit: fit each model to the other folds; False: all models predict as they are.
 
     Returns:
         One row per model, best first: rank, score_heldout (1.0 is as good as the log can tell),
@@ -1742,13 +1741,13 @@ def diagnose(
     without: Iterable[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
-    """Names the physical effect that a model lacks, or says that none is, or that none can be told.
+    """Names the physical effect that a model lacks, or says that none is missing or identifiable.
 
     Args:
         log: a log, or the path of one.
         model: best one that was fitted to another log; None is TurboPi's.
         without: names of effects that are not considered.
-        progress: is told in words what is being done.
+        progress: called with a sentence on each step.
 
     Returns:
         The verdict, what was found, and all effects that were tried.
@@ -1780,14 +1779,14 @@ def infer(
     own: Log | str | Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Inference:
-    """Gives the probability of each effect that a model may lack, and of something nameless.
+    """Posterior probability of each effect that a model may lack, and of an unknown cause.
 
     Args:
         log: of one robot, or the path of one; several logs that were loaded together are judged
             together.
         model: best one that was fitted to another log; None is TurboPi's.
-        own: the log (or logs) that the model was fitted to: what it misses there, too, is no news.
-        progress: is told in words what is being done.
+        own: the log (or logs) that the model was fitted to: model errors there are not reported.
+        progress: called with a sentence on each step.
 
     Returns:
         Verdict, effects and dependences with their probabilities.
@@ -1816,13 +1815,13 @@ def infer_robots(
     own: Log | str | Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> dict[int, Inference]:
-    """Infers for each robot of a log by itself.
+    """Posterior probabilities for each robot of a log separately.
 
     Args:
         log: of several robots, or the path of one.
         model: of all of them; None is TurboPi's.
         own: the log (or logs) that the model was fitted to; see `infer`.
-        progress: is told in words what is being done.
+        progress: called with a sentence on each step.
 
     Returns:
         Robot's number -> verdict, effects and dependences with their probabilities.
@@ -1851,13 +1850,13 @@ def explain(
     formula: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Explanation:
-    """Diagnoses, adds what is found, and fits all of it; every step on held-out data.
+    """Diagnoses, adds the effects found, and fits all parameters; cross-validated at each step.
 
     Args:
         log: a log, or the path of one.
         model: best one that was fitted to another log; None is TurboPi's.
-        formula: one that was proven for what no effect explains is added as well.
-        progress: is told in words what is being done.
+        formula: also add a validated formula for what no effect explains.
+        progress: called with a sentence on each step.
 
     Returns:
         The new model, and the diagnosis behind it.
@@ -1907,7 +1906,7 @@ def next_run(
         floor_m: free floor, along and across the robot at its start.
         max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
             highest in its logs.
-        progress: is told in words what is being done.
+        progress: called with a sentence on each step.
 
     Returns:
         The script, and what it would tell.
@@ -1971,7 +1970,7 @@ def simulate(
     seed: int = 1,
     script: str | Path | NextRun | None = None,
 ) -> Log:
-    """Lets robots drive in the twin.
+    """Simulates robots in the twin.
 
     Args:
         model: a model, or the name of one; None is TurboPi's.
@@ -1980,11 +1979,11 @@ def simulate(
         duration_s: simulated time.
         plant: `planar`, or `mujoco` with contacts and rollers.
         seed: the same seed gives the same log.
-        script: CSV of inputs or duties that all play in place of a behaviour, or a run that
+        script: CSV of inputs or duties that all play instead of a behaviour, or a run that
             `next_run` designed.
 
     Returns:
-        A log like a robot's own; it is in no file unless it is saved.
+        A log like a robot's own, in memory; `Log.save` writes it.
 
     Raises:
         ModelError: the model cannot be read.
@@ -2033,8 +2032,8 @@ def import_log(
 ) -> Log:
     """Makes a log from motion capture and commands in files of other programs.
 
-    One source of poses (`poses`, `motive`, `vicon`) is needed, and one of commands (`commands`,
-    `io_tsv`) unless the log is to be of poses alone; or a bag, which holds both. The page Files
+    It needs one source of poses (`poses`, `motive`, `vicon`), and one of commands (`commands`,
+    `io_tsv`) unless the log is to have poses alone; or a bag, which has both. The page Files
     lists the columns of tables; those of pandas go into `Log.from_frames`. Arguments are named as
     the options of `twinmill import`, whose help says more.
 
@@ -2061,10 +2060,10 @@ def import_log(
             `wheel_factor`; `command_timeout_s`, after which a robot stops that hears nothing.
 
     Returns:
-        A log; it is in no file unless it is saved.
+        A log, in memory; `Log.save` writes it.
 
     Raises:
-        LogError: a file cannot be read, or what it holds makes no run; one sentence.
+        LogError: a file cannot be read, or its rows make no run; one sentence.
         ValueError: there is no such option; the sentence has the nearest.
 
     Examples:

@@ -8,7 +8,7 @@ from scipy import special
 
 
 def t_quantile(share: float, free: float) -> float:
-    """Of Student's t with so many degrees of freedom."""
+    """Quantile of Student's t with so many degrees of freedom."""
     return float(special.stdtrit(free, share))
 
 
@@ -28,5 +28,5 @@ def chi2_above(value: float, free: float) -> float:
 
 
 def chi2_median(free: float) -> float:
-    """Of chi squared."""
+    """Median of chi squared."""
     return float(special.chdtri(free, 0.5))

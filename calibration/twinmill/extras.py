@@ -34,12 +34,12 @@ def missing(module: str, extra: str | None = None) -> str:
 
 
 def command(extra: str | None) -> str:
-    """What installs an extra, or without one all that everybody gets, into this environment."""
+    """Command line that installs an extra, or without one all that everybody gets, here."""
     return installing(f"'twinmill[{extra}]'" if extra else "twinmill")
 
 
 def installing(wanted: str) -> str:
-    """What installs a package into this environment."""
+    """Command line that installs a package into this environment."""
     pip = shutil.which("pip")
     own = pip and Path(pip).parent == Path(sys.executable).parent
     return f"{'pip' if own else f'{sys.executable} -m pip'} install {wanted}"

@@ -252,7 +252,7 @@ def _check_folder(path: Path, folder: Path) -> None:
 
 @contextmanager
 def _said_of(path: Path) -> Iterator[None]:
-    """What the system says of a place that cannot be written, in a sentence."""
+    """Turns an error of the system on writing a path into a sentence."""
     try:
         yield
     except OSError as error:

@@ -4,14 +4,13 @@
 `scipy.signal` does the same, and takes four tenths of a second to import.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 import twinmill_native as native
+from numpy.typing import ArrayLike
 
 
 def filtered(
-    numerator: Sequence[float], denominator: Sequence[float], signal: np.ndarray, axis: int = 0
+    numerator: ArrayLike, denominator: ArrayLike, signal: np.ndarray, axis: int = 0
 ) -> np.ndarray:
     """Output y of a filter that begins at rest: sum_k a_k y[n - k] = sum_k b_k x[n - k].
 
@@ -30,7 +29,7 @@ def filtered(
 
 
 class Swing:
-    """What swings around a push, over steps: dr/dt = w^2 (push - s) - 2 z w r.
+    """An oscillator that is driven by a push, over steps: dr/dt = w^2 (push - s) - 2 z w r.
 
     Exact where each push holds for its step. A step of no length leaves all as it is.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results that stand for themselves: a comparison, a designed run, a swarm's test, a card."""
+"""Results without a model of their own: comparisons, inferences, designed runs, cards."""
 
 from io import StringIO
 from pathlib import Path
@@ -36,12 +36,12 @@ NOT_SAVED = next_run_report.How("Not written yet: `run.save(path)` of this resul
 
 
 class Comparison(Reported):
-    """How well a model predicts a log, against the log's own noise.
+    """Prediction errors of a model on a log, relative to the noise floor.
 
     Attributes:
-        score: root mean square of prediction errors over what noise alone would cause: 1.0 is as
-            good as the log can tell; above 1.3 something is missing.
-        verdict: what that means, in a sentence.
+        score: RMS of prediction errors over the noise floor: 1.0 is as good as the log can tell;
+            above 1.3 something is missing.
+        verdict: interpretation of the score, in a sentence.
 
     Examples:
         >>> found = tm.compare("run.lcmlog", "turbopi.toml")
@@ -57,7 +57,7 @@ class Comparison(Reported):
         """Errors of each robot in each log.
 
         Returns:
-            log, robot_id, channel, unit, horizon_s, rms, floor (both in the unit), ratio.
+            log, robot_id, channel, unit, horizon_s, rms, floor (in the unit), ratio.
 
         Examples:
             >>> found.table()["horizon_s"].unique().tolist()
@@ -71,9 +71,9 @@ class Comparison(Reported):
         )
 
     def plot(self) -> Figure:
-        """Errors over the time predicted ahead, with the noise floor; of a table, its values.
+        """Errors over the horizon, with the noise floor; for a steady-state table, its values.
 
-        Of several robots it is the one that the model misses most.
+        Of several robots the one with the highest score is shown.
 
         Returns:
             A figure of matplotlib: m for forward and left, degrees for heading, over s.
@@ -96,14 +96,14 @@ class Comparison(Reported):
 
 
 class Inference(Shown):
-    """Probabilities of what a model lacks.
+    """Posterior probabilities of the effects that a model may lack.
 
     Attributes:
         verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
             cannot_tell.
         sentence: the same for people.
         findings: effects that are missing, each with `effect`, `probability` and `certainty`.
-        nothing, outside: probabilities that nothing is missing, and that something nameless is.
+        nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
 
     Examples:
         >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
@@ -198,12 +198,12 @@ class RunComparison(Reported):
 
 
 class NextRun(Reported):
-    """A script for the robot that tells apart what the logs so far cannot.
+    """A script for the robot that discriminates between effects that the logs so far cannot.
 
     Attributes:
-        why: what the logs leave open.
-        separates: effects that the run would more probably name than not.
-        predicted_power: chance of the right name if each effect in question is as probable.
+        why: the open question.
+        separates: effects in question with a power above one half.
+        predicted_power: mean power, each effect in question being equally probable.
         duration_s: of the script.
 
     Examples:
@@ -234,9 +234,9 @@ class NextRun(Reported):
         """Power of the run for each effect in question, surest first.
 
         Returns:
-            effect, rival (that could imitate it best; None: the base), margin_before and margin
-            (chi2 that no rival can imitate), power_before and power (chance that it is named if it
-            is the one).
+            effect, rival (the closest; None: the base), margin_before and margin (chi2 of the
+            effect's signature that the rival cannot reproduce), power_before and power
+            (probability that the effect is named if it is the missing one).
 
         Examples:
             >>> list(run.effects().columns)[:2]
@@ -285,12 +285,12 @@ class NextRun(Reported):
 
 
 class SwarmComparison(Reported):
-    """A recorded swarm among the twin's swarms.
+    """Test of a recorded swarm against swarms of the twin.
 
     Attributes:
-        differs: whether it is not one of them; one true model in twenty is called different.
-        verdict: the same for people.
-        p_energy, p_band: chance of so odd a run as a whole, and at its worst moment.
+        differs: significant at 5 %.
+        verdict: the result in a sentence.
+        p_energy, p_band: p-values by the energy distance, and by the largest deviation.
 
     Examples:
         >>> swarm = tm.simulate(n=3, duration_s=20)
@@ -349,7 +349,8 @@ class Effect(Shown):
     """A card of the catalogue: one physical effect that a model can have.
 
     Attributes:
-        name, summary, equation, stage: what it is, and where it acts.
+        name, summary, equation: as in the catalogue.
+        stage: where in the signal path it acts.
 
     Examples:
         >>> tm.effect("coasting").stage
@@ -394,7 +395,7 @@ class Effect(Shown):
 
 
 def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:
-    """Errors over the time predicted ahead, or a table's values; of the robot missed most.
+    """Errors over the horizon, or a table's values, of the robot with the highest score.
 
     Args:
         results: by the name that each has in the figure; of the last, the robot is taken.

@@ -10,6 +10,8 @@ from types import SimpleNamespace
 import pytest
 import twinmill_native as native
 
+import twinmill as tm
+
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
 from site_hooks import commands_of, on_post_page, run, with_outputs  # noqa: E402
@@ -53,6 +55,20 @@ def test_the_tutorial_names_the_effect_that_the_recording_has(outputs, folder):
     # As examples/make_recording.py hides it.
     assert value == pytest.approx(0.7, abs=2 * std)
     assert std < 0.2
+
+
+def test_the_tutorial_with_ros_finds_what_its_bag_has(tmp_path):
+    """As examples/make_ros_bag.py simulates it with NumPy: 1 m/s² at most, and a lag of 80 ms."""
+    page = (ROOT / "docs/tutorial-ros.md").read_text()
+    said = {command: run(command, tmp_path) for command in commands_of(page)}
+    (verdict,) = (text for command, text in said.items() if "diagnose" in command)
+    assert verdict.startswith("Missing: acceleration_limit (")
+    found = tm.Model.load(tmp_path / "better.toml")
+    assert found["acceleration_limit.pace_s2_per_m"] == pytest.approx(1.0, rel=0.02)
+    lag_s = found["base.motor_lag_s"] + found["motor_lag.extra_s"]
+    assert lag_s == pytest.approx(0.08, abs=0.002)
+    linked = re.findall(r"\(runs/tutorial-ros/([^)]+)\)", page)
+    assert [name for name in linked if not (tmp_path / name).is_file()] == []
 
 
 def test_what_the_tutorial_links_to_was_written(outputs, folder):

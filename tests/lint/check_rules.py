@@ -18,6 +18,7 @@ import tomllib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from graphlib import CycleError, TopologicalSorter
+from itertools import chain
 from pathlib import Path
 
 FOLDERS = (
@@ -183,8 +184,9 @@ def licence_line(args: argparse.Namespace) -> Iterator[str]:
 def docstring_openings(args: argparse.Namespace) -> Iterator[str]:
     """Docstrings of the commands and of what is typed strictly begin with what the thing is."""
     project = tomllib.loads((args.root / "pyproject.toml").read_text(encoding="utf-8"))
-    strict = [args.root / file for file in project["tool"]["mypy"]["files"]]
-    for path in [*strict, *sorted((args.root / "tools").rglob("*.py"))]:
+    typed = [args.root / name for name in (*project["tool"]["mypy"]["files"], "tools")]
+    found = (sorted(path.rglob("*.py")) if path.is_dir() else [path] for path in typed)
+    for path in chain.from_iterable(found):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             told = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
             if opening := OPENING.match(told or ""):

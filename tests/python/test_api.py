@@ -429,7 +429,7 @@ def test_a_fit_is_shown_with_its_own_clock_and_name_and_says_that_nothing_is_wri
     fitted = tm.fit("run.lcmlog", "turbopi.toml")
     text = " ".join(str(fitted).split())
     ms = abs(1000 * fitted.after.to_json()["time_offset_s"])
-    clock_ms = float(re.search(r"motion capture ([\d.]+) ms", text)[1])
+    clock_ms = float(re.search(r"motion capture's stamps are ([\d.]+) ms", text)[1])
     assert clock_ms == pytest.approx(ms, rel=0.01)
     assert "model turbopi_fitted.toml" in text
     assert "Not written yet" in text and "Written:" not in text

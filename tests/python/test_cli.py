@@ -369,6 +369,8 @@ def test_help_says_what_one_value_is_and_keeps_its_lines(name, module, summary):
     context = typer.Context(command)
     for parameter in command.params:
         assert not re.search(r"list|range|bool", parameter.display_type_rich(ctx=context) or "")
+    usage = command.get_usage(context)
+    assert not [p.name for p in command.params if p.hidden and f"[{p.name}]" in usage]
     (_, *paragraphs) = (command.help or "").split("\n\n")
     told = [line for p in paragraphs if not p.startswith("Example") for line in p.splitlines()]
     assert all(len(line) <= 78 for line in told)

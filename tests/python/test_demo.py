@@ -64,5 +64,5 @@ def test_one_of_a_group_is_right_in_part_and_no_wrong_name():
     groups = {"mass_offset": ("mass_offset", "wheel_gain")}
     grade, words = judged(HIDDEN, explained("coasting", "mass_offset", groups=groups))
     assert grade == "in part"
-    assert "mass_offset was named, which this log cannot part from it" in words
+    assert "mass_offset was named, which this log cannot distinguish from it" in words
     assert "not hidden" not in words

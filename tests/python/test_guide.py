@@ -68,7 +68,7 @@ def test_each_plan_has_a_model_that_loads_and_commands_that_exist(case):
     model = native.Model.load("plan/mine.toml")
     assert (model.drive, model.wheel_kind) == (case[2], case[3])
     assert ("--same-clock" in text) == (case[4] == "one" and case[1] in ("ros", "csv"))
-    ruler = re.search(r"what a ruler tells: (.*?)\n\n", text, re.DOTALL)[1]
+    ruler = re.search(r"Measure with a ruler .*?`mine.toml`: (.*?)\n\n", text, re.DOTALL)[1]
     asked, there = (
         set(re.findall(r"`(\w+_m)`", ruler)),
         tomllib.loads(Path("plan/mine.toml").read_text()),
@@ -138,7 +138,7 @@ def test_what_is_not_said_is_asked(monkeypatch):
 
     monkeypatch.setattr("sys.stdin", Terminal("other\nbicycle\ncsv\ndifferential\nduty\ntwo\n"))
     text, _ = plan()
-    assert "on plain wheels left and right, told duties; poses from a table" in " ".join(
+    assert "on plain wheels left and right, commanded by duties; poses from a table" in " ".join(
         text.split()
     )
 

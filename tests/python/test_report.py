@@ -15,6 +15,7 @@ from twinmill.fitting.compare import Comparison, compare
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, show, write_report
 from twinmill.report.sections import comparison_section, steps_section
+from twinmill.report.tables import _clocks, _date
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 
@@ -146,14 +147,33 @@ def noise_told(sensor_m, model_text, tmp_path):
     text = text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")
     (tmp_path / "m.toml").write_text(text)
     log = tm.Log.from_arrays(t_s, pose, commands_t_s, commands, kind="twist", same_clock=True)
-    (told,) = re.findall(r"noise\s+(.*?)\s+floor ", str(tm.compare(log, tmp_path / "m.toml")), re.S)
+    table = str(tm.compare(log, tmp_path / "m.toml"))
+    told = re.search(r"^ *noise +(.*?)^ *[a-z ]*floor ", table, re.S | re.M)[1]
     return " ".join(told.split())
 
 
 def test_a_log_without_noise_is_said_to_have_none(model_text, tmp_path):
     """Motion by algebra has no noise but that of rounding, and that is none; 0.3 mm are told."""
     assert noise_told(0, model_text, tmp_path) == "none found"
-    told = re.match(
-        r"each measured pose is off by ([0-9.]+) mm", noise_told(3e-4, model_text, tmp_path)
-    )
+    told = re.match(r"poses ([0-9.]+) mm", noise_told(3e-4, model_text, tmp_path))
     assert float(told[1]) == pytest.approx(0.3, rel=0.1)
+
+
+def test_noise_of_a_wrong_model_is_called_so(section):
+    """The model given lacks the robot's coasting."""
+    assert dict(section.facts)["noise"].endswith("include the model's error")
+
+
+def test_a_simulated_log_has_no_date():
+    """The twin starts all its logs at one instant."""
+    (run,) = tm.simulate(n=1, duration_s=12).measurements()
+    assert _date(run) == "simulated"
+
+
+@pytest.mark.parametrize(
+    ("offset_s", "said"), [(0.151, "151 ms later than"), (-0.02, "20.0 ms earlier than")]
+)
+def test_the_clocks_offset_says_which_stamp_is_later(offset_s, said):
+    """docs/conventions.md: t_capture = t_robot + offset."""
+    robot = SimpleNamespace(measurement=SimpleNamespace(same_clock=False), time_offset_s=offset_s)
+    assert said in _clocks(robot)

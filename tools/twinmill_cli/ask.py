@@ -66,7 +66,7 @@ def _ask(
     as_json: AsJson = False,
     out: Out = None,
 ) -> list[Curve]:
-    """Answer a design question with a curve and a sentence.
+    """Answer a design question (how many robots, how fast) by simulation.
 
     Example: twinmill swarm ask how-many --behavior milling --model turbopi.toml --out answer
     """

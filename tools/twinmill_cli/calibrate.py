@@ -47,11 +47,11 @@ def register(app: typer.Typer) -> None:
 def _compare(
     logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
 ) -> Comparison:
-    """Tell how well a model predicts logs, against the log's own noise, and where it fails.
+    """Measure prediction errors of a model on logs, relative to the noise floor.
 
-    Predictions start from measured poses and are judged 0.1, 0.2, 0.5, 1 and
-    2 s later. A score of 1.0 is as good as the log can tell; above 1.3
-    something is missing.
+    Predictions start from measured poses; errors are taken 0.1, 0.2, 0.5, 1 and
+    2 s later. The score is their RMS over the noise floor: 1.0 is as good as the
+    log can tell; above 1.3 something is missing.
 
     Example: twinmill compare run.lcmlog --model turbopi.toml --out report
     """
@@ -84,7 +84,7 @@ def _fit(
     as_json: AsJson = False,
     out: Out = None,
 ) -> FitResult:
-    """Fit all quantities of a model to logs; writes a new model file and leaves the old one.
+    """Fit the parameters of a model to logs, into a new model file.
 
     Example: twinmill fit run.lcmlog --model turbopi.toml -o fitted.toml
     """
@@ -114,7 +114,7 @@ def _add(
         typer.Argument(
             metavar="EFFECT",
             show_default=False,
-            help="Its name; `twinmill twin effects` lists them. Of one robot also gains.",
+            help="Name of an effect, as `twinmill twin effects` lists; with --robot also gains.",
             autocompletion=effects_beginning,
         ),
     ],
@@ -124,30 +124,34 @@ def _add(
     model: Model = DEFAULT_MODEL,
     force: Force = False,
     adds_to: Annotated[
-        str | None, typer.Option("--adds-to", help="Of an equation: vx_mps, rim_mps and others.")
+        str | None,
+        typer.Option(
+            "--adds-to", help="For equation: the quantity it adds to, as vx_mps, rim_mps."
+        ),
     ] = None,
     formula: Annotated[
-        str | None, typer.Option("--formula", help="Of an equation: what is added, of p0 to p3.")
+        str | None,
+        typer.Option("--formula", help="For equation: the term, with parameters p0 to p3."),
     ] = None,
     state_rate: Annotated[
         str | None,
-        typer.Option("--state-rate", help="Of an equation: ds/dt of the state s that it names."),
+        typer.Option("--state-rate", help="For equation: ds/dt of a state s."),
     ] = None,
     second_rate: Annotated[
         str | None,
-        typer.Option("--second-rate", help="Of an equation: dr/dt of a second state r."),
+        typer.Option("--second-rate", help="For equation: dr/dt of a second state r."),
     ] = None,
     hold: Hold = None,
     robot: Annotated[
         int | None,
         typer.Option(
-            min=0, max=99, show_default=False, help="Its number: that robot alone has the effect."
+            min=0, max=99, show_default=False, help="Number of the robot that alone has the effect."
         ),
     ] = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> AddResult:
-    """Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.
+    """Add an effect to a model, fit it with all other parameters, and cross-validate it.
 
     Example: twinmill twin add coasting run.lcmlog --model fitted.toml -o better.toml
     """

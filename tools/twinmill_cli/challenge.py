@@ -66,7 +66,8 @@ def _challenge(
     count: Annotated[int, typer.Option("--n", min=1, help="Cases.")] = 60,
     seed: Annotated[int, typer.Option(help="Same seed, same cases.")] = 1,
     duration_s: Annotated[
-        float, typer.Option("--duration-s", min=30, help="Of a log; they differ by 30 %.")
+        float,
+        typer.Option("--duration-s", min=30, help="Mean length of a log; lengths differ by 30 %."),
     ] = 90,
     out: Annotated[Path, typer.Option("--out", help="Folder for answers and results.")] = Path(
         "challenge"
@@ -81,16 +82,16 @@ def _challenge(
             min=1,
             metavar="N",
             show_default=False,
-            help="In place of the exam: fit N drives whose numbers are known, and tell of each "
-            "quantity how often its 95 % interval covers the truth.",
+            help="Instead of the tests: fit N drives with known parameters, and report how often "
+            "each 95 % interval covers the truth.",
         ),
     ] = None,
     judge: Annotated[
-        Judge, typer.Option(help="What is examined; infer also sees the log of each base.")
+        Judge, typer.Option(help="Engine to test; infer also sees the log of each base.")
     ] = Judge.DIAGNOSE,
     as_json: AsJson = False,
 ) -> dict:
-    """Draw robots and what is hidden in them, seal the answers, diagnose their logs, unseal, score.
+    """Blind tests: simulate robots with hidden effects, diagnose their logs, and score the answers.
 
     The robots move by formulas of their own, by forces in MuJoCo, and on wheels
     with free rollers; what is hidden is an effect of the catalogue, its cousin,

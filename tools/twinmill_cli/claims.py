@@ -70,7 +70,7 @@ def _claims(
     odd_turn: Annotated[
         list[float] | None,
         typer.Option(
-            "--odd-turn", help="Of the bull's-eye's odd robot, over the ring's turn rate."
+            "--odd-turn", help="Turn rate of the bull's-eye's odd robot, over that of the ring."
         ),
     ] = None,
     mujoco_seeds: Annotated[
@@ -88,7 +88,7 @@ def _claims(
     as_json: AsJson = False,
     out: Out = None,
 ) -> int:
-    """Check what was published of these swarms, with a figure of each claim.
+    """Check published claims about these swarms, with a figure of each.
 
     Exit code 1 if a number differs and it is not known why. DIR also gets
     claims.json and every figure as SVG. Stopped in MuJoCo, the same command goes

@@ -42,7 +42,8 @@ def _compare_swarm(
         str | None, typer.Option("--odd", help="Robots that are not of the ring, as 5 or R05,R06.")
     ] = None,
     behavior: Annotated[
-        str | None, typer.Option("--behavior", help="Of all robots; default: what the log says.")
+        str | None,
+        typer.Option("--behavior", help="Behaviour of all robots; default: as in the log."),
     ] = None,
     as_json: AsJson = False,
     out: Out = None,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot with a secret: two effects, drawn by lot and sealed, are found from a log and unsealed.
+"""A blind test: two effects, drawn at random and sealed, are found from a log and unsealed.
 
 Prints each command as a user would type it, then its real output; all files go to demo/.
 """
@@ -87,9 +87,11 @@ def register(app: typer.Typer) -> None:
 
 
 def _demo(
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the lot: another secret.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Another number hides other effects.")
+    ] = 1,
 ) -> None:
-    """Find two effects that were hidden in a simulated robot, and unseal what they were.
+    """Blind test: find two effects that are hidden in a simulated robot.
 
     Shows each command with its output; all files go to demo/ here. A minute or
     two, most of it the diagnosis.
@@ -103,11 +105,11 @@ def _demo(
     write_rich_script(FOLDER / "script.csv", DURATION_S, seed)
     robot = ["--plant", "planar", "--model", SEALED, "--n", "1", "--script", "demo/script.csv"]
     _simulate(*robot, "--seed", str(seed), "--log", LOG)
-    _say("How far does the model that we have miss?")
+    _say("How large are the prediction errors of the model as given?")
     _twinmill("compare", LOG, "--model", GIVEN)
-    _say("What is missing? Kept is only what helps on data not fitted to")
+    _say("Which effects are missing? Only what lowers the held-out error is kept")
     result = _twinmill("explain", LOG, "--model", GIVEN, "-o", FOUND)
-    _say("The seal is broken")
+    _say("The sealed answer")
     if _digest() != digest:
         raise ValueError(f"{SEALED}: was changed since it was sealed.")
     print(f"$ sha256sum {SEALED}\n{_digest()}  {SEALED}\nIt is the same file.")
@@ -126,7 +128,7 @@ def _demo(
     program = _as_typed(Path(sys.argv[0]))
     first = "" if find_spec("nicegui") else f"{command('workbench')} && "
     print(f"By hand, in the browser: {first}{program} open {LOG} --model {GIVEN}")
-    print(f"Another secret:          {program} demo --seed {seed + 1}")
+    print(f"Other effects:           {program} demo --seed {seed + 1}")
 
 
 def _as_typed(program: Path) -> str:
@@ -146,11 +148,11 @@ def _hide(seed: int) -> str:
         value = round(float(random.uniform(low, high)), 3)
         text += f'\n[[effect]]\nname = "{effect}"\n{parameter} = {value}\n'
     Path(SEALED).write_text(text)
-    _say("A robot with a secret")
+    _say("A blind test")
     print(
-        f"One of {len(PAIRS)} pairs of effects, and their sizes, were drawn by lot into a file\n"
-        "that nothing but the robot reads until the end. The pairs are ones that so short\n"
-        "a log can tell; of the others `twinmill lab challenge` shows how often it does.\n"
+        f"One of {len(PAIRS)} pairs of effects, and their sizes, were drawn at random into a file\n"
+        "that only the simulated robot reads until the end. All are identifiable in so short\n"
+        "a log; `twinmill lab challenge` tests the others, too.\n"
         f"SHA-256: {_digest()}"
     )
     return _digest()
@@ -186,7 +188,7 @@ def judged(hidden: list[Hidden], result: Explanation) -> tuple[str, str]:
         return "right", f"{told} {_sizes(hidden, result)}"
     words = [f"{effect} was hidden and found" for effect in sure]
     words += [
-        f"{effect} was hidden, and {e} was named, which this log cannot part from it"
+        f"{effect} was hidden, and {e} was named, which this log cannot distinguish from it"
         for effect, e in among.items()
     ]
     words += [f"{effect} was hidden and not found" for effect in missed]
@@ -199,7 +201,7 @@ def judged(hidden: list[Hidden], result: Explanation) -> tuple[str, str]:
 def _sizes(hidden: list[Hidden], result: Explanation) -> str:
     held = [h for h in hidden if _holds(_estimate(h, result), h)]
     count = {0: "Neither size", 1: "One of the two sizes", 2: "Both sizes"}[len(held)]
-    return f"{count} lie{'' if len(held) == 2 else 's'} within the 95 % interval that was told."
+    return f"{count} lie{'' if len(held) == 2 else 's'} within the estimated 95 % interval."
 
 
 def _estimate(hidden: Hidden, result: Explanation) -> ParameterEstimate | None:
@@ -218,14 +220,14 @@ def _table(hidden: list[Hidden], result: Explanation) -> Table:
         told = "not found" if estimate is None else f"{estimate.value:.3g} ± {estimate.std:.1g}"
         rows.append([Cell(h.name), Cell(f"{h.value:g}"), Cell(told)])
     return Table(
-        "The secret", ["quantity", "hidden", "found"], rows, "Found: with its standard deviation."
+        "The sealed answer", ["quantity", "hidden", "found"], rows, "Found: ± one standard error."
     )
 
 
 def _section(hidden: list[Hidden], result: Explanation, words: str, grade: str) -> Section:
     before, after = result.diagnosis.before.score, result.after.score
     return Section(
-        "A robot with a secret",
+        "A blind test",
         [
             ("answer", grade, TONES[grade][0]),
             ("score as given", number(before), tone(before)),
@@ -250,15 +252,15 @@ def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
                     label=None if row else "found, 95 % interval",
                 )  # fmt: skip
         axes.set_yticks(range(len(hidden)), [h.name for h in hidden])
-        axes.set(xlabel="size over what was hidden", ylim=(len(hidden) - 0.4, -0.6))
+        axes.set(xlabel="estimated size over hidden size", ylim=(len(hidden) - 0.4, -0.6))
         axes.set_xlim(min(0.0, axes.get_xlim()[0]), max(1.7, axes.get_xlim()[1]))
         legend_above(axes, 2)
 
     return Figure(
         draw(1.9, paint),
-        "Found beside hidden",
-        "The model knew nothing of these effects. The dots are what the log alone told of their "
-        "sizes, with 95 % intervals; the green line is what the sealed file held.",
+        "Estimates over the hidden sizes",
+        "The model as given has none of these effects. Dots: sizes estimated from the log alone, "
+        "with 95 % intervals; green line: the sizes in the sealed file.",
     )
 
 

@@ -57,10 +57,10 @@ def register(app: typer.Typer) -> None:
 def _diagnose(
     logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
 ) -> Diagnosis:
-    """Name the physical effect that a model lacks, or say that none is or that the log cannot tell.
+    """Name the physical effect that a model lacks, or say that none is missing or identifiable.
 
-    Best on a model whose base was fitted to another log of the same robot and
-    clocks: a new lag or delay can be told from what was there before.
+    Works best with a model whose base was fitted to another log of the same robot
+    and clocks: only then can a new lag or delay be told from an old one.
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
     """
@@ -231,18 +231,18 @@ def _explain(
         bool,
         typer.Option(
             "--formula/--no-formula",
-            help="Add a formula too, where one is proven for what no effect explains.",
+            help="Add a validated formula for what no effect explains.",
         ),
     ] = True,
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
 ) -> Explanation:
-    """Diagnose, add what is found, and write the model that has it; every step on held-out data.
+    """Diagnose, add the effects found, and write the new model; cross-validated at each step.
 
-    Where no effect explains what is left and a formula for it was proven on
-    stretches that neither chose nor fitted it, the formula is added last, if
-    left-out data are then better predicted.
+    If an error remains that no effect explains, and a formula for it was
+    validated on data used neither to choose nor to fit it, the formula is added
+    last, if that lowers the held-out error.
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
     """

@@ -53,13 +53,18 @@ def register(app: typer.Typer) -> None:
 
 def _discover(
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", show_default=False, help="Of the archive.")
+        Path,
+        typer.Option("--out", metavar="DIR", show_default=False, help="Folder of the archive."),
     ],
     *,
     model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
     change: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Of the model, as an axis of twin_sweep."),
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Value of a model parameter, named as an axis of twin_sweep.",
+        ),
     ] = None,
     n: Annotated[int, typer.Option("--n", min=2, max=100, help="Robots.")] = 6,
     generations: Annotated[
@@ -70,9 +75,12 @@ def _discover(
     ] = 8,
     duration_s: Annotated[float, typer.Option("--duration-s", min=1)] = 120,
     start: Annotated[str, typer.Option("--start")] = "square",
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the search.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the search.")] = 1,
     show: Annotated[
-        int, typer.Option("--show", min=1, help="Of each kind, drawn and tried in MuJoCo.")
+        int,
+        typer.Option(
+            "--show", min=1, help="Examples of each kind that are drawn and tried in MuJoCo."
+        ),
     ] = 6,
     confirm_runs: Annotated[
         int, typer.Option("--confirm", min=1, help="Fresh runs of each, and with models drawn.")
@@ -85,7 +93,7 @@ def _discover(
     ] = 5,
     as_json: AsJson = False,
 ) -> list[Entry]:
-    """Search tables and mixes of two tables for behaviours that differ, and name what is known.
+    """Search controllers, and mixes of two, for new behaviours of the swarm.
 
     Stopped half way, or with more generations, the same command goes on where it
     was. DIR/behaviors.toml makes each runnable by name in twin_run.

@@ -32,7 +32,9 @@ def register(app: typer.Typer) -> None:
 def _drift(
     history: Annotated[
         Path,
-        typer.Argument(metavar="HISTORY", show_default=False, help="That `fit --history` wrote."),
+        typer.Argument(
+            metavar="HISTORY", show_default=False, help="File that `fit --history` wrote."
+        ),
     ],
     *,
     alarm_rate: Annotated[
@@ -41,13 +43,13 @@ def _drift(
             "--alarm-rate",
             min=0.001,
             max=0.5,
-            help="Of an unchanged robot's calibrations, at most.",
+            help="Largest share of false alarms on an unchanged robot.",
         ),
     ] = ALARM_RATE,
     as_json: AsJson = False,
     out: Out = None,
 ) -> Drift:
-    """Draw a robot's numbers over its calibrations, and tell which left its band.
+    """Plot a robot's parameters over its calibrations, and test which have drifted.
 
     The band is where the next calibration of an unchanged robot lies, by those
     before it. Exit codes: 0 all are in their bands, 3 one is not.

@@ -32,21 +32,21 @@ def _effects(
         ),
     ] = None,
     called: Annotated[
-        str | None, typer.Argument(metavar="NEW_NAME", help="Of the one that is written.")
+        str | None, typer.Argument(metavar="NEW_NAME", help="Name of the new effect.")
     ] = None,
     *,
     from_model: Annotated[
         Path | None,
-        typer.Option("--from", metavar="MODEL", help="Of new: the model that has its equation."),
+        typer.Option("--from", metavar="MODEL", help="For new: the model that has its equation."),
     ] = None,
     equation: Annotated[
         str | None,
         typer.Option(
-            "--equation", help="Of new: which of the model's equations, if it has several."
+            "--equation", help="For new: which of the model's equations, if it has several."
         ),
     ] = None,
     into: Annotated[
-        Path, typer.Option("--into", help="Of new: folder of the project's source.")
+        Path, typer.Option("--into", help="For new: folder of the project's source.")
     ] = Path(),
     as_json: AsJson = False,
 ) -> None:

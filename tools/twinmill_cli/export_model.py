@@ -34,7 +34,7 @@ def _export_model(
     ],
     *,
     to: Annotated[
-        ModelFormat | None, typer.Option("--to", show_default=False, help="What to write.")
+        ModelFormat | None, typer.Option("--to", show_default=False, help="Format to write.")
     ] = None,
     out: Annotated[
         Path | None,
@@ -44,7 +44,7 @@ def _export_model(
     ] = None,
     robot: Annotated[
         int | None,
-        typer.Option("--robot", min=0, max=99, help="With what the model states of this robot."),
+        typer.Option("--robot", min=0, max=99, help="Robot whose own parameters are used."),
     ] = None,
     diagnosis: Annotated[
         Path | None,
@@ -60,11 +60,11 @@ def _export_model(
         ),
     ] = False,
     samples: Annotated[int, typer.Option("--samples", min=1, max=100_000)] = 100,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the samples.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the samples.")] = 1,
     force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
     as_json: AsJson = False,
 ) -> dict:
-    """Write a model for other simulators, and name what their file cannot carry.
+    """Export a model to other simulators, and list what their format cannot represent.
 
     The MJCF runs in MuJoCo as it is. SDF, URDF and ros2_control parameters have
     geometry, masses, wheels, camera and limits. JSON has all. --ranges writes

@@ -95,7 +95,7 @@ def _flash(
     lcm_url: LcmUrl = URL,
     as_json: AsJson = False,
 ) -> int:
-    """Install the robot's program on robots, all at once, and see that each runs.
+    """Install the robot's program on several robots at once, and check that each runs.
 
     Needs ssh with a key, and sudo without password, on Raspberry Pi OS (64 bit).
     Robots stop while they are updated, and stand after it. Exit code 1 if any

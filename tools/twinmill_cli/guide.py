@@ -80,7 +80,7 @@ QUESTIONS = {
     "robot": (Robot, "What drives it: our program, ROS, another program, or the twin to try this"),
     "poses": (Poses, "Where do the robot's poses come from"),
     "wheels": (Wheels, "What does it roll on"),
-    "drive": (Drive, "What is it told: duties, wheel speeds or velocities"),
+    "drive": (Drive, "How is it commanded: by duties, wheel speeds or velocities"),
     "clocks": (Clocks, "Does one computer stamp poses and commands (one), or do two"),
 }
 WIDTH = 72  # of a paragraph of the plan
@@ -102,7 +102,7 @@ SEEN = {
 ANSWERS = (
     (
         "score near 1",
-        "on average it predicts as well as this log can tell; something small may be left",
+        "on average it predicts as well as this log can tell; a small effect may be missing",
         "read the verdict",
     ),
     ("`model_adequate`", "nothing is missing that this log would show", "use the model"),
@@ -115,11 +115,10 @@ ANSWERS = (
     ("`ambiguous`, `group`", "this log cannot tell some effects apart", "`next`"),
     (
         "`outside_catalogue`",
-        "something is missing that no effect explains; `rest` says when it comes",
-        "look there; `explain` takes a formula that was proven for it, `add equation` one of your "
-        "own",
+        "something is missing that no effect explains; `rest` says what it depends on",
+        "look there; `explain` adds a validated formula for it, `add equation` one of your own",
     ),
-    ("`cannot_tell`", "what the log does not show would change the answer", "`next`"),
+    ("`cannot_tell`", "the log does not determine the answer", "`next`"),
     ("`bad_input`", "the log itself is wrong; `input` says what", "correct it, import again"),
 )
 DRIVE_S, SEED = 60.0, 1
@@ -156,7 +155,7 @@ def _guide(
     ] = Path("plan"),
     as_json: AsJson = False,
 ) -> Have:
-    """Ask what you have, and write the plan from an unknown robot to a named effect.
+    """Ask for your equipment, and write a plan from an unknown robot to a named effect.
 
     The folder holds plan.md, a model file to write your measures into, and two
     scripts: one wheel at a time, and the first drive. What an option says is

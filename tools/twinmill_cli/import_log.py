@@ -187,7 +187,7 @@ def _command(
     command_timeout_s: Annotated[
         float | None,
         typer.Option(
-            help="Of a robot that stops by itself when it hears no command for so long, as "
+            help="Time after which the robot stops by itself if it gets no command, as "
             "ros2_control's do after 0.5 s; else each command holds until the next."
         ),
     ] = None,
@@ -252,7 +252,7 @@ def _command(
         list[str] | None,
         typer.Option(
             metavar="[ROBOT=]PPM",
-            help="By which the poses' clock gains on the commands', taken out; likewise.",
+            help="Rate of the poses' clock relative to the commands', to be removed; likewise.",
         ),
     ] = None,
     heading_offset_deg: Annotated[
@@ -266,7 +266,7 @@ def _command(
         bool,
         typer.Option(
             "--heading-from-path",
-            help="Of positions alone: the heading is the way of the path while the robot is told "
+            help="For positions without heading: take it from the path while the robot is told "
             "to drive ahead or straight aside.",
         ),
     ] = False,

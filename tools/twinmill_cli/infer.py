@@ -51,7 +51,7 @@ def _infer(
             metavar="LOG",
             show_default=False,
             help="Log that the model was fitted to (once for each): what it misses there, too, "
-            "is no news.",
+            "is not reported as new.",
         ),
     ] = None,
     keep: Annotated[
@@ -66,7 +66,7 @@ def _infer(
     force: Force = False,
     as_json: AsJson = False,
 ) -> list[Inference]:
-    """Give the probability of each effect that a model may lack, and of something nameless.
+    """Posterior probability of each effect that a model may lack, and of an unknown cause.
 
     Effects of the catalogue, dependences without a name (on time, place, heading,
     speed, turns, the past, single moments) and nothing at all compete by their
@@ -82,7 +82,7 @@ def _infer(
     verb = shlex.join(["lab", "infer", *words, *(["--keep", str(keep)] if keep else [])])
     source = provenance(command_line(verb, logs, model), model_file := open_model(model, None))
     if keep is not None and not own:
-        raise ValueError("infer: --keep keeps what --own tells; give the model's own log, too.")
+        raise ValueError("infer: --keep stores what --own shows; give the model's own log, too.")
     if keep is not None:
         check_new_file(keep, force, [model_file.path, *logs, *own])
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):

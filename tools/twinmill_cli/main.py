@@ -18,12 +18,12 @@ COMMANDS = (
     (
         "demo",
         "demo",
-        "Find two effects that were hidden in a simulated robot, and unseal what they were.",
+        "Blind test: find two effects that are hidden in a simulated robot.",
     ),
     (
         "guide",
         "guide",
-        "Ask what you have, and write the plan from an unknown robot to a named effect.",
+        "Ask for your equipment, and write a plan from an unknown robot to a named effect.",
     ),
     (
         "import",
@@ -49,17 +49,17 @@ COMMANDS = (
     (
         "track-calibrate",
         "track",
-        "Find a camera's lens from a film of a board that is moved about before it.",
+        "Calibrate a camera's lens from a film of a board that is moved in front of it.",
     ),
     (
         "track-check",
         "track",
-        "Compare poses of a printed sheet with the ruler along which a hand pushed it.",
+        "Check the accuracy of poses: a printed sheet pushed by hand along a ruler.",
     ),
     (
         "export-model",
         "export_model",
-        "Write a model for other simulators, and name what their file cannot carry.",
+        "Export a model to other simulators, and list what their format cannot represent.",
     ),
     (
         "wheels",
@@ -75,12 +75,12 @@ COMMANDS = (
     (
         "open",
         "open_workbench",
-        "See where a model fails, turn its knobs, name and add what is missing, in the browser.",
+        "Inspect a model's errors, change parameters, diagnose and add effects, in the browser.",
     ),
     (
         "compare",
         "calibrate",
-        "Tell how well a model predicts logs, against the log's own noise, and where it fails.",
+        "Measure prediction errors of a model on logs, relative to the noise floor.",
     ),
     (
         "compare-runs",
@@ -90,50 +90,48 @@ COMMANDS = (
     (
         "drift",
         "drift",
-        "Draw a robot's numbers over its calibrations, and tell which left its band.",
+        "Plot a robot's parameters over its calibrations, and test which have drifted.",
     ),
     (
         "fit",
         "calibrate",
-        "Fit all quantities of a model to logs; writes a new model file and leaves the old one.",
+        "Fit the parameters of a model to logs, into a new model file.",
     ),
     (
         "add",
         "calibrate",
-        "Add an effect to a model, fit it with all the rest, and judge it on data not fitted to.",
+        "Add an effect to a model, fit it with all other parameters, and cross-validate it.",
     ),
     (
         "set",
         "set_values",
-        "Set numbers of a model by hand; writes a new model file and leaves the old one.",
+        "Set parameters of a model by hand, into a new model file.",
     ),
     (
         "diagnose",
         "diagnose",
-        "Name the physical effect that a model lacks, or say that none is or "
-        "that the log cannot tell.",
+        "Name the physical effect that a model lacks, or say that none is missing or identifiable.",
     ),
     (
         "infer",
         "infer",
-        "Give the probability of each effect that a model may lack, and of something nameless.",
+        "Posterior probability of each effect that a model may lack, and of an unknown cause.",
     ),
     (
         "explain",
         "diagnose",
-        "Diagnose, add what is found, and write the model that has it; every "
-        "step on held-out data.",
+        "Diagnose, add the effects found, and write the new model; cross-validated at each step.",
     ),
     (
         "next",
         "next",
-        "Design the run that best tells apart what these logs cannot, and write its script.",
+        "Design the run that best discriminates what these logs cannot, and write its script.",
     ),
     (
         "challenge",
         "challenge",
-        "Draw robots and what is hidden in them, seal the answers, diagnose their logs, "
-        "unseal, score.",
+        "Blind tests: simulate robots with hidden effects, diagnose their logs, and score "
+        "the answers.",
     ),
     (
         "effects",
@@ -143,7 +141,7 @@ COMMANDS = (
     (
         "flash",
         "flash",
-        "Install the robot's program on robots, all at once, and see that each runs.",
+        "Install the robot's program on several robots at once, and check that each runs.",
     ),
     (
         "characterise",
@@ -153,7 +151,7 @@ COMMANDS = (
     (
         "metrics",
         "metrics",
-        "Tell what the swarm in a log or on the bus does: metrics over time, and its class.",
+        "Metrics of the swarm in a log or on the bus over time, and the class of its behaviour.",
     ),
     (
         "compare-swarm",
@@ -163,38 +161,38 @@ COMMANDS = (
     (
         "phase",
         "phase",
-        "Draw what becomes of the swarm over a sweep's grid, and where to experiment next.",
+        "Draw the phase diagram of a sweep, and where to experiment next.",
     ),
     (
         "predict-floor",
         "predict_floor",
-        "Choose the cells of a sweep that tell most, plan their runs, and seal what is predicted.",
+        "Preregister a prediction: choose the most informative cells of a sweep, plan their runs.",
     ),
     (
         "score-floor",
         "score_floor",
-        "Unseal a prediction and score it by what came of the runs, against simpler predictions.",
+        "Score a preregistered prediction by the outcomes of the runs, against simpler ones.",
     ),
     (
         "matters",
         "matters",
-        "Tell which effects and numbers of a model matter for what the swarm does.",
+        "Sensitivity analysis: which effects and parameters change what the swarm does.",
     ),
-    ("ask", "ask", "Answer a design question with a curve and a sentence."),
+    ("ask", "ask", "Answer a design question (how many robots, how fast) by simulation."),
     (
         "claims",
         "claims",
-        "Check what was published of these swarms, with a figure of each claim.",
+        "Check published claims about these swarms, with a figure of each.",
     ),
     (
         "discover",
         "discover",
-        "Search tables and mixes of two tables for behaviours that differ, and name what is known.",
+        "Search controllers, and mixes of two, for new behaviours of the swarm.",
     ),
     (
         "threshold",
         "threshold",
-        "Find the limits of colour that hold the green ball, and nothing else.",
+        "Find the colour limits that select the green ball, and nothing else.",
     ),
     (
         "swarm",
@@ -244,9 +242,9 @@ BELOW = {
     },
 }
 GROUPS = {
-    "twin": "Change a model by hand, list effects, write files for other simulators.",
-    "robot": "Set up a robot, drive it, and see whether it changed since.",
-    "lab": "Probabilities, sealed tests and predictions, published claims, new behaviours.",
+    "twin": "Change a model by hand, list effects, export to other simulators.",
+    "robot": "Set up a robot, drive it, and test whether it has changed.",
+    "lab": "Probabilities, blind tests, preregistered predictions, claims, new behaviours.",
 }
 
 
@@ -306,9 +304,9 @@ def _options(
         typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
-    """Compare a robot's log with its model, and make the model as good as the log can tell.
+    """Compare a robot's log with its model, and improve the model as far as the log allows.
 
-    Lengths in m, angles in rad, times in s; what is printed for people says mm and degrees.
+    Lengths in m, angles in rad, times in s; text for people uses mm and degrees.
 
     `twinmill --install-completion` lets the shell complete commands and options.
 

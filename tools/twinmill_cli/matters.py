@@ -76,7 +76,9 @@ def _matters(
     ] = None,
     seeds: Annotated[int, typer.Option("--seeds", min=40, help="Most runs of each change.")] = 400,
     first_seed: Annotated[int, typer.Option("--first-seed", min=0)] = 1,
-    duration_s: Annotated[float, typer.Option("--duration-s", min=10, help="Of each run.")] = 120,
+    duration_s: Annotated[
+        float, typer.Option("--duration-s", min=10, help="Length of each run.")
+    ] = 120,
     start: Start = "square",
     spread_m: SpreadM = 1.2,
     margin: Annotated[
@@ -98,7 +100,7 @@ def _matters(
     as_json: AsJson = False,
     out: Out = None,
 ) -> Sensitivity:
-    """Tell which effects and numbers of a model matter for what the swarm does.
+    """Sensitivity analysis: which effects and parameters change what the swarm does.
 
     Each is changed alone: an effect is left out, a number goes to both ends of
     its interval, and what the logs do not exclude is put in. The same seeds

@@ -50,7 +50,7 @@ def _metrics(
     as_json: AsJson = False,
     out: Out = None,
 ) -> SwarmSeries | int:
-    """Tell what the swarm in a log or on the bus does: metrics over time, and its class.
+    """Metrics of the swarm in a log or on the bus over time, and the class of its behaviour.
 
     With --live the same of the last 10 s of the bus, robots and twins (channels
     TWIN_...), once a second until Ctrl-C; --json then prints an object a line.

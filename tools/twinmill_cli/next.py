@@ -47,9 +47,16 @@ def _next(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="SCRIPT", help="The new script (.csv).")
     ] = Path("script.csv"),
-    duration_s: Annotated[float, typer.Option("--duration-s", max=600, help="Longest run.")] = 30,
+    duration_s: Annotated[
+        float, typer.Option("--duration-s", max=600, help="Longest duration of the run.")
+    ] = 30,
     floor_m: Annotated[
-        str, typer.Option("--floor-m", metavar="LxW", help="Free floor, along and across.")
+        str,
+        typer.Option(
+            "--floor-m",
+            metavar="LxW",
+            help="Free area, along and across the robot at its start, m.",
+        ),
     ] = "2x2",
     max_duty_pct: Annotated[
         int,
@@ -57,7 +64,7 @@ def _next(
             "--max-duty-pct",
             min=20,
             max=100,
-            help="Highest duty of a wheel; of a robot told velocities, share of the highest in its "
+            help="Highest duty of a wheel; for velocity commands, percent of the highest in the "
             "logs.",
         ),
     ] = 100,
@@ -66,27 +73,27 @@ def _next(
         typer.Option(
             "--for",
             metavar="BEHAVIOR",
-            help="Narrow what a swarm of it is predicted to do, as milling; not the parameters.",
+            help="Reduce the uncertainty of what a swarm with this behaviour does, as milling.",
         ),
     ] = "",
     n: Annotated[int, typer.Option("--n", min=2, help="Robots of that swarm.")] = 6,
     draws: Annotated[int, typer.Option("--draws", min=4, help="Models that are drawn.")] = 40,
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each.")] = 20,
-    swarm_s: Annotated[float, typer.Option("--swarm-s", min=10, help="Of each run.")] = 120,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each model.")] = 20,
+    swarm_s: Annotated[float, typer.Option("--swarm-s", min=10, help="Length of each run.")] = 120,
     force: Annotated[bool, typer.Option("--force", help="Replace SCRIPT if it exists.")] = False,
     script_as: ScriptAs = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> Plan | Narrowing:
-    """Design the run that best tells apart what these logs cannot, and write its script.
+    """Design the run that best discriminates what these logs cannot, and write its script.
 
-    What is in question is what `diagnose` leaves open: effects that look alike,
-    else effects that would not show. Play the script, log it, and diagnose
-    the old and the new logs together.
+    In question are the effects that `diagnose` cannot distinguish, else those
+    that are not identifiable in these logs. Play the script, record it, and
+    diagnose the old and the new logs together.
 
-    With --for the run tells what a swarm's predicted share of success depends on:
-    models drawn from what the fits leave open are run as swarms, and the drive
-    that narrows their spread most is put together.
+    With --for the run reduces the uncertainty of a swarm's predicted success:
+    models drawn from the uncertainty of the fits are run as swarms, and the
+    script determines the parameters on which their outcomes depend most.
 
     Example: twinmill next run.lcmlog --model fitted.toml -o script.csv
     """

@@ -32,7 +32,7 @@ def _open(
     *,
     model: Model = DEFAULT_MODEL,
     port: Annotated[
-        int, typer.Option(min=0, max=65535, help="Of this machine; 0: any that is free.")
+        int, typer.Option(min=0, max=65535, help="Port on this machine; 0: any that is free.")
     ] = 0,
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Print the address alone.")
@@ -47,7 +47,7 @@ def _open(
         ),
     ] = None,
 ) -> None:
-    """See where a model fails, turn its knobs, name and add what is missing, in the browser.
+    """Inspect a model's errors, change parameters, diagnose and add effects, in the browser.
 
     Serves this machine alone, until Ctrl-C; the address holds a secret. What
     you did is kept: the same command opens it again.

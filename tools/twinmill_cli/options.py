@@ -85,7 +85,7 @@ Arm = Annotated[
 ]
 LcmUrl = Annotated[str, typer.Option("--lcm-url", help="The bus that the robots are on.")]
 Prefix = Annotated[
-    str, typer.Option("--channel-prefix", help="As given to twin_run, to speak to a twin alone.")
+    str, typer.Option("--channel-prefix", help="Prefix given to twin_run, to address a twin alone.")
 ]
 SshConfig = Annotated[
     Path | None,
@@ -94,7 +94,10 @@ SshConfig = Annotated[
 DurationS = Annotated[
     float,
     typer.Option(
-        "--duration-s", min=0.1, show_default=False, help="Of the bus; else until Ctrl-C."
+        "--duration-s",
+        min=0.1,
+        show_default=False,
+        help="How long to listen to the bus; else until Ctrl-C.",
     ),
 ]
 

@@ -38,10 +38,13 @@ def register(app: typer.Typer) -> None:
 
 
 def _optitrack(
-    server: Annotated[str, typer.Option("--server", metavar="IP", help="Of Motive's computer.")],
+    server: Annotated[
+        str, typer.Option("--server", metavar="IP", help="Address of Motive's computer.")
+    ],
     *,
     local: Annotated[
-        str, typer.Option("--local", metavar="IP", help="Of this machine, on Motive's network.")
+        str,
+        typer.Option("--local", metavar="IP", help="Address of this machine on Motive's network."),
     ] = "",
     multicast: Annotated[
         bool | None,

@@ -64,11 +64,11 @@ def _phase(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Of the report; default: SWEEP/phase."),
+        typer.Option("--out", metavar="DIR", help="Folder of the report; default: SWEEP/phase."),
     ] = None,
     as_json: AsJson = False,
 ) -> dict:
-    """Draw what becomes of the swarm over a sweep's grid, and where to experiment next.
+    """Draw the phase diagram of a sweep, and where to experiment next.
 
     Example: twinmill swarm phase sweep --experiments floor.csv
     """

@@ -34,19 +34,23 @@ def _predict_floor(
     ],
     output: Annotated[
         Path,
-        typer.Option("--output", "-o", metavar="DIR", show_default=False, help="Of the plan."),
+        typer.Option(
+            "--output", "-o", metavar="DIR", show_default=False, help="Folder of the plan."
+        ),
     ],
     *,
-    cells: Annotated[int, typer.Option("--cells", min=1, help="That are to be run.")] = 9,
+    cells: Annotated[int, typer.Option("--cells", min=1, help="Number of cells to run.")] = 9,
     repeats: Annotated[int, typer.Option("--repeats", min=1, help="Runs of each cell.")] = 3,
     draws: Annotated[
         int, typer.Option("--draws", min=0, help="Models drawn from the errors of the numbers.")
     ] = 100,
     seeds: Annotated[int, typer.Option("--seeds", min=2, help="Runs of each in each cell.")] = 10,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of draws, order and starts.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, help="Random seed of draws, order and starts.")
+    ] = 1,
     as_json: AsJson = False,
 ) -> Plan:
-    """Choose the cells of a sweep that tell most, plan their runs, and seal what is predicted.
+    """Preregister a prediction: choose the most informative cells of a sweep, plan their runs.
 
     Cells tell most where models drawn from the uncertainty of the sweep's model
     end differently, or surely and otherwise than most cells do. DIR/plan.md is

@@ -31,7 +31,8 @@ def register(app: typer.Typer) -> None:
 
 def _score_floor(
     folder: Annotated[
-        Path, typer.Argument(metavar="PLAN", show_default=False, help="Folder of predict-floor.")
+        Path,
+        typer.Argument(metavar="PLAN", show_default=False, help="Folder that `lab predict` wrote."),
     ],
     outcomes: Annotated[
         Path,
@@ -40,12 +41,12 @@ def _score_floor(
     *,
     sha256: Annotated[
         str | None,
-        typer.Option("--sha256", metavar="HEX", help="As published; default: as plan.md says."),
+        typer.Option("--sha256", metavar="HEX", help="Hash as published; default: as in plan.md."),
     ] = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> Score:
-    """Unseal a prediction and score it by what came of the runs, against simpler predictions.
+    """Score a preregistered prediction by the outcomes of the runs, against simpler ones.
 
     Scores are proper: the log score in nats and Brier's. Their intervals come
     from the scatter of the cells.

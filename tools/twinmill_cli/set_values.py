@@ -37,7 +37,7 @@ def _set(
     force: Force = False,
     as_json: AsJson = False,
 ) -> dict:
-    """Set numbers of a model by hand; writes a new model file and leaves the old one.
+    """Set parameters of a model by hand, into a new model file.
 
     What fits told of these numbers is taken out of the new file.
 

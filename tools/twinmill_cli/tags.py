@@ -29,7 +29,9 @@ def _tags(
         Path, typer.Option("--out", "-o", metavar="PDF", show_default=False, help="The sheets.")
     ],
     *,
-    robots: Annotated[str, typer.Option("--robots", metavar="IDS", help="As 1-8,12.")] = "1-8",
+    robots: Annotated[
+        str, typer.Option("--robots", metavar="IDS", help="Numbers, as 1-8,12.")
+    ] = "1-8",
     size_m: Annotated[
         float, typer.Option("--size", metavar="M", help="Side of the black square.")
     ] = 0.10,

@@ -58,10 +58,16 @@ def _threshold(
         ),
     ] = None,
     camera: Annotated[
-        str, typer.Option("--camera", metavar="DEVICE", help="Or a camera here: /dev/video0.")
+        str,
+        typer.Option(
+            "--camera", metavar="DEVICE", help="Use a camera of this machine: /dev/video0."
+        ),
     ] = "",
     robot: Annotated[
-        str, typer.Option("--robot", metavar="HOST", help="Or a robot's, by ssh; it stops for it.")
+        str,
+        typer.Option(
+            "--robot", metavar="HOST", help="Use a robot's camera, by ssh; the robot stops for it."
+        ),
     ] = "",
     ball: Annotated[
         list[str] | None,
@@ -69,10 +75,15 @@ def _threshold(
             "--ball", metavar="X,Y,R", help="Where the ball is, in pixels: once, or per picture."
         ),
     ] = None,
-    size: Annotated[str, typer.Option("--size", help="Of raw frames.")] = "640x480",
-    count: Annotated[int, typer.Option("--count", min=1, max=100, help="Of live frames.")] = 10,
+    size: Annotated[str, typer.Option("--size", help="Size of raw frames.")] = "640x480",
+    count: Annotated[
+        int, typer.Option("--count", min=1, max=100, help="Number of live frames.")
+    ] = 10,
     min_blob_px: Annotated[
-        int, typer.Option("--min-blob-px", min=0, help="As in the robot's configuration.")
+        int,
+        typer.Option(
+            "--min-blob-px", min=0, help="Smallest blob, as in the robot's configuration."
+        ),
     ] = DEFAULT_MIN_BLOB_PX,
     config: Annotated[
         Path | None, typer.Option("--config", metavar="FILE", help="Put the limits in there.")
@@ -87,7 +98,7 @@ def _threshold(
     ssh_config: SshConfig = None,
     as_json: AsJson = False,
 ) -> int:
-    """Find the limits of colour that hold the green ball, and nothing else.
+    """Find the colour limits that select the green ball, and nothing else.
 
     Pictures from different places and lights make better limits. Whether they
     do is judged by the robot's own threshold and blob code. Nothing is written

@@ -49,7 +49,7 @@ Rate = Annotated[
     typer.Option("--rate-hz", help="The frames' rate, where the file's stamps are no good."),
 ]
 ExposureMs = Annotated[
-    float | None, typer.Option("--exposure-ms", min=0, max=1000, help="Of each row.")
+    float | None, typer.Option("--exposure-ms", min=0, max=1000, help="Exposure time of each row.")
 ]
 LineDelayUs = Annotated[
     float | None,
@@ -72,7 +72,7 @@ def _track(
             "--lens",
             metavar="TOML",
             show_default=False,
-            help="Of track-calibrate; one for all cameras, or one for each.",
+            help="Lens file that `track calibrate` wrote; one for all cameras, or one for each.",
         ),
     ],
     floor: Annotated[
@@ -83,7 +83,12 @@ def _track(
     ],
     height_m: Annotated[
         float,
-        typer.Option("--height", metavar="M", show_default=False, help="Of the tags over it."),
+        typer.Option(
+            "--height",
+            metavar="M",
+            show_default=False,
+            help="Height of the tags above the floor, m.",
+        ),
     ],
     *,
     videos: Annotated[
@@ -91,10 +96,12 @@ def _track(
     ] = None,
     camera: Annotated[
         list[str] | None,
-        typer.Option("--camera", metavar="DEVICE", help="Or live: 0, or /dev/video0; repeatable."),
+        typer.Option(
+            "--camera", metavar="DEVICE", help="Live camera: 0, or /dev/video0; repeatable."
+        ),
     ] = None,
     robots: Annotated[
-        str, typer.Option("--robots", metavar="IDS", help="As 1-8,12; default: all seen.")
+        str, typer.Option("--robots", metavar="IDS", help="Numbers, as 1-8,12; default: all seen.")
     ] = "",
     size_m: Annotated[
         float, typer.Option("--size", metavar="M", help="Side of the tags' black square.")
@@ -104,7 +111,7 @@ def _track(
         typer.Option(
             "--family",
             metavar="NAME",
-            help="Of tags, as OpenCV draws them: 4x4_50, apriltag_25h9 ...; or AprilTag: tag36h11.",
+            help="Family of tags, by OpenCV: 4x4_50, apriltag_25h9; or by AprilTag: tag36h11.",
         ),
     ] = "apriltag_36h11",
     out: Annotated[
@@ -123,13 +130,15 @@ def _track(
     ] = None,
     commands: Annotated[
         Path | None,
-        typer.Option("--commands", metavar="CSV", help="Or the commands, to find it by."),
+        typer.Option(
+            "--commands", metavar="CSV", help="Command table, to find that stamp by the motion."
+        ),
     ] = None,
     duration_s: Annotated[
         float | None, typer.Option("--duration-s", min=0.1, help="Live; else until Ctrl-C.")
     ] = None,
     port: Annotated[
-        int, typer.Option("--port", min=0, max=65535, help="Of the page; 0: any that is free.")
+        int, typer.Option("--port", min=0, max=65535, help="Port of the page; 0: any that is free.")
     ] = 0,
     lcm_url: LcmUrl = "",
     force: Force = False,
@@ -472,7 +481,7 @@ def _calibrate(
     force: Force = False,
     as_json: AsJson = False,
 ) -> dict:
-    """Find a camera's lens from a film of a board that is moved about before it.
+    """Calibrate a camera's lens from a film of a board that is moved in front of it.
 
     The board is that of `twinmill track tags --board`, or a checkerboard. Show
     it in all parts of the picture and tilted to all sides; move slowly, and keep
@@ -531,7 +540,7 @@ def _check(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Compare poses of a printed sheet with the ruler along which a hand pushed it.
+    """Check the accuracy of poses: a printed sheet pushed by hand along a ruler.
 
     Film a sheet on the floor that lies still for two seconds at each of some
     marks of a ruler, and let `track` find it. No robot is needed. Exit code 1

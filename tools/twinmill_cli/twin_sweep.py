@@ -60,14 +60,21 @@ def _command(
         int, typer.Option("--first-seed", min=0, help="Cells take their seeds from here on.")
     ] = 1,
     same_seeds: Annotated[
-        bool, typer.Option("--same-seeds", help="In every cell, to see differences of cells alone.")
+        bool,
+        typer.Option(
+            "--same-seeds", help="Use the same seeds in every cell, so that only the cells differ."
+        ),
     ] = False,
-    duration_s: Annotated[float, typer.Option("--duration-s", min=0.1, help="Of each run.")] = 120,
+    duration_s: Annotated[
+        float, typer.Option("--duration-s", min=0.1, help="Length of each run.")
+    ] = 120,
     start: Start = "square",
     spread_m: SpreadM = 1.2,
     target_radius_m: Annotated[
         float | None,
-        typer.Option("--target-radius-m", help="Of the disc that is seen; default: the model's."),
+        typer.Option(
+            "--target-radius-m", help="Radius of the disc that is seen; default: the model's."
+        ),
     ] = None,
     model: Annotated[str, typer.Option("--model", "-m", metavar="M")] = "paper.toml",
     workers: Annotated[

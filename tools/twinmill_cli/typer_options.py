@@ -13,6 +13,7 @@ _display_type = TyperOption.display_type_rich
 _argument_type = TyperArgument.display_type_rich
 _process_value = TyperOption.process_value
 _argument_value = TyperArgument.process_value
+_argument_usage = TyperArgument.get_usage_pieces
 _parse_args = TyperCommand.parse_args
 
 
@@ -23,6 +24,11 @@ def _type_shown(option: TyperOption, ctx: typer.Context) -> str | None:
 
 def _of_argument(argument: TyperArgument, ctx: typer.Context) -> str | None:
     return _plain(_argument_type(argument, ctx=ctx))
+
+
+def _usage(argument: TyperArgument, ctx: typer.Context) -> list[str]:
+    """Typer's, but without arguments that are hidden."""
+    return [] if argument.hidden else _argument_usage(argument, ctx)
 
 
 def _plain(shown: str | None) -> str | None:
@@ -109,5 +115,6 @@ def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> li
 TyperCommand.parse_args = _each_once
 TyperOption.display_type_rich = _type_shown
 TyperArgument.display_type_rich = _of_argument
+TyperArgument.get_usage_pieces = _usage
 TyperOption.process_value = _finite
 TyperArgument.process_value = _given

@@ -47,7 +47,7 @@ def register(app: typer.Typer) -> None:
 def _wheels(
     *,
     log: Annotated[
-        Path | None, typer.Argument(metavar="[LOG]", show_default=False, help="Of the script.")
+        Path | None, typer.Argument(metavar="[LOG]", show_default=False, help="Log of the script.")
     ] = None,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="SCRIPT", help="The script to write.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a browser draws, as arrays: thinned to what an eye can tell."""
+"""Series for the browser, as arrays: thinned to what an eye can resolve."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -126,7 +126,7 @@ class RobotView:
         return found
 
     def measured(self) -> Arrays:
-        """What the log alone tells: speeds, and the band that a right model keeps to.
+        """Arrays from the log alone: speeds, and the band that a right model keeps to.
 
         band: (5, 4) horizon_s, forward and left in m, heading in rad: 95 % of the errors of a right
         model are within it.
@@ -135,7 +135,7 @@ class RobotView:
         return {**measured_speed(self.track), "band": band}
 
     def predicted(self, model: native.Model, every: int = 1) -> Arrays:
-        """What the model says; of the places where predictions start, each so many-th.
+        """Arrays from the model; of the places where predictions start, each so many-th.
 
         starts: (S, 4) t_s and pose from which a prediction starts; ahead: (S, AHEAD, 2) places
         after each step, NaN where the track ends; predicted_speed: (T, 4) as the measured one;

@@ -8,6 +8,7 @@ import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -87,7 +88,7 @@ def embedded(robots: Sequence[Shown], first: int, span_s: tuple[float, float]) -
 
 
 def slim(packed: bytes) -> str:
-    """What `pack` made, with numbers rounded to 1/STEPS, deflated, as text.
+    """Output of `pack`, with numbers rounded to 1/STEPS, deflated, as text.
 
     The four bytes of all numbers stand apart, first bytes first: so they deflate to half.
     """
@@ -110,8 +111,8 @@ def _log_bytes(robots: Sequence[Shown]) -> bytes:
     return pack_log(robots[0].view.measurement.log_name, paths, headings, radius_m)
 
 
-def _facts(robot: Shown, log: int) -> dict:
-    """Of one robot: label, place of its log, and its moments by what it was doing."""
+def _facts(robot: Shown, log: int) -> dict[str, Any]:
+    """Facts of one robot: label, place of its log, and its moments by what it was doing."""
     moments = robot.view.moments(robot.model) if robot.regimes else {}
     where = []
     for regime in robot.regimes:
@@ -122,7 +123,7 @@ def _facts(robot: Shown, log: int) -> dict:
     return {"label": robot.view.measurement.label, "log": log, "where": where}
 
 
-def _script(options: dict) -> str:
+def _script(options: dict[str, Any]) -> str:
     """The modules, named by an import map, and the call that starts them."""
     imports = {name: f"data:text/javascript;base64,{_module(name)}" for name in MODULES}
     told = json.dumps(options, separators=(",", ":")).replace("<", "\\u003c")

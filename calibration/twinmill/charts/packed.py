@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a browser draws, as bytes: facts as JSON, and arrays of 32-bit numbers behind them."""
+"""Series for the browser, as bytes: facts as JSON, then arrays of 32-bit numbers."""
 
 import json
 import struct
@@ -75,7 +75,7 @@ def pack_prediction(
     every: int = 1,
     **facts: object,
 ) -> bytes:
-    """What a model says of one robot; another model's words beside it, with its label.
+    """Predictions of one robot, and those of another model with its label.
 
     `detections`: of its camera, if it has one and others are near; `every`: as of
     `RobotView.predicted`.

@@ -45,6 +45,7 @@ class Measurement:
         time_base: of the log, where it was not what the stamps say; `track` has it put right.
         frames: of the robot's camera; None if the log tells of none.
         findings: mistakes of the input with which it can be judged.
+        simulated: the log says that the twin made it.
     """
 
     log_name: str
@@ -55,6 +56,7 @@ class Measurement:
     time_base: TimeBase | None = None
     frames: Frames | None = None
     findings: tuple[InputFinding, ...] = ()
+    simulated: bool = False
 
     @classmethod
     def live(cls, track: Track) -> "Measurement":
@@ -341,6 +343,7 @@ def _measured(log: Log, robot: RobotLog, runs: int) -> Measurement:
         recorded_utime_us=log.t0_utime_us,
         time_base=base,
         frames=frames_of(robot) if robot.has_heading else None,
+        simulated=robot.source == "twin",
     )
 
 

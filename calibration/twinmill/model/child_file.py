@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import tomlkit
 import twinmill_native as native
@@ -34,7 +34,7 @@ class NoiseTable(Protocol):
 
 @dataclass(frozen=True)
 class Fitted:
-    """What a fit found out and a new model file records.
+    """Results of a fit, as a new model file records them.
 
     Attributes:
         model: with the fitted values and effects.
@@ -123,12 +123,14 @@ def _write_moved(document: tomlkit.TOMLDocument, before: native.Model, after: na
 
 def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     base = document.setdefault("base", tomlkit.table())
-    stds: dict = {}
+    stds: dict[str, Any] = {}
     for estimate in fitted.estimates:
         section, *key = estimate.name.split(".")
         if section != "base":
             continue
-        values, errors, place = base, stds, key[0]
+        values: Any = base
+        errors: Any = stds
+        place: str | int = key[0]
         if len(key) == 2:  # an entry of a table: those that were not fitted have no error
             values, place = base[key[0]], int(key[1])
             errors = stds.setdefault(key[0], [math.nan] * len(values))
@@ -139,7 +141,7 @@ def _write_base(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
 
 
 def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
-    """What is one robot's own, as [robots.R03]."""
+    """Writes parameters of single robots, as [robots.R03]."""
     for robot_id, estimates in sorted(fitted.robots.items()):
         robots = document.setdefault("robots", tomlkit.table(is_super_table=True))
         own = robots.setdefault(f"R{robot_id:02d}", tomlkit.table())

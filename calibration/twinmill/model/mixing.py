@@ -25,7 +25,8 @@ def duties_from_vendor_move(speed: float, direction_deg: float, turn: float) -> 
 
     Its rounding is kept: (50, 270, 0) gives (-50, -49, -49, -50).
     """
-    return tuple(_duty(value) for value in asked_by_vendor_move(speed, direction_deg, turn))
+    fl, fr, rl, rr = map(_duty, asked_by_vendor_move(speed, direction_deg, turn))
+    return fl, fr, rl, rr
 
 
 def asked_by_vendor_move(

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
+from typing import Any
 
 import twinmill_native as native
 
@@ -87,7 +88,7 @@ class Parameter:
     words: str = ""
 
     def at(self, value: float) -> "Parameter":
-        """The same, begun elsewhere; no place or moment is usual: the prior of one goes with it."""
+        """A parameter that starts elsewhere; the prior of a place or a moment moves with it."""
         return replace(self, value=value, usual=value if self.role in NO_SIZE else self.usual)
 
 
@@ -114,7 +115,7 @@ class ParameterEstimate:
 
     @property
     def told(self) -> bool:
-        """Whether the log tells it, by itself or together with others."""
+        """True if the log determines it, by itself or in combination with others."""
         return self.seen or self.together
 
     @property
@@ -127,7 +128,7 @@ class ParameterEstimate:
         """The unit behind a number, for people; nothing behind a pure one."""
         return "" if self.unit == "1" else f" {self.unit.replace('^2', '²')}"
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return vars(self)
 
@@ -148,12 +149,12 @@ def catalogue_name(name: str) -> str:
 
 
 @cache
-def catalogue() -> dict[str, dict]:
+def catalogue() -> dict[str, dict[str, Any]]:
     """The twin's effects by name."""
     return {entry["name"]: entry for entry in native.catalogue()}
 
 
-def find_effect(name: str) -> dict:
+def find_effect(name: str) -> dict[str, Any]:
     """The catalogue's entry of that name.
 
     Raises:
@@ -168,7 +169,7 @@ def find_effect(name: str) -> dict:
 
 
 def is_of_camera(effect: str) -> bool:
-    """Whether an effect changes what a camera sees, and not the motion; false of what is none."""
+    """True if an effect changes what a camera sees, and not the motion; false of unknown names."""
     return effect in catalogue() and catalogue()[effect]["stage"] in CAMERA_STAGES
 
 
@@ -208,13 +209,13 @@ def phases(model: native.Model) -> list[Parameter]:
 
 
 def _phase_keys(texts: Mapping[str, str]) -> list[str]:
-    """Of p0 to p3 those that are phases in an effect's texts."""
+    """Those of p0 to p3 that are phases in an effect's texts."""
     whole = " ".join(texts.values())
     at = [key for _, key in IN_A_WAVE.findall(whole)]
     return [k for k in dict.fromkeys(at) if len(re.findall(rf"\b{k}\b", whole)) == at.count(k)]
 
 
-def _phase(v: dict) -> Parameter:
+def _phase(v: dict[str, Any]) -> Parameter:
     at = v["value"]
     return Parameter(
         name=v["name"],
@@ -232,7 +233,7 @@ def _phase(v: dict) -> Parameter:
 
 
 def of_each_log(model: native.Model) -> list[Parameter]:
-    """What no other log tells: wheels' angles at the start, if any acts, and formulas' phases."""
+    """Parameters of each log alone: wheels' angles at the start, if any acts, and phases."""
     return [*starting_angles(model), *phases(model)]
 
 
@@ -250,7 +251,7 @@ def take_alignment(model: native.Model, of: native.Model) -> None:
 
 
 def unevenness(model: native.Model, wheel: str) -> float:
-    """Of a wheel by its angle, as a share of its way; 0 where a formula alone says how it acts."""
+    """Ripple of a wheel over its angle, relative to its speed; 0 if only a formula describes it."""
     cards = catalogue_of(model)
     own = [
         model.get(f"{instance}.{p['name']}")
@@ -262,7 +263,7 @@ def unevenness(model: native.Model, wheel: str) -> float:
 
 
 def drives_sideways(model: native.Model) -> bool:
-    """Whether a robot on such wheels can; one of no wheels that are known may."""
+    """True if a robot on such wheels can drive sideways, or its wheels are unknown."""
     return model.wheel_kind not in ("differential", "ackermann")
 
 
@@ -283,17 +284,17 @@ def beginning_at_a_moment() -> list[str]:
 
 
 def lasts_for_a_while(effect: str) -> bool:
-    """Whether an effect begins at one moment of its log and ends at another."""
+    """True if an effect begins at one time of its log and ends at another."""
     return len(with_role(effect, "moment")) > 1
 
 
 def is_local(effect: str) -> bool:
-    """Whether one part of a log may hold all of an effect: of one for a while, or of a place."""
+    """True if an effect may lie in one part of a log: a transient, or one at a place."""
     return lasts_for_a_while(effect) or bool(with_role(effect, "place"))
 
 
 def late_part(effect: str) -> tuple[str, str] | None:
-    """What an effect makes late and by which of its parameters; None if it makes nothing late.
+    """Kind of lateness of an effect, and its parameter; None if it makes nothing late.
 
     Returns:
         "lag", "delay" or "clock", and the parameter of role "lateness".
@@ -303,7 +304,7 @@ def late_part(effect: str) -> tuple[str, str] | None:
 
 
 def makes_late(name: str) -> bool:
-    """Whether an effect makes late, or a quantity is the base's lag or of such an effect."""
+    """True of an effect that makes late, of its quantities and of the base's lag."""
     return name == LAG or bool(with_role(catalogue_name(name), "lateness"))
 
 
@@ -312,10 +313,10 @@ def making_late(part: str) -> list[str]:
     return [name for name in catalogue() if (late := late_part(name)) and late[0] == part]
 
 
-_of_kind: dict[tuple[str, str, int], dict[str, dict]] = {}
+_of_kind: dict[tuple[str, str, int], dict[str, dict[str, Any]]] = {}
 
 
-def catalogue_of(model: native.Model) -> dict[str, dict]:
+def catalogue_of(model: native.Model) -> dict[str, dict[str, Any]]:
     """Effects that a robot like the model's can have, parameters by its own wheels."""
     kind = (model.wheel_kind, model.drive, len(model.wheels()))
     if kind not in _of_kind:
@@ -435,7 +436,7 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
 
 
 def base_lag_is_identifiable(model: native.Model) -> bool:
-    """Whether data can tell the base's lag, and not only its sum with an effect's."""
+    """True if data determine the base's lag, and not only its sum with an effect's."""
     return LAG_EFFECT not in model.effects
 
 

@@ -2,6 +2,7 @@
 """Intervals of a model's numbers, and samples of them that go together, for randomisation."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import tomlkit
@@ -49,7 +50,7 @@ class Quantity:
         ends = norm(self.value, self.std)
         return float(ends.cdf(self.min) + ends.sf(self.max))
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Its fields and interval."""
         low, high = self.interval
         return {**vars(self), "low": low, "high": high}
@@ -78,7 +79,7 @@ class Ranges:
         """Those that a bound cuts off so far that samples have another mean and covariance."""
         return [q for q in self.quantities if q.outside > CUT]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """For all three files."""
         return {
             "seed": self.seed,
@@ -113,7 +114,7 @@ def quantities(file: ModelFile, model: native.Model) -> list[Quantity]:
 
 
 def _stds(file: ModelFile) -> dict[str, float]:
-    """What the tables `std` of a model file say, by the quantities' full names."""
+    """Standard errors in the tables `std` of a model file, by the quantities' full names."""
     document = tomlkit.parse(file.text).unwrap()
     tables = {k: t for k, t in document.items() if isinstance(t, dict)}
     tables |= dict(zip(effect_names(file.model), document.get("effect", []), strict=True))

@@ -4,6 +4,7 @@
 import difflib
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import tomlkit
 
@@ -36,7 +37,7 @@ def with_values(parent: ModelFile, values: Mapping[str, float], command: str) ->
     return tomlkit.dumps(document)
 
 
-def _check(name: str, value: float, bounds: Mapping[str, dict]) -> None:
+def _check(name: str, value: float, bounds: Mapping[str, dict[str, Any]]) -> None:
     known = [own for own in bounds if not own.startswith("theta_")]
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)

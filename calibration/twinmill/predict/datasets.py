@@ -26,7 +26,7 @@ INDEPENDENT_S = 2.0  # predictions that start so far apart share nothing
 
 
 class Dataset(Protocol):
-    """What all kinds have."""
+    """Attributes and methods that all kinds of data sets have."""
 
     @property
     def label(self) -> str:
@@ -59,7 +59,7 @@ class ErrorDataset(Dataset, Protocol):
 
     @property
     def by_run(self) -> bool:
-        """What its robot has of its own is of this data set alone, not of the robot's others."""
+        """True if its robot's own parameters are of this data set alone, not of its others."""
         ...
 
     @property
@@ -150,7 +150,7 @@ class Trajectory:
 
     @classmethod
     def at(cls, measurement: Measurement, windows: Windows) -> "Trajectory":
-        """The same with some windows alone."""
+        """A trajectory of some windows alone."""
         measured = windows.measured(measurement)
         return cls(
             measurement,
@@ -161,18 +161,18 @@ class Trajectory:
         )
 
     def over(self, floor: np.ndarray, keep: np.ndarray | None = None) -> "Trajectory":
-        """The same over another floor; channels that never move (floor 0 or NaN) are not judged."""
+        """A copy with another noise floor; channels that never move (0 or NaN) are not judged."""
         known = np.where(floor > 1e-9, floor, np.inf)
         return replace(self, floor=known, keep=self.keep if keep is None else keep)
 
     def with_own_start(self, model: native.Model) -> "Trajectory":
-        """The same with what it begins at: angles of wheels and phases of formulas that act."""
+        """A copy with its own initial state: angles of wheels and phases of formulas that act."""
         known = {p.name for p in self.own}
         fresh = tuple(p for p in of_each_log(model) if p.name not in known)
         return replace(self, own=(*self.own, *fresh)) if fresh else self
 
     def thinned(self, every: int) -> "Trajectory":
-        """The same with every Nth start alone: predictions that overlap tell much the same."""
+        """A copy with every Nth start alone: overlapping predictions are redundant."""
         return replace(
             self,
             windows=self.windows.thinned(every),

@@ -2,6 +2,7 @@
 """Predicted against measured detections: how often they agree, and where they do not."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -38,7 +39,7 @@ class Confusion:
         """Share of frames in which both say the same."""
         return (self.true_positive + self.true_negative) / max(self.frames, 1)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The four counts: the model's answer is true or false by what was measured."""
         return dict(vars(self))
 
@@ -73,7 +74,7 @@ class DetectionComparison:
 
     @property
     def confusion(self) -> Confusion:
-        """Of geometry against measured detections."""
+        """Confusion of geometry and measured detections."""
         return Confusion.of(self.in_view, self.measured)
 
     @property
@@ -90,7 +91,7 @@ class DetectionComparison:
             rows.append((label, confusion, brier_ratio(self.predicted[own], self.measured[own])))
         return rows
 
-    def cells(self) -> list[dict]:
+    def cells(self) -> list[dict[str, Any]]:
         """Counts over range and bearing of the nearest robot, cells without frames left out."""
         range_edges = np.linspace(0, SHOWN * self.reach_m, RANGE_BINS + 1)
         bearing_edges = np.linspace(-np.pi, np.pi, BEARING_BINS + 1)
@@ -113,7 +114,7 @@ class DetectionComparison:
                     )
         return cells
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The key `bits`."""
         return {
             "frames": self.confusion.frames,
@@ -150,15 +151,14 @@ def compare_detections(
         return None
     raw = all(s.frames.has_raw for s in cameras)
     parts = [_of_robot(s, model.for_robot(s.robot_id), raw) for s in cameras]
-    columns = [np.concatenate(c) for c in zip(*(p[:5] for p in parts), strict=True)]
+    predicted, in_view, measured, range_m, bearing_rad, votes = (
+        np.concatenate(c) for c in zip(*parts, strict=True)
+    )
     robot = np.concatenate([np.full(len(p[0]), i) for i, p in enumerate(parts)])
     detection = model.detection_model()
-    votes = np.concatenate([p[5] for p in parts])
     return DetectionComparison(
         [s.label for s in cameras],
-        *columns[:3],
-        robot,
-        *columns[3:],
+        *(predicted, in_view, measured, robot, range_m, bearing_rad),
         detection["range_m"],
         detection["cone_rad"] / 2,
         raw,

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -49,8 +50,8 @@ class Detections:
     blur: tuple[float, float]
     block: np.ndarray
     half: np.ndarray
-    _seen: tuple = field(default=(None, None), repr=False)
-    _placed: tuple = field(default=(None, None), repr=False)
+    _seen: tuple[Any, Any] = field(default=(None, None), repr=False)
+    _placed: tuple[Any, Any] = field(default=(None, None), repr=False)
 
     stages = CAMERA_STAGES  # see Dataset
 
@@ -107,7 +108,8 @@ class Detections:
         chance = self.chance(model, pick)
         raw = self.frames.raw[pick]
         right = self.voted(frames)[pick] == self.frames.voted[pick]
-        vote = np.where(right, np.log(1 - VOTE_ERROR), np.log(VOTE_ERROR))
+        vote = np.full(right.shape, np.log(VOTE_ERROR))
+        vote[right] = np.log(1 - VOTE_ERROR)
         vote[np.arange(len(self.frames.raw))[pick] < UNSEEN_FRAMES] = 0
         told = np.log(np.where(raw, chance, 1 - chance)) + vote * self.frames.has_vote
         return np.where(self.usable[pick], told, np.nan)
@@ -163,7 +165,7 @@ def pose_at(track: Track, t_s: np.ndarray) -> np.ndarray:
     return np.where(whole[:, None], pose, np.nan)
 
 
-def all_detections(logs: Sequence) -> list[Detections]:
+def all_detections(logs: Sequence[Any]) -> list[Detections]:
     """Robots that reported bits while at least one other was tracked.
 
     Args:
@@ -184,9 +186,10 @@ def all_detections(logs: Sequence) -> list[Detections]:
 
 
 def detections_of(together: list[ModelledLog], own: int) -> Detections:
-    """Of one robot of a log that has frames; of the others the tracks alone are used."""
+    """Detections of one robot of a log that has frames; the others contribute their tracks."""
     modelled = together[own]
-    noise, frames = modelled.noise.to_json(), modelled.measurement.frames
+    noise, frames = modelled.known_noise.to_json(), modelled.measurement.frames
+    assert frames is not None
     block = ((frames.t_s - frames.t_s[0]) // BLOCK_S).astype(int)
     made = Detections(
         label=modelled.measurement.label,

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a log's motion leaves unexplained by any smooth response to its commands: its own noise.
+"""Residuals of a smooth response to the commands, fitted to a log's motion: its own noise.
 
 A regression with no physics names: the measured velocity on the commands' levels, each passed
 through a few first-order lags, with terms for stopping, for coupling between the axes and for the
-room. It is never shown as a model; it only tells noise from what some model could explain.
+room. It is never shown as a model; it separates noise from what some model could explain.
 """
 
 from collections.abc import Iterator

@@ -31,6 +31,12 @@ class ModelledLog:
     noise: Noise | None = None
 
     @property
+    def known_noise(self) -> Noise:
+        """The noise, which every maker of a log settles."""
+        assert self.noise is not None
+        return self.noise
+
+    @property
     def stated(self) -> set[str]:
         """Names that the model file states of this robot alone: no fit of all robots moves them."""
         return stated_names(self.model, self.measurement.track.robot_id)
@@ -39,7 +45,7 @@ class ModelledLog:
     def on_clock(
         cls, measurement: Measurement, model: native.Model, clock_free: bool
     ) -> "ModelledLog":
-        """Of a robot's own model on the measurement's clock, with the noise that the log shows."""
+        """A log with a robot's own model on the measurement's clock, and the noise in the log."""
         modelled = cls(measurement, model, StepGrid.of(measurement), clock_free)
         modelled.noise = fit_noise(
             unexplained(measurement, modelled.grid, model.get(CLOCK)),
@@ -50,13 +56,13 @@ class ModelledLog:
         return modelled
 
     def with_model(self, model: native.Model) -> "ModelledLog":
-        """The same measurement, clock and noise with another model."""
+        """A copy with another model; measurement, clock and noise stay."""
         model = model.for_robot(self.measurement.track.robot_id)
         take_alignment(model, self.model)
         return replace(self, model=model)
 
     def fitted(self, model: native.Model) -> "ModelledLog":
-        """The same with a model of its own robot that was fitted to it, its clock included."""
+        """A copy with a model of its own robot that was fitted to it, its clock included."""
         modelled = replace(self, model=model)
         modelled.settle_noise()
         return modelled
@@ -69,12 +75,12 @@ class ModelledLog:
 
     def white_errors(self) -> np.ndarray:
         """(S, 3) the same, whitened."""
-        return self.noise.whiten(self.errors(), self.grid)
+        return self.known_noise.whiten(self.errors(), self.grid)
 
     def settle_noise(self) -> None:
         """Takes the noise that the model leaves, if it leaves less than any smooth response did."""
         left = fit_noise([self.errors()], self._moving(), self.grid)
-        if left.loudness(self.grid.period_s) < self.noise.loudness(self.grid.period_s):
+        if left.loudness(self.grid.period_s) < self.known_noise.loudness(self.grid.period_s):
             self.noise = left
 
     @property
@@ -85,7 +91,7 @@ class ModelledLog:
         way_m = np.linalg.norm(ends[:, :2] - pose[grid.origin, :2], axis=1) * grid.share
         speed_mps = way_m[way_m > LEAST_SPEED_MPS * grid.period_s] / grid.period_s
         rms_mps = np.sqrt(np.mean(speed_mps**2)) if len(speed_mps) else 0.0
-        return replace(self.noise, speed_mps=float(rms_mps))
+        return replace(self.known_noise, speed_mps=float(rms_mps))
 
     def _moving(self) -> np.ndarray:
         """(S,) bool: some command is not zero."""
@@ -98,4 +104,4 @@ class ModelledLog:
         predicted = native.one_step_batch(
             self.model, self.measurement.played, names, np.ascontiguousarray(rows)
         )
-        return self.noise.whiten(self.grid.errors(predicted, self.measurement), self.grid)
+        return self.known_noise.whiten(self.grid.errors(predicted, self.measurement), self.grid)

@@ -8,6 +8,7 @@ phi = exp(-dt / tau). Whitened, they have unit variance and no memory.
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -95,7 +96,7 @@ class Noise:
     heading: ChannelNoise
     speed_mps: float = 0.0
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's field names."""
         return {
             "sensor_m": self.position.sensor,
@@ -141,7 +142,8 @@ def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> N
     while (pieces := _pieces(grid, moving, chunk)) is None:
         chunk //= 2
     if not len(pieces):
-        return Noise(*(ChannelNoise(*least, LEAST_MEMORY_S) for least in LEAST))
+        position, heading = (ChannelNoise(*least, LEAST_MEMORY_S) for least in LEAST)
+        return Noise(position, heading)
     bins, taken = _bins(chunk)
     power = np.mean([_median_power(np.nan_to_num(e), pieces, bins) for e in errors], axis=0)
     return Noise(
@@ -168,7 +170,7 @@ def _pieces(grid: StepGrid, moving: np.ndarray, chunk: int) -> np.ndarray | None
 
 @cache
 def _bins(chunk: int) -> tuple[np.ndarray, np.ndarray]:
-    """What a spectrum is made of, and what it blurs.
+    """Weights that make a spectrum, and how they blur it.
 
     Returns:
         (F, chunk) weights whose sums over a stretch are its spectrum: taper, wave, mean left out;

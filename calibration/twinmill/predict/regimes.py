@@ -4,10 +4,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
-from twinmill.data.track import command_at
+from twinmill.data.track import Track, command_at
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import body_velocity
 from twinmill.predict.windows import HORIZONS_S, Windows
@@ -30,7 +31,7 @@ class Regime:
     ratio: float
     windows: int
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return vars(self)
 
@@ -86,7 +87,7 @@ def regime_masks(modelled: ModelledLog, windows: Windows) -> Iterator[tuple[str,
         yield "place", name, mask
 
 
-def _by_change(track, t_s: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+def _by_change(track: Track, t_s: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
     """By what the commands did from shortly before the window until its end."""
     grid = np.arange(-SETTLED_S, HORIZONS_S[HORIZON], 0.02)
     command = command_at((t_s[:, None] + grid).ravel(), track.command_t_s, track.command)

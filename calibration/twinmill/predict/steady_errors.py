@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -52,7 +53,7 @@ class SteadyComparison:
 
     @property
     def model(self) -> native.Model:
-        """Of this robot, its own numbers included."""
+        """Model of this robot, its own parameters included."""
         return self.modelled.model
 
     @property
@@ -70,7 +71,7 @@ class SteadyComparison:
         """How many values were predicted."""
         return int(np.isfinite(self.errors).sum())
 
-    def error_rows(self) -> list[dict]:
+    def error_rows(self) -> list[dict[str, Any]]:
         """errors[] of the interface; a ratio is the RMS of each input's own."""
         rows = []
         for c, (channel, unit) in enumerate(self.modelled.channels):
@@ -88,7 +89,7 @@ class SteadyComparison:
                 )
         return rows
 
-    def cells(self) -> list[dict]:
+    def cells(self) -> list[dict[str, Any]]:
         """One entry per input, in the vendor's convention; a spread is relative, over robots.
 
         Of a bench test by duties, with the speed of each wheel.
@@ -118,7 +119,7 @@ class SteadyComparison:
             entries.append(entry)
         return entries
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """One entry of robots[]."""
         sheet = self.measurement
         return {

@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -33,7 +34,7 @@ class SteadyStates:
     measurement: SteadyTable
     model: native.Model
     commands: np.ndarray
-    own: tuple = ()
+    own: tuple[Any, ...] = ()
     noise: None = None
     clock_free: bool = False
     stages = MOTION_STAGES
@@ -86,11 +87,11 @@ class SteadyStates:
         return np.isfinite(self._measured()).sum(axis=0).astype(float)
 
     def with_model(self, model: native.Model) -> "SteadyStates":
-        """The same table with another model."""
+        """A copy with another model."""
         return replace(self, model=model.for_robot(self.measurement.robot_id))
 
     def fitted(self, model: native.Model) -> "SteadyStates":
-        """The same with a model of its own robot that was fitted to it."""
+        """A copy with a model of its own robot that was fitted to it."""
         return replace(self, model=model)
 
     def predicted(self) -> np.ndarray:

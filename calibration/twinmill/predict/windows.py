@@ -105,7 +105,7 @@ def score(errors: np.ndarray, floor: np.ndarray) -> float:
 
 
 def score_of(parts: list[np.ndarray], floors: list[np.ndarray]) -> float:
-    """The same for several logs: (H, 3) RMS errors and floors of each."""
+    """Score of several logs, of (H, 3) RMS errors and noise floors of each."""
     return float(
         np.sqrt(np.mean([np.nanmean((e / f) ** 2) for e, f in zip(parts, floors, strict=True)]))
     )

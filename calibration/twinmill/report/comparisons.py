@@ -15,7 +15,7 @@ WRONG = {
     "steady": "steady speeds are wrong",
     "starting": "starts are wrong",
     "stopping": "stops are wrong",
-    "changing": "changes of command are followed wrongly",
+    "changing": "the response to changes of the command is wrong",
 }
 
 
@@ -32,7 +32,7 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
 
 
 def _of_shown(comparison: Comparison) -> list[Table]:
-    """Errors and where they come, of the robot that is shown; of several it is named."""
+    """Errors and regimes of the robot that is shown; of several it is named."""
     robot = comparison.shown
     made = [tables.errors(robot), tables.where(robot)]
     if len(comparison.robots) == 1:
@@ -41,7 +41,7 @@ def _of_shown(comparison: Comparison) -> list[Table]:
 
 
 def robot_tables(comparison: Comparison) -> list[Table]:
-    """Errors and where they come: of the robot that is shown, then of all tables."""
+    """Errors and regimes: of the robot that is shown, then of all tables."""
     made = []
     if not isinstance(comparison.shown, SteadyComparison):
         made += _of_shown(comparison)
@@ -88,7 +88,7 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
         whose, who = f" of {robot.measurement.label}", "it"
     return (
         f"{100 * worst.share:.0f} % of the error{whose} comes while {who} is {worst.regime} "
-        f"({number(worst.ratio)} times the floor): {WRONG[worst.regime]}; {try_next}."
+        f"({number(worst.ratio)} times the noise floor): {WRONG[worst.regime]}; {try_next}."
     )
 
 
@@ -98,5 +98,5 @@ def _steady_advice(robot: SteadyComparison) -> str:
     where = f"at {worst.regime}" if first == ON_BENCH else worst.regime
     return (
         f"{100 * worst.share:.0f} % of the error comes {where} ({number(worst.ratio)} times "
-        "the floor); `twinmill diagnose` names what is missing."
+        "the noise floor); `twinmill diagnose` names what is missing."
     )

@@ -23,10 +23,10 @@ def steps(found: Sequence[tuple[str | None, float]]) -> Table:
         for effect, score in found
     ]
     return Table(
-        "The detections, step by step",
+        "Detections: score after each step",
         ["step", "held-out\nscore"],
         rows,
-        "On frames that were not fitted to: 1.0 is right.",
+        "On held-out frames: 1.0 is as good as a right model.",
         words=(0,),
     )
 
@@ -58,8 +58,8 @@ def _by_robot(detections: DetectionComparison) -> Table:
         f"The camera's bit ({'raw' if detections.raw else 'after the vote'})",
         ["robot", *COLUMNS, "score"],
         rows,
-        "Frames by what the model's geometry says and what the robot reported; score: how far off "
-        "the model's chances are over how far such chances must be, 1.0 is right." + vote,
+        "Frames by what the model's geometry predicts and what the robot reported; score: error of "
+        "the predicted probabilities over its expectation for a right model, 1.0 is right." + vote,
     )
 
 

@@ -26,14 +26,14 @@ from twinmill.report.sections import robot_pictures
 from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
 
 TOO_FEW = (
-    f"Of fewer than {SETTINGS.fewest_robots} robots none can be called the odd one, and what one "
-    "has is looked for in all: where their scores differ (twinmill compare), give each a log of "
-    "its own."
+    f"Among fewer than {SETTINGS.fewest_robots} robots none can be called the outlier, and an "
+    "effect of one is searched in all: where their scores differ (twinmill compare), give each a "
+    "log of its own."
 )
 
 NOTHING_GAINED = (
-    "Nothing could be gained: no numbers predict other data surely better than those of the model "
-    "as given, and the new file has these."
+    "No refit improves the held-out error significantly: the new file has the parameters of the "
+    "model as given."
 )
 
 Steps = Sequence[tuple[str | None, float]]  # what came into the model, and the score then
@@ -50,7 +50,7 @@ TONES: dict[str, Tone] = {
 
 
 def findings(diagnosis: Diagnosis) -> Table:
-    """What was found, most important first, and what is left."""
+    """Findings, most important first, and the unexplained error."""
     rows = []
     for f in diagnosis.findings:
         names = f" or {' or '.join(f.group[1:])}" if f.group else ""
@@ -69,7 +69,7 @@ def findings(diagnosis: Diagnosis) -> Table:
         on = f"depends {most}on {other.join(rest.depends_on)}" if rest.depends_on else ""
         rows.append(
             [
-                Cell("left over", "dim"),
+                Cell("unexplained", "dim"),
                 Cell(f"{100 * rest.share:.0f} %", "dim", rest.share),
                 Cell(
                     diagnosis.rest_certainty if diagnosis.is_left else "no more than noise", "dim"
@@ -79,11 +79,11 @@ def findings(diagnosis: Diagnosis) -> Table:
         )
     return Table(
         "What was found",
-        ["effect", "takes away", "certainty", "estimates"],
+        ["effect", "share of error", "certainty", "estimates"],
         rows,
-        "Takes away: share of the squared error above the log's noise, on parts of the "
-        "data that were not fitted to; with what is left over they make all of it. Estimates: ± is "
-        "one standard error; a 95 % interval is about twice that to each side.",
+        "Share: of the squared error above the noise floor, on held-out data, that the effect "
+        "removes once those above it are in the model; with the unexplained part they add up to "
+        "100 %. Estimates: ± one standard error; a 95 % interval is about twice that to each side.",
         words=(0, 2, 3),
         lists=(3,),
     )
@@ -98,33 +98,32 @@ def ranking(diagnosis: Diagnosis) -> Table:
             [
                 Cell(_named(r.effect), "good" if found else "dim"),
                 Cell(number(r.score_heldout), tone(r.score_heldout)),
-                Cell(f"{100 * r.share_explained:.0f} %"),
                 Cell(f"{r.p_value:.3f}"),
                 Cell("" if r.group is None else str(r.group)),
                 Cell(estimates((found or r).parameters)),
             ]
         )
     return Table(
-        "What could be missing",
-        ["effect", "held-out\nscore", "explains", "p", "group", "estimates"],
+        "Effects that were tried",
+        ["effect", "held-out\nscore", "p", "group", "estimates"],
         rows,
-        "Found effects are coloured. The score is of drives that were not fitted to; explains: "
-        "share of what anything could explain; p: chance of such a fit if nothing were missing, "
-        "for all effects together; effects of one group look alike in this log. Estimates of "
-        "effects that were not found are those of the step that tried them.",
-        words=(0, 5),
-        lists=(5,),
+        "Found effects are coloured. The search adds one effect per step. Score and the estimates "
+        "of effects that were not found are of the step that tried them, with all that was found "
+        "before; p: probability of such a gain if nothing were missing, corrected for the number "
+        "of effects; effects with the same group number cannot be distinguished in this log.",
+        words=(0, 4),
+        lists=(4,),
     )
 
 
 def unseen(diagnosis: Diagnosis) -> Table:
-    """Effects that could be there and not be seen."""
+    """Effects that are not identifiable in these logs."""
     rows = [[Cell(effect), Cell(why)] for effect, why in diagnosis.not_identifiable]
     return Table("What this log cannot show", ["effect", "why"], rows, words=(0, 1))
 
 
 def each_robot(diagnosis: Diagnosis) -> Table:
-    """What is said of each robot, and what its logs would have shown of it."""
+    """Each robot's deviation, and the smallest that its logs would have shown."""
     off = {o.robot_id: _said_of(o.sentence) for o in diagnosis.robots_off}
     count = len(diagnosis.robots)
     too_few = 1 < count < SETTINGS.fewest_robots and not off
@@ -143,17 +142,17 @@ def each_robot(diagnosis: Diagnosis) -> Table:
     ]
     return Table(
         "Each robot",
-        ["robot", "it is", "would show\nin speed", "in turning"],
+        ["robot", "it is", "detectable\nin speed", "in turning"],
         rows,
-        "Would show: by how much all of its speed, or of its turning, would have had to differ "
-        "from the model to be beyond doubt; less is not excluded, nor what acts at some commands."
+        "Detectable: smallest deviation of all its speeds, or turn rates, from the model that "
+        "would have been significant. Smaller ones are possible, and those at some commands only."
         + (f" {TOO_FEW}" if too_few else ""),
         words=(1,),
     )
 
 
 def _would_show(diagnosis: Diagnosis) -> list[str]:
-    """How small a difference these logs would have shown, over all robots; nothing if none."""
+    """Smallest significant deviation in these logs, over all robots; nothing if unknown."""
     told = []
     of_which = {
         "speed": "speed",
@@ -202,17 +201,17 @@ def robots_off(diagnosis: Diagnosis) -> Table:
     ]
     return Table(
         "Robots that differ from the others",
-        ["robot", "in", "score\nas all", "score\nown", "p", "estimates"],
+        ["robot", "effect", "score,\nshared", "score,\nown", "p", "estimates"],
         rows,
-        "Scores are of drives that were not fitted to: with the model of all, and with the robot's "
-        "own. What the others lack was looked for without these robots.",
+        "Held-out scores with the model shared by all robots, and with the robot's own parameters. "
+        "The search for effects that all have left these robots out.",
         words=(1, 5),
         lists=(5,),
     )
 
 
 def moments(diagnosis: Diagnosis) -> Table:
-    """Events that neither commands nor findings explain."""
+    """Transient events that neither commands nor findings explain."""
     rows = [
         [
             Cell(f"{m.log} R{m.robot_id:02d}"),
@@ -223,18 +222,18 @@ def moments(diagnosis: Diagnosis) -> Table:
         for m in diagnosis.rest.moments
     ]
     return Table(
-        "Single moments",
-        ["log", "begins\ns", "of the\nway", "it"],
+        "Transient events",
+        ["log", "begins\ns", "distance\ndriven", "the robot"],
         rows,
-        "From these on a robot did not do what was predicted; of the way: how much of the "
-        "predicted way it went in the half second that was farthest off: 1 is all of it, less "
-        "than 0 backwards.",
+        "Times at which a robot deviated from its prediction. Distance driven: over the predicted "
+        "distance, in the half second with the largest deviation: 1 is all of it, less than 0 is "
+        "backwards.",
         words=(0, 3),
     )
 
 
 def lines(diagnosis: Diagnosis) -> list[str]:
-    """What the tables do not say."""
+    """Sentences on what the tables do not contain."""
     told = [*diagnosis.notes, *formula.sentences(diagnosis.rest)]
     if diagnosis.late and (late := _late(diagnosis)):
         told.append(late)
@@ -242,27 +241,29 @@ def lines(diagnosis: Diagnosis) -> list[str]:
 
 
 def next_run(diagnosis: Diagnosis) -> str:
-    """What another run would settle, in one sentence; empty if the logs leave nothing open."""
+    """Purpose of another run, in one sentence; empty if the logs leave nothing open."""
     return f"{diagnosis.next_experiment['why']}." if diagnosis.next_experiment else ""
 
 
 def _late(diagnosis: Diagnosis) -> str:
-    """How late the robot is, where that was a finding."""
+    """The robot's response time, where that was a finding."""
     late = diagnosis.late
     if late is None or late.sum_std_s is None:
         return ""
-    whose = " on the average, each with its own" if late.spread_s else " in all"
+    whose = " on average, each with its own" if late.spread_s else " in total"
     total = f"{rounded(late.sum_s, late.sum_std_s)} ± {late.sum_std_s:.1g} s{whose}"
     if late.parted:
-        return f"Late by {total}: {late.lag_s:.2f} s lag, {late.delay_s:.2f} s delay."
+        return f"Response time {total}: {late.lag_s:.2f} s lag, {late.delay_s:.2f} s delay."
     if late.lag_s is not None:
         rest_s = round(late.sum_s - late.lag_s, 2) + 0.0  # no minus before nothing
-        return f"Late by {total}: {late.lag_s:.2f} s lag; {rest_s:.2f} s delay or clocks."
-    return f"Late by {total}: these logs cannot part lag and delay."
+        return (
+            f"Response time {total}: {late.lag_s:.2f} s lag; {rest_s:.2f} s delay or clock offset."
+        )
+    return f"Response time {total}: these logs cannot separate lag and delay."
 
 
 def terminal(diagnosis: Diagnosis, commands: show.Commands = ()) -> RenderableType:
-    """What a person reads of a diagnosis, and what to type then."""
+    """Text of a diagnosis, with the commands that follow."""
     return Group(*_said(diagnosis), *_next(diagnosis, commands))
 
 
@@ -306,16 +307,16 @@ def _next(diagnosis: Diagnosis, commands: show.Commands) -> list[Text]:
 def terminal_explanation(
     result: Explanation, commands: show.Commands = (), not_written: str = ""
 ) -> RenderableType:
-    """What a person reads of the whole loop, and what to type then.
+    """Text of the whole loop, with the commands that follow.
 
     Args:
         result: the model and its diagnosis.
-        commands: what to type then, each with why.
-        not_written: said in the place of where the model was written.
+        commands: to type next, each with its purpose.
+        not_written: said in place of where the model was written.
     """
     return Group(
         *([Text(result.now, show.STYLES["good"]), Text("Without it:")] if result.now else []),
-        *_said(result.diagnosis),
+        *_said(_as_fitted(result)),
         Text(),
         show.table(tables.steps(_labelled(result.steps, bool(result.diagnosis.apart)))),
         *([show.table(tables.parameters(result.parameters))] if result.parameters else []),
@@ -325,6 +326,16 @@ def terminal_explanation(
         Text(not_written or f"Written: {result.path}"),
         *_next(result.diagnosis, commands),
     )
+
+
+def _as_fitted(result: Explanation) -> Diagnosis:
+    """The diagnosis with the estimates of the last fit, so that each has one standard error."""
+    last = {e.name: e for e in result.parameters}
+    findings = [
+        replace(f, parameters=[last.get(e.name, e) for e in f.parameters])
+        for f in result.diagnosis.findings
+    ]
+    return replace(result.diagnosis, findings=findings)
 
 
 def section(
@@ -372,7 +383,7 @@ def explanation_section(
     result: Explanation, commands: show.Commands = (), not_written: str = ""
 ) -> Section:
     """The page of the whole loop: that of its diagnosis, and what was fitted and written then."""
-    page = section(result.diagnosis, commands, result.steps)
+    page = section(_as_fitted(result), commands, result.steps)
     return replace(
         page,
         verdict="\n".join([*([f"{result.now} Without it:"] if result.now else []), page.verdict]),
@@ -388,15 +399,15 @@ def explanation_section(
 
 
 def deciding(diagnosis: Diagnosis) -> Table:
-    """The numbers that decided, with what each means: of search, noise floor and input checks."""
+    """Thresholds of search, noise floor and input checks, each with its meaning."""
     numbers = [
         *diagnosis.search.settings.listed(),
         *FLOOR_SETTINGS.listed(),
         *CHECKS.listed(),
     ]
     rows = [[Cell(name), Cell(f"{value:g}"), Cell(what)] for name, value, what in numbers]
-    note = "Scores are over the noise floor: 1.0 is right. Costs are -2 log likelihoods."
-    return Table("Numbers that decided", ["name", "value", "what"], rows, note, words=(0, 2))
+    note = "Scores are relative to the noise floor: 1.0 is right. Costs are -2 log-likelihoods."
+    return Table("Thresholds", ["name", "value", "meaning"], rows, note, words=(0, 2))
 
 
 def found_models(diagnosis: Diagnosis) -> list[tuple[str, native.Model] | None]:
@@ -460,7 +471,7 @@ def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
 
 
 def _gains(steps: Steps, own: bool) -> list[Figure]:
-    """What each step took away; nothing where none did."""
+    """The score after each step, as a figure; nothing where there is none."""
     labelled = _labelled(steps, own)
     return [waterfall(labelled)] if len(labelled) > 1 else []
 
@@ -472,7 +483,7 @@ def _labelled(steps: Steps, own: bool) -> list[tuple[str, float]]:
 
 
 def _named(effect: str) -> str:
-    """As the sentence of the verdict names it."""
+    """Name of an effect as in the sentence of the verdict."""
     return REFIT_IN_WORDS if effect == REFIT else effect
 
 

@@ -44,14 +44,14 @@ def error_growth(models: Sequence[tuple[str, RobotComparison]]) -> Figure:
             plain_ticks(axes.xaxis)
             plain_ticks(axes.yaxis)
         legend_above(panels[0], 3)
-        panels[-1].set_xlabel("predicted this many seconds ahead")
+        panels[-1].set_xlabel("horizon (s)")
 
     return Figure(
         draw(2.0 * len(shown_channels), paint, nrows=len(shown_channels), sharex=True),
-        "How errors grow with time",
-        "The further ahead, the larger the error. Inside the green band an error cannot be told "
-        "from noise: a line that runs along its edge is as good as this log can show. Each "
-        "gridline up is a factor.",
+        "Errors over the horizon",
+        "Errors grow with the horizon. Inside the green band an error cannot be distinguished "
+        "from noise: a line along its edge is as good as this log can show. The scale is "
+        "logarithmic.",
     )
 
 

@@ -17,8 +17,8 @@ from twinmill.report.html import Figure
 
 PARTS = {
     "motion": "share of all speeds",
-    "travel": "share of the way",
-    "aside": "share of the way led aside",
+    "travel": "share of the distance",
+    "aside": "share of the distance that is deflected sideways",
     "theta_rad": "heading, rad",
 }
 SIDES = 1.96  # standard errors: 95 %
@@ -32,18 +32,18 @@ def sentences(rest: Rest) -> list[str]:
     if not rest.on or rest.share < SETTINGS.nothing_left:
         return []
     return [
-        f"Something is left; it depends {rest.on}. No formula for it held on drives that it was "
-        "not fitted to: more of this drive would tell."
+        f"An error is unexplained; it depends {rest.on}. No formula for it held on held-out "
+        "data: a longer log of such drives would settle it."
     ]
 
 
 def _said(found: Formula) -> str:
-    what = f"In place of {' and '.join(found.instead_of)}" if found.instead_of else "What is left"
+    what = f"In place of {' and '.join(found.instead_of)}" if found.instead_of else "Unexplained"
     like = f" In words: {found.like}." if found.like else ""
     return (
-        f"{what}: {found.forms[0].adds_to} += {found.text}. On stretches that neither chose nor "
-        f"fitted it, it takes {100 * found.takes:.0f} % of the squared error (p "
-        f"{found.chance:.2g}, the best of {found.tried} forms).{like}"
+        f"{what}: {found.forms[0].adds_to} += {found.text}. On data used neither to choose nor to "
+        f"fit it, it removes {100 * found.takes:.0f} % of the squared error (p "
+        f"{found.chance:.2g}; {found.tried} forms were candidates).{like}"
     )
 
 
@@ -54,14 +54,14 @@ def taken(beyond: Taken | None) -> list[str]:
     scores = f"{beyond.before:.2f} without it, {beyond.after:.2f} with it"
     if not beyond.kept:
         return [
-            f"The formula that was proven is not in the model: {beyond.why_not} (held-out score "
+            f"The validated formula is not in the model: {beyond.why_not} (held-out score "
             f"{scores})."
         ]
     instead = beyond.formula.instead_of
     place = f" in place of {' and '.join(instead)}" if instead else ""
     return [
-        f"The model has a formula{place}, fitted together with the rest: {beyond.added.equals}. It "
-        f"takes {100 * beyond.share:.0f} % of the squared error above the floor that was left "
+        f"A formula was added{place}, fitted together with all else: {beyond.added.equals}. It "
+        f"removes {100 * beyond.share:.0f} % of the unexplained squared error "
         f"(held-out score {scores}). {_numbers(beyond.added)}"
         f" {option('formula', False)} leaves it out.",
         *([beyond.note] if beyond.note else []),
@@ -69,7 +69,8 @@ def taken(beyond: Taken | None) -> list[str]:
 
 
 def _bounds(found: Formula) -> str:
-    return f"{_numbers(found)} {100 * found.again:.0f} % of resamplings choose the same dependence."
+    again = f"{100 * found.again:.0f} % of bootstrap samples choose the same dependence."
+    return f"{_numbers(found)} {again}"
 
 
 def _numbers(found: Formula) -> str:
@@ -80,7 +81,7 @@ def _numbers(found: Formula) -> str:
         for n in found.numbers
     ]
     seen = [_range(name, low, high) for name, (low, high) in found.holds.items()]
-    where = f" Seen at {', '.join(seen)}; beyond that it is a guess." if seen else ""
+    where = f" Seen at {', '.join(seen)}; beyond that it extrapolates." if seen else ""
     return f"Its numbers with 95 % intervals: {', '.join(numbers)}.{where}"
 
 
@@ -112,7 +113,7 @@ def figures(rest: Rest) -> Sequence[Figure]:
             ms=4,
             lw=1,
             color=MEASURED,
-            label="what is left",
+            label="residual",
         )
         order = np.argsort(curve.at)
         axes.plot(curve.at[order], curve.drawn[order], color=PREDICTED, label="formula")
@@ -127,7 +128,7 @@ def figures(rest: Rest) -> Sequence[Figure]:
         legend_above(axes, 2)
 
     caption = (
-        "What the model with the findings leaves, in bins of the variable, with 95 % intervals, "
-        "and what the formula adds there. A base refit may shift all points alike."
+        "Residuals of the model with the findings, in bins of the variable, with 95 % intervals, "
+        "and the formula. A refit of the base may shift all points alike."
     )
-    return [Figure(draw(2.4, paint), "The formula for what is left", caption)]
+    return [Figure(draw(2.4, paint), "The formula for the residuals", caption)]

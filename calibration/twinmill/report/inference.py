@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Probabilities of what a model lacks, as sentences and tables."""
+"""Posterior probabilities of effects, as sentences and tables."""
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -12,8 +12,8 @@ from twinmill.report import show
 from twinmill.report.tables import Cell, Table, number
 
 ONE_BY_ONE = (
-    "Robots of one model differ, and nothing tells infer by how much: a small effect of one robot "
-    "alone may be its own gains. For all that is known of one, give its logs alone."
+    "Robots of one model differ by an amount that infer does not know: a small effect of one robot "
+    "alone may be its own gains. For all results of one robot, give its logs alone."
 )
 SHOWN = 0.01  # probability of an effect that is listed; --json has all
 
@@ -52,7 +52,7 @@ def _robots(results: list[Inference]) -> Table:
     rows = []
     for result in results:
         numbers = "; ".join(
-            f"{f.effect}.{name} {number(value)} +- {number(std, 2)}"
+            f"{f.effect}.{name} {number(value)} ± {number(std, 2)}"
             for f in result.answer.findings
             for name, (value, std) in f.numbers.items()
         )
@@ -62,7 +62,7 @@ def _robots(results: list[Inference]) -> Table:
 
 
 def terminal(result: Inference) -> RenderableType:
-    """Text on one robot: verdict, effects, dependences, and what is no news."""
+    """Text on one robot: verdict, effects, dependences, and errors that are not new."""
     answer = result.answer
     parts: list[RenderableType] = [Text(sentence(answer)), Text()]
     if answer.findings:
@@ -74,14 +74,14 @@ def terminal(result: Inference) -> RenderableType:
     if result.always is None:
         parts.append(
             Text(
-                "What the model misses in the log that it was fitted to is not known, so it may be "
-                f"told as news: give that log with {option('own')}, and keep what it tells with "
+                "The model's error on the log that it was fitted to is not known, so it may be "
+                f"reported as new: give that log with {option('own')}, and store its result with "
                 f"{option('keep')}."
             )
         )
     elif result.always.kernels or result.always.effects:
         known = ", ".join([*result.always.effects, *(name for name, _ in result.always.kernels)])
-        parts.append(Text(f"No news, since the model misses it in its own log too: {known}."))
+        parts.append(Text(f"Not reported, since its own log shows it, too: {known}."))
     return Group(*parts)
 
 
@@ -120,7 +120,7 @@ def _effects(findings: list[Named]) -> Table:
                     Cell("" if k else percent(f.probability), bar=None if k else f.probability),
                     Cell(name),
                     Cell(number(value)),
-                    Cell(f"+- {number(std, 2)}"),
+                    Cell(f"± {number(std, 2)}"),
                     Cell("" if k else str(catalogue()[f.effect]["summary"])),
                 ]
             )
@@ -141,5 +141,5 @@ def _others(answer: Answer) -> Table | None:
 
 def _dependences(answer: Answer) -> Table:
     rows = [[Cell(word), Cell(percent(p), bar=p)] for word, p in answer.depends_on.items()]
-    note = f"The likeliest takes {percent(answer.share)} of the squared error above the noise."
-    return Table("What is left depends on", ["", "probability"], rows, note=note)
+    note = f"The first explains {percent(answer.share)} of the squared error above the noise."
+    return Table("The residual depends on", ["", "probability"], rows, note=note)

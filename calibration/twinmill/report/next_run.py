@@ -40,7 +40,7 @@ class How:
 
 
 def terminal(plan: Plan, how: How) -> RenderableType:
-    """What a person reads; command lines stay whole, to be copied."""
+    """Text of a planned run; command lines stay whole, to be copied."""
     steps = [part for where, command in how.commands for part in (Text(where), whole(command))]
     return Group(
         Text(plan.why),
@@ -59,7 +59,7 @@ def section(plan: Plan, how: How) -> Section:
     power = plan.predicted_power
     return Section(
         "The next run",
-        [("chance of the right name", percent(power), _tone(power))],
+        [("probability of the right name", percent(power), _tone(power))],
         f"{plan.why} {_outlook(plan)}",
         [("run", _length(plan))],
         [figures.commands(plan), figures.floor(plan), figures.margins(plan)],
@@ -81,23 +81,24 @@ def _length(plan: Plan) -> str:
 def _outlook(plan: Plan) -> str:
     told, asked = len(plan.separates), len(plan.chances)
     return (
-        f"The run tells {told} of these {asked}: if one of them is missing, the right name comes "
-        f"with a chance of {percent(plan.predicted_power)}."
+        f"The run identifies {told} of these {asked}: if one of them is missing, diagnose will "
+        f"name it with a probability of {percent(plan.predicted_power)} (mean over all {asked})."
     )
 
 
 def _hidden(plan: Plan) -> list[str]:
-    """What even this run does not tell, and what would."""
+    """Effects that even this run does not identify, and how to measure them."""
     entries = catalogue()
     return [
-        f"{c.effect} stays open ({_rival(c)}); measured by hand: {entries[c.effect]['measure']}"
+        f"{c.effect} is not identified ({_rival(c)}); to measure it by hand: "
+        f"{entries[c.effect]['measure']}"
         for c in plan.chances
         if c.effect not in plan.separates
     ]
 
 
 def _rival(chance: Chance) -> str:
-    return f"like {chance.rival}" if chance.rival else "too weak here"
+    return f"resembles {chance.rival}" if chance.rival else "too weak here"
 
 
 def _moves(plan: Plan) -> Table:
@@ -123,20 +124,21 @@ def _chances(plan: Plan) -> Table:
         for c in plan.chances
     ]
     return Table(
-        "What it tells apart",
+        "What the run identifies",
         [
             "effect",
-            "best\nimitation",
-            "margin\nso far",
+            "closest\nrival",
+            "chi2\nso far",
             "with\nthis run",
-            "named\nso far",
-            "then",
+            "power\nso far",
+            "with\nthis run",
         ],
         rows,
-        "Margin: chi2 of the effect's trace that no rival and no change of the base could leave, "
-        "at its fitted strength or else its usual one. Named: chance that it is, if it is the one: "
-        "it must stand out, be told from its rivals and lower the score by 2 %. Where no log tells "
-        "its strength, that is the mean over weak, usual and strong (0.4, 1, 2.5 times).",
+        "Chi2: of the part of the effect's signature that neither the closest rival nor a refit of "
+        "the base can reproduce, at the effect's fitted size or else a usual one. Power: "
+        "probability that diagnose names the effect if it is the missing one, which takes "
+        "significance, a lead over its rivals and a score lower by 2 %. Where no log determines "
+        "its size, power is the mean over 0.4, 1 and 2.5 times the usual size.",
         words=(0, 1),
     )
 
@@ -146,13 +148,13 @@ def _tone(power: float) -> Tone:
 
 
 def narrowing_terminal(found: Narrowing, how: How) -> RenderableType:
-    """What a person reads of a run that narrows what a swarm is predicted to do."""
+    """Text of a run that narrows the prediction of a swarm."""
     steps = [part for where, command in how.commands for part in (Text(where), whole(command))]
     return Group(*map(Text, [*_narrowed(found), how.first]), *steps)
 
 
 def _narrowed(found: Narrowing) -> list[str]:
-    """What is open, why, and what the run does about it."""
+    """Uncertainty of the prediction, its sources, and the effect of the run on it."""
     before, after = found.stds
     share, shares = found.spread.shares.mean(), found.spread.shares
     takes = list(found.spread.known_takes().items())[:MOST_NAMED]
@@ -160,21 +162,21 @@ def _narrowed(found: Narrowing) -> list[str]:
     moves = [(name, len(list(group))) for name, group in groupby(m.name for m in found.moves)]
     drive = ", ".join(f"{count} x {name}" if count > 1 else name for name, count in moves)
     said = [
-        f"{share:.0%} of runs end as {found.goal}, ± {100 * before:.1f} points by what the fits "
-        f"leave open ({len(shares)} models drawn: {shares.min():.0%} to {shares.max():.0%}).",
-        f"Known exactly, one of these would take so much of that variance: {named}.",
+        f"{share:.0%} of runs end as {found.goal}, ± {100 * before:.1f} points by the uncertainty "
+        f"of the fits ({len(shares)} models drawn: {shares.min():.0%} to {shares.max():.0%}).",
+        f"Share of that variance that each would remove if it were known exactly: {named}.",
         f"After a fit to this run of {found.rows.end_s:.0f} s it would be ± {100 * after:.1f} "
         f"points: {drive}.",
     ]
     if found.spread.foretold <= 0:
         said.append(
-            f"Which number moves it is not known: what {len(shares)} models tell of another is no "
-            "better than their mean, so these points and this drive may be chance. More "
-            f"{option('draws')} "
-            f"and {option('seeds')} tell, or nothing here matters (twinmill swarm matters)."
+            f"No parameter was shown to matter: a regression on {len(shares)} models predicts "
+            "another no better than their mean, so these points and this drive may be chance. Use "
+            f"more {option('draws')} "
+            f"and {option('seeds')}, or nothing here matters (twinmill swarm matters)."
         )
     if found.untold > SMALL_SHARE:
         said.append(
-            f"{found.untold:.0%} of it no drive of one robot shows: measure that by itself."
+            f"{found.untold:.0%} of it cannot be measured by driving one robot: measure it apart."
         )
     return said

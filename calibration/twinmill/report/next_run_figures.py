@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a planned run: its duties, its way over the floor, what it tells."""
+"""Figures of a planned run: its commands, its path, and the power for each effect."""
 
 import numpy as np
 from matplotlib.patches import Rectangle
@@ -16,7 +16,7 @@ LEAST_CHI2 = 0.1  # a margin that is less is drawn as this
 
 
 def commands(plan: Plan) -> Figure:
-    """What each wheel is told over time, or the body."""
+    """Commands over time, of each wheel or of the body."""
     t_s = np.append(plan.rows.t_s, plan.rows.end_s)
     told = np.vstack([plan.rows.command, plan.rows.command[-1:]])
     duties = plan.rows.kind == "duty"
@@ -37,7 +37,7 @@ def commands(plan: Plan) -> Figure:
         "The script",
         "Duty of each wheel in percent, over time. Positive drives the robot forward."
         if duties
-        else "Velocities that the robot is told, over time.",
+        else "Commanded velocities over time.",
     )
 
 
@@ -52,7 +52,7 @@ def floor(plan: Plan) -> Figure:
         for k, path in enumerate(plan.paths[1:]):
             label = "with one of the effects" if k == 0 else None
             axes.plot(*path[::thin, :2].T, color=PREDICTED, lw=0.7, alpha=0.6, label=label)
-        axes.plot(*plan.paths[0, ::thin, :2].T, color=BEFORE, label="as the model is")
+        axes.plot(*plan.paths[0, ::thin, :2].T, color=BEFORE, label="model as given")
         axes.plot(0, 0, "o", color=MEASURED, ms=5, label="start")
         axes.annotate("", (0.15, 0), (0, 0), arrowprops={"arrowstyle": "->", "color": MEASURED})
         axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
@@ -61,14 +61,14 @@ def floor(plan: Plan) -> Figure:
 
     return Figure(
         draw(min(6.5, 0.9 + 4.6 * across_m / along_m), paint),
-        "Where it goes",
-        "Seen from above: path of the robot's centre in the floor's frame (black). Put the robot "
-        "in the middle, its camera along the arrow.",
+        "Predicted path",
+        "Seen from above: path of the robot's centre, in the frame of its start. Put the robot "
+        "in the middle of the arena, its camera along the arrow.",
     )
 
 
 def margins(plan: Plan) -> Figure:
-    """What no rival can imitate of each effect, before and after the run."""
+    """Part of each effect's signature that is its own, before and after the run."""
     names = [c.effect for c in plan.chances]
     before = np.maximum([c.margin_before for c in plan.chances], LEAST_CHI2)
     after = np.maximum([c.margin for c in plan.chances], LEAST_CHI2)
@@ -92,7 +92,7 @@ def margins(plan: Plan) -> Figure:
             xscale="log",
             xlim=(low, 6 * max(after.max(), ENOUGH_CHI2)),
             ylim=(len(names) - 0.4, -0.6),
-            xlabel="margin (chi2 that no rival can imitate)",
+            xlabel="chi2 that no rival can reproduce",
         )
         axes.set_yticks(at, names)
         axes.grid(False, axis="y")
@@ -100,8 +100,8 @@ def margins(plan: Plan) -> Figure:
 
     return Figure(
         draw(1.1 + 0.42 * max(len(names), 2), paint),
-        "What it tells apart",
-        "How much of each effect's trace no other effect and no change of the base could leave, "
-        "from the logs so far and with this run. Right of the dashed line is enough to name it; "
-        "beside the bars the chance that it is named if it is the one.",
+        "What the run identifies",
+        "Part of each effect's signature that neither another effect nor a refit of the base can "
+        "reproduce, in the logs so far and with this run. Right of the dashed line is enough to "
+        "name the effect; the numbers are its power: the probability that it is named if missing.",
     )

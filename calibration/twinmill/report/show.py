@@ -76,7 +76,7 @@ def added(result: AddResult, not_written: str = "") -> RenderableType:
             "held out",
             result.heldout_refit.score,
             result.heldout_after.score,
-            "without and with the effect, all refitted",
+            "without and with the effect, all parameters refitted",
         ),
         *warned(result.notes),
         score_line("", result.after, number_too=False),
@@ -98,7 +98,7 @@ def _added_to_camera(result: AddResult, not_written: str) -> RenderableType:
             "held out",
             result.heldout_refit.score,
             result.heldout_after.score,
-            "without and with the effect, the camera's others refitted",
+            "without and with the effect, the camera's other parameters refitted",
         ),
         *warned(result.notes),
         Text(),
@@ -124,9 +124,9 @@ def effect(entry: dict) -> RenderableType:
 
 
 def robots(entry: dict) -> str:
-    """Of which robots an effect is."""
+    """Kinds of robots that an effect is defined for."""
     *others, last = entry["drives"]
-    return f"that are told {' or '.join([', '.join(others), last] if others else [last])}"
+    return f"commanded by {' or '.join([', '.join(others), last] if others else [last])}"
 
 
 def table(data: Table) -> RenderableType:
@@ -150,7 +150,7 @@ def table(data: Table) -> RenderableType:
 
 
 def score_line(label: str, result: Comparison, number_too: bool = True) -> Text:
-    """Score in colour, and what it means."""
+    """Score in colour, with its meaning."""
     line = Text(f"{label:<10}" if label else "")
     if number_too:
         line.append(number(result.score), STYLES[tone(result.score)]).append("  ")
@@ -190,7 +190,7 @@ def _change(label: str, before: float, after: float, note: str = "") -> Text:
 
 
 def warned(warnings: list[str]) -> list[RenderableType]:
-    """What was left out or cut, line by line, but for what would be too much."""
+    """Warnings, line by line; of many the first."""
     lines: list[RenderableType] = [Text(f"! {text}", "yellow") for text in warnings[:WARNINGS]]
     if len(warnings) > WARNINGS:
         lines.append(Text(f"! and {len(warnings) - WARNINGS} more (the JSON has all).", "yellow"))
@@ -198,7 +198,7 @@ def warned(warnings: list[str]) -> list[RenderableType]:
 
 
 def typed_next(commands: Commands) -> list[Text]:
-    """Lines to type next, each with what for."""
+    """Lines to type next, each with its purpose."""
     return [part for why, command in commands for part in (Text(f"{why}:"), whole(command))]
 
 

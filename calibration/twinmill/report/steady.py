@@ -44,7 +44,7 @@ def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, st
         ("model", model_name),
         ("scatter", "; ".join(_scatter(robots[0], c) for c in _measured(robots))),
         (
-            "floor",
+            "noise floor",
             "scatter of repeated runs"
             + (", with that of robots of one kind" if kind == "spread" else ""),
         ),
@@ -96,10 +96,10 @@ def errors(robots: list[SteadyComparison]) -> Table:
             ]
         )
     return Table(
-        "How far predictions miss",
-        ["channel", "unit", "values", "error", "floor", "ratio"],
+        "Prediction errors",
+        ["channel", "unit", "values", "error", "noise floor", "ratio"],
         rows,
-        "RMS of medians of runs less prediction; the ratio is that of each value's own."
+        "RMS of median over runs less prediction; ratio: RMS of the ratios of all values."
         + ("" if robots[0].measurement.of_wheels else STANDING),
         (0, 1),
     )
@@ -136,7 +136,7 @@ def cells(robots: list[SteadyComparison]) -> Table:
         ],
         rows,
         ("Duties of the wheels." if sheet.of_wheels else BY_VENDOR)
-        + " Robots: how much they differ. Worst first"
+        + " Robots: scatter between them. Worst first"
         + (f"; {rest} more in the JSON." if rest else "."),
         (len(sheet.input_names) + 3 * len(shown),),
     )

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from twinmill.data.measurement import Measurement
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
@@ -16,9 +17,7 @@ from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 
 Tone = Literal["", "good", "warn", "bad", "dim"]
 
-OF_RESPONSE = (
-    "what a smooth response to the commands misses on parts of the log that it was not fitted to"
-)
+OF_RESPONSE = "held-out error of a smooth response to the commands"
 SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
@@ -78,8 +77,6 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
     robot = comparison.shown
     measurement, noise = robot.measurement, robot.modelled.noise
     track = measurement.track
-    recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
-    date = f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
     others = len(comparison.robots) - 1
     why = "which the model misses most" if comparison.about is None else "which it was added to"
     return [
@@ -90,29 +87,40 @@ def facts(comparison: Comparison) -> list[tuple[str, str]]:
         ),
         (
             "recorded",
-            f"{date}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
+            f"{_date(measurement)}, {track.pose_t_s[-1] - track.pose_t_s[0]:.0f} s, "
             f"{len(track.pose)} poses used, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
-        ("noise", _noise(noise, track.has_heading)),
-        ("floor", robot.floor.reason or OF_RESPONSE),
-        ("clock", _clock(robot)),
+        ("noise", _noise(noise, track.has_heading, wrong=robot.score > GOOD)),
+        ("noise floor", robot.floor.reason or OF_RESPONSE),
+        ("clocks", _clocks(robot)),
         *_held_heading(robot),
         *_wheel_angles(robot),
         *_phases(robot),
     ]
 
 
-def _clock(robot: RobotComparison) -> str:
-    """Of the poses, against that of the commands."""
+def _date(measurement: Measurement) -> str:
+    """Date of a recording; the twin's own start is a fixed one, the same in every run."""
+    if measurement.simulated:
+        return "simulated"
+    recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
+    return f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
+
+
+def _clocks(robot: RobotComparison) -> str:
+    """Offset between the clocks of poses and commands, with its sign in words."""
     if robot.measurement.same_clock and not robot.time_offset_s:
-        return "one stamped poses and commands"
-    side = "ahead of" if robot.time_offset_s >= 0 else "behind"
-    return f"motion capture {number(1000 * abs(robot.time_offset_s))} ms {side} the robot"
+        return "one clock stamped poses and commands"
+    side = "later" if robot.time_offset_s >= 0 else "earlier"
+    return (
+        f"motion capture's stamps are {number(1000 * abs(robot.time_offset_s))} ms {side} "
+        "than the robot's of the same moment; a constant delay of the robot is included"
+    )
 
 
 def _held_heading(robot: RobotComparison) -> list[tuple[str, str]]:
-    """At which angle a robot seems to hold a heading that was not recorded."""
+    """Heading that the robot seems to hold, where none was recorded."""
     if robot.held_heading_rad is None:
         return []
     angle_deg = np.degrees(robot.held_heading_rad)
@@ -121,7 +129,7 @@ def _held_heading(robot: RobotComparison) -> list[tuple[str, str]]:
 
 
 def _wheel_angles(robot: RobotComparison) -> list[tuple[str, str]]:
-    """At which angle each wheel begins the log, where that matters to the model."""
+    """Angle of each wheel at the start of the log, where that matters to the model."""
     if robot.wheel_angles_rad is None:
         return []
     angles = ", ".join(f"{w} {round(np.degrees(a))}°" for w, a in robot.wheel_angles_rad.items())
@@ -130,40 +138,47 @@ def _wheel_angles(robot: RobotComparison) -> list[tuple[str, str]]:
 
 
 def _phases(robot: RobotComparison) -> list[tuple[str, str]]:
-    """At which moment of their periods the log begins, of formulas that recur in time."""
+    """Phase of each periodic formula at the start of the log."""
     if not robot.phases:
         return []
     told = [
         f"{p.name} {round(np.degrees(np.angle(np.exp(1j * p.value))))}° "
-        + (f"± {max(1, round(np.degrees(NORMAL_95 * p.std)))}°" if p.seen else "(hardly told)")
+        + (
+            f"± {max(1, round(np.degrees(NORMAL_95 * p.std)))}°"
+            if p.seen
+            else "(poorly determined)"
+        )
         for p in robot.phases
     ]
     return [("phases", f"the log begins at {', '.join(told)}, where the model fits best")]
 
 
-def _noise(noise: Noise, has_heading: bool) -> str:
-    """In words: what the sensor adds to a pose, and how the robot itself varies."""
-    channels = [(noise.position, 1000.0, " mm"), (noise.heading, float(np.degrees(1)), "°")]
-    off, varies = [], []
-    for (at, shown, unit), least in zip(channels[: 1 + has_heading], LEAST, strict=False):
+def _noise(noise: Noise, has_heading: bool, *, wrong: bool) -> str:
+    """Standard deviations of the poses and of the robot's speed, in words.
+
+    No larger than fits assume at least is none. While the model is wrong its error is in what seems
+    to be noise of the speed.
+    """
+    channels = [
+        ("speed", noise.position, 1000.0, " mm"),
+        ("turn rate", noise.heading, float(np.degrees(1)), "°"),
+    ]
+    poses, moves = [], []
+    for (name, at, shown, unit), least in zip(channels[: 1 + has_heading], LEAST, strict=False):
         if at.sensor > UNSEEN * least[0]:
-            off.append(f"{number(shown * at.sensor, 2)}{unit}")
-        how = "by nothing that shows"
+            poses.append(f"{number(shown * at.sensor, 2)}{unit}")
         if at.drive > UNSEEN * least[1]:
             memory = f"correlation time {number(at.memory_s, 2)} s"
-            how = f"by {number(shown * at.drive, 2)}{unit}/s ({memory})"
-        varies.append(how)
-    if not off and not any("(" in how for how in varies):
-        return "none found"
-    kind, by = "pose" if has_heading else "place", " and ".join(off) or "nothing that shows"
-    return (
-        f"each measured {kind} is off by {by}; "
-        f"the robot's speed varies {', its turning '.join(varies)}"
-    )
+            moves.append(f"{name} {number(shown * at.drive, 2)}{unit}/s ({memory})")
+    of = "poses" if has_heading else "positions"
+    told = [f"{of} {' and '.join(poses)}"] if poses else []
+    told += [", ".join(moves)] if moves else []
+    of_model = "; those of speed and turn rate include the model's error" if moves and wrong else ""
+    return f"{'; '.join(told)}{of_model}" if told else "none found"
 
 
 def robots(result: Comparison, before: Comparison | None = None) -> list[Table]:
-    """Score of each of several robots, worst first; before as well, if told; none of one robot."""
+    """Score of each of several robots, worst first; before a fit as well, if that is given."""
     if len(result.robots) == 1:
         return []
     old = [r.score for r in before.robots] if before else []
@@ -183,11 +198,11 @@ def robots(result: Comparison, before: Comparison | None = None) -> list[Table]:
 
 
 def errors(robot: RobotComparison) -> Table:
-    """Errors by horizon and channel, each beside its floor."""
+    """Errors by horizon and channel, each with its noise floor."""
     found, floor = rms(robot.errors), robot.floor.rms
-    columns = ["ahead\ns"]
+    columns = ["horizon\ns"]
     for channel, unit in CHANNELS:
-        columns += [f"{channel}\n{SHOWN[unit][1]}", "floor", "ratio"]
+        columns += [f"{channel}\n{SHOWN[unit][1]}", "noise\nfloor", "ratio"]
     rows = []
     for h, horizon_s in enumerate(HORIZONS_S):
         row = [Cell(f"{horizon_s:g}")]
@@ -200,10 +215,10 @@ def errors(robot: RobotComparison) -> Table:
             ]
         rows.append(row)
     return Table(
-        "How far predictions miss",
+        "Prediction errors",
         columns,
         rows,
-        "RMS error of predictions that start from measured poses; ratio is error over floor.",
+        "RMS error of predictions that start from measured poses; ratio: error over noise floor.",
     )
 
 
@@ -226,9 +241,9 @@ def where(robot: RobotComparison) -> Table:
             )
     return Table(
         "Where it fails",
-        ["by", "while", "error over floor", "share of error"],
+        ["by", "while", "error over noise floor", "share of error"],
         rows,
-        f"Predictions {HORIZONS_S[HORIZON]:g} s ahead; the {WORST} worst of each kind.",
+        f"Horizon of {HORIZONS_S[HORIZON]:g} s; the {WORST} worst of each kind.",
         (0, 1),
     )
 
@@ -278,10 +293,10 @@ def rounded(value: float, std: float) -> str:
 
 
 def held_out(added: AddResult) -> list[Table]:
-    """Errors on the half that was not fitted, before and after; none without a log."""
+    """Cross-validated errors, before and after; none without a log."""
     if not added.heldout_after.rows():
         return []
-    columns = ["ahead\ns"]
+    columns = ["horizon\ns"]
     for channel, unit in CHANNELS:
         columns += [f"{channel}\n{SHOWN[unit][1]}", "after"]
     rows = []
@@ -297,8 +312,10 @@ def held_out(added: AddResult) -> list[Table]:
                 ),
             ]
         rows.append(row)
-    note = "Each of six parts of the log is judged by a fit to the other five."
-    return [Table("Errors on data that was not fitted", columns, rows, note)]
+    note = (
+        "Six-fold cross-validation: each part of the log is predicted by a fit to the other five."
+    )
+    return [Table("Errors on held-out data", columns, rows, note)]
 
 
 def steps(scores: list[tuple[str, float]]) -> Table:
@@ -312,8 +329,8 @@ def steps(scores: list[tuple[str, float]]) -> Table:
         "Score after each step",
         ["step", "held-out\nscore"],
         rows,
-        "On parts of the data that were not fitted to, without robots that differ from the "
-        "others. 1.0 is as good as the log can tell; bars show factors.",
+        "On held-out data, without robots that differ from the others. 1.0 is as good as the log "
+        "can tell; bars have a logarithmic scale.",
     )
 
 

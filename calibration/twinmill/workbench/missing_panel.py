@@ -103,7 +103,7 @@ class MissingPanel:
                 _told(effect)
             words = "less than 1 %" if share < 0.005 else f"{100 * share:.0f} %"
             markup(
-                '<div class=share><i style="width:{}%"></i></div>takes away {} of the error',
+                '<div class=share><i style="width:{}%"></i></div>removes {} of the error',
                 f"{100 * share:.1f}",
                 words,
             )
@@ -115,13 +115,13 @@ class MissingPanel:
                 ui.label(finding["why"]).classes("warn")
 
     def _rivals(self, rivals: list[str]) -> None:
-        """What these logs cannot tell a finding from."""
-        ui.label("These logs cannot tell it from:").classes("soft").style("margin-top: 6px")
+        """Effects that these logs cannot distinguish from a finding."""
+        ui.label("These logs cannot distinguish it from:").classes("soft").style("margin-top: 6px")
         for rival in rivals:
             with ui.element("div").classes("line"):
                 ui.label(rival).style("flex: 1")
                 self._buttons(rival)
-        button = ui.button("Design the drive that parts them", on_click=self.page.design)
+        button = ui.button("Design a drive that discriminates", on_click=self.page.design)
         button.props('dense flat no-caps padding="0 8px" data-testid="part-them"')
         self._adding.append(button)
 
@@ -133,7 +133,7 @@ class MissingPanel:
         if moves(of):
             button = ui.button("Show", on_click=lambda: self.page.try_beside(of, robot_id))
             button.props(f'dense flat no-caps padding="0 8px" data-testid="show-{name}"')
-            button.tooltip("Draws what it would change, before it is taken")
+            button.tooltip("Draws its effect on the predictions, before it is added")
             self._trying.setdefault(beside_label(of, robot_id), []).append(button)
         options = {"robot_id": robot_id}
         button = ui.button(words, on_click=lambda: self.page.start(verb, of, options))
@@ -145,7 +145,7 @@ class MissingPanel:
         if found["findings"]:
             most, other = ("most likely ", " or ") if rest.get("likely") else ("", ", ")
             on = other.join(rest["depends_on"])
-            words = f"Left over: {100 * rest['share']:.0f} %"
+            words = f"Unexplained: {100 * rest['share']:.0f} %"
             words += f", depends {most}on {on}" if on and rest.get("told", True) else ""
             certainty = rest["certainty"] if rest.get("told", True) else "no more than noise"
             ui.label(f"{words}: {certainty}.").classes("soft")

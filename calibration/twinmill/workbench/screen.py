@@ -21,7 +21,7 @@ HINT_MS = 900  # over a tab, before its hint shows
 HINTS = {
     "knobs": "Every quantity of the model, with its interval",
     "missing": "What is missing in the model",
-    "fails": "Where it fails: error over noise by what the robot was doing",
+    "fails": "Where it fails: error over noise floor, by what the robot was doing",
     "models": "All models tried, with their scores; save one",
     "next": "What to drive next",
     "swarm": "What a swarm would do with the model now",

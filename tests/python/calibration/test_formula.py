@@ -149,7 +149,7 @@ def test_explain_leaves_the_formula_out_if_asked(playing, one_clock_base, tmp_pa
 
 def test_the_report_draws_it_over_the_data(found):
     page = (found["page"] / "index.html").read_text()
-    assert "The formula for what is left" in page and "neither chose nor fitted it" in page
+    assert "The formula for the residuals" in page and "neither to choose nor to fit it" in page
 
 
 @pytest.mark.parametrize("seed", [301, 302])
