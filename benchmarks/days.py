@@ -33,7 +33,7 @@ from twinmill.runs.alarm import Alarm, alarm
 from twinmill.runs.changes import kinds_of
 from twinmill.runs.compare import may_alarm, open_run, second_half
 from twinmill.runs.difference import Difference, difference
-from twinmill.runs.reference import Day, day_of
+from twinmill.runs.reference import Day, day_of, steadier
 
 HEALTHY = 19  # runs that calibrate the alarm, the first one included
 TESTS, WEAK_TESTS = 12, 6  # of each robot
@@ -129,6 +129,7 @@ def recorded(number: int, duration_s: float) -> dict:
                 pieces["half"] = second_half(second)
             pairs = {name: difference(first, run) for name, run in pieces.items()}
             keys = may_alarm(pairs["whole"], first.one_clock)
+            pairs["precise"] = pairs["whole"].precise()
             told = {name: _both_days(pair.only(keys)) for name, pair in pairs.items()}
             days.append({"weak": wheel, **told})
     robot = drawn.robot
@@ -152,15 +153,18 @@ def examined(line: dict) -> list[dict]:
     with TemporaryDirectory() as folder:
         model = draw(line["robot"], Path(folder)).model.model
     kinds = kinds_of(model, line["keys"])
-    healthy = [_day(run["whole"][1]) for run in line["runs"][: HEALTHY - 1]]
+    healthy = line["runs"][: HEALTHY - 1]
     told = []
     for run in line["runs"][HEALTHY - 1 :]:
         pieces = [[_day(d) for d in run[piece]] for piece in ("whole", "half")]
         alone = (alarm(days, kinds, ALARM_RATE, len(pieces)) for days in pieces)
-        first, own = pieces[0]
+        choices = [
+            [_day(run[way][0]), *(_day(other[way][1]) for other in (*healthy, run))]
+            for way in ("whole", "precise")
+        ]
         for found, calibrated in (
             (min(alone, key=lambda a: a.p_errors), False),
-            (alarm([first, *healthy, own], kinds, ALARM_RATE), True),
+            (alarm(steadier(choices, kinds), kinds, ALARM_RATE), True),
         ):
             told.append(_told(found, run["weak"], line["wheels"]) | {"calibrated": calibrated})
     return told

@@ -167,7 +167,8 @@ class RunComparison(Reported):
         """Each kind of change by itself, were it all that changed.
 
         Returns:
-            name, value, std, low, high (95 %), unit, score (value over std), smallest_shown.
+            name, value, std, low, high (95 %), unit, score (value over std), smallest_shown (by
+            half of such pairs), shown_9_of_10.
 
         Examples:
             >>> "wheels.left" in set(runs.table()["name"])

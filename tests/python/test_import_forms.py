@@ -49,6 +49,7 @@ FORMS = {
     "commas behind the numbers": _text("{t},{x},{y},0.4,", "t_s,x_m,y_m,theta_rad"),
     "a comma behind the names": _text("{t},{x},{y},0.4", "t_s,x_m,y_m,theta_rad,"),
     "EuRoC": _text("{ns},{x},{y},0,{w},0,0,{z}", EUROC),
+    "a count before the stamps": _text("7,{t},{x},{y},0,0,0,{z},{w}", "num,t,x,y,z,qx,qy,qz,qw"),
     "ros2 topic echo --csv": _text(ECHO),
     "days beside times": _text("{date},{time},{x},{y},0.4", "Date,Time,x_m,y_m,theta_rad"),
     "digits": _text("2023_11_14_22_13_{s}_{ms},{x},{y},0.4", "timestamp,x_m,y_m,theta_rad"),
@@ -67,6 +68,29 @@ def test_a_form_of_another_program_is_read_without_an_option(form, tmp_path):
     np.testing.assert_allclose(robot.pose[:, 0], T_S / 10)
     np.testing.assert_allclose(robot.pose[:, 2], 0.4)
     assert log.t0_utime_us == START_S * 10**6
+
+
+def _table(stamps_s) -> str:
+    rows = [f"{t:.3f},{k / 10},{k / 20},0.4" for k, t in enumerate(stamps_s)]
+    return "\n".join(["t_s,x_m,y_m,theta_rad", *rows]) + "\n"
+
+
+def test_a_clock_that_was_set_back_within_a_table_is_told_and_nothing_mixed(tmp_path):
+    """30 rows at 10 Hz, then 2 s less: the 31st, row 32 of the file, stands at 1 s again."""
+    path, out = tmp_path / "p.csv", tmp_path / "o.lcmlog"
+    path.write_text(_table([k / 10 - 2 * (k >= 30) for k in range(60)]))
+    with pytest.raises(LogError, match=r"row 32 is 1\.9 s earlier .* 20 rows behind it"):
+        import_log(path, None, out, options=ImportOptions(robot_id=1))
+    assert not out.exists()
+
+
+def test_packets_that_came_late_are_put_where_they_belong(tmp_path):
+    path, out = tmp_path / "p.csv", tmp_path / "o.lcmlog"
+    order = [*range(20), 23, 20, 21, 22, *range(24, 40)]
+    lines = _table([k / 10 for k in range(40)]).splitlines()
+    path.write_text("\n".join([lines[0], *(lines[1 + k] for k in order)]) + "\n")
+    import_log(path, None, out, options=ImportOptions(robot_id=1))
+    np.testing.assert_allclose(read_log(out).robots[1].pose[:, 0], np.arange(40) / 10)
 
 
 def test_odometry_stands_in_for_commands_and_is_said_to(tmp_path):

@@ -19,7 +19,7 @@ from twinmill.report import show
 from twinmill.report.canvas import MEASURED, PREDICTED, draw
 from twinmill.report.html import Figure, Section
 from twinmill.report.tables import Cell, Table, number
-from twinmill.runs.changes import Change
+from twinmill.runs.changes import MOSTLY, Change
 from twinmill.runs.compare import Named, RunComparison
 from twinmill.runs.difference import follows_charge
 from twinmill.runs.rate import runs_for
@@ -150,13 +150,27 @@ def calibration(result: RunComparison) -> str:
     return f"{rank}: calibrated on this robot, with false alarms in {wanted} of comparisons."
 
 
+def power(result: RunComparison) -> str:
+    """How large a change must be to be seen."""
+    changes = result.alarm.tested.changes()
+    single = [c for c in changes if c.kind.key.startswith("wheel.")]
+    sides = [c for c in changes if c.kind.key in ("wheels.left", "wheels.right")]
+    own = single or sides or [c for c in changes if c.kind.unit == "1"]
+    least = max(own, key=lambda c: c.std)
+    percent = number(100 * result.alarm.shown(least, MOSTLY), 2)
+    return (
+        f"Nine of ten such pairs of runs would show a change of the {label(least)} by {percent} %, "
+        f"and of each other {'wheel' if single else 'side' if sides else 'speed'} by no more."
+    )
+
+
 def terminal(result: RunComparison) -> RenderableType:
     """What `twinmill robot compare` prints."""
     tone = "bold red" if result.changed else "bold green"
     return Group(
         *(Text(line, tone) for line in verdict(result)),
         Text(),
-        *(Text(line) for line in [*apart(result), calibration(result)]),
+        *(Text(line) for line in [*apart(result), calibration(result), power(result)]),
         Text(),
         show.table(numbers(result)),
         *show.warned(list(result.left_out)),
@@ -171,17 +185,18 @@ def numbers(result: RunComparison) -> Table:
         factor, unit = SHOWN[change.kind.unit]
         low, high = change.interval
         tone = "bad" if change.kind.key in named else ""
-        reach = result.alarm.above * change.std
+        half, most = (result.alarm.shown(change, share) for share in (0.5, MOSTLY))
         rows.append(
             [
                 Cell(label(change), tone),
                 Cell(f"{factor * change.value:+.2f} {unit}", tone),
                 Cell(f"{factor * low:+.2f} to {factor * high:+.2f}"),
                 Cell(f"{abs(change.score):.1f}", tone),
-                Cell(f"{factor * reach:.2f} {unit}", "dim"),
+                Cell(f"{factor * half:.2f} {unit}", "dim"),
+                Cell(f"{factor * most:.2f} {unit}", "dim"),
             ]
         )
-    columns = ["", "difference", "95 %", "standard errors", "alarm from"]
+    columns = ["", "difference", "95 %", "standard errors", "alarm from", "9 of 10 from"]
     return Table("Each by itself, were it all that changed", columns, rows)
 
 
@@ -198,7 +213,7 @@ def section(result: RunComparison) -> Section:
         "\n".join(verdict(result)),
         figures=[intervals(result)],
         tables=[numbers(result)],
-        notes=[*apart(result), calibration(result)],
+        notes=[*apart(result), calibration(result), power(result)],
         charts=partial(_charts, result),
         warnings=[*result.left_out, *first.warnings, *second.warnings],
     )
@@ -216,7 +231,7 @@ def intervals(result: RunComparison) -> Figure:
             own = [c for c in changes if c.kind.unit == unit][::-1]
             factor, words = SHOWN[unit]
             for row, change in enumerate(own):
-                reach = factor * result.alarm.above * change.std
+                reach = factor * result.alarm.shown(change, 0.5)
                 color = PREDICTED if change.kind.key in named else MEASURED
                 axes.barh(row, 2 * reach, left=-reach, color="#efefef", height=0.8)
                 ends = [factor * end for end in change.interval]

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from twinmill.chance import t_quantile
 from twinmill.runs.changes import Change, Judged, Kind, rivals
 from twinmill.runs.rate import promised, rank_p, runs_for
 from twinmill.runs.reference import Day, judged
@@ -67,6 +68,10 @@ class Alarm:
             return sorted(self.healthy)[-place]
         by_errors = float(np.quantile(self.tested.by_errors, 1 - self.rate / self.pieces))
         return max([by_errors, *(self.healthy if self.calibrated else ())])
+
+    def shown(self, change: Change, share: float) -> float:
+        """Size from which on a change is an alarm in this share of such pairs of runs."""
+        return (self.above + t_quantile(share, change.free)) * change.std
 
     @cached_property
     def found(self) -> list[tuple[Change, tuple[Change, ...]]]:

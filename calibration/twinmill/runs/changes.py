@@ -17,6 +17,7 @@ from twinmill.model.parameters import drives_sideways
 
 SHARE_95 = 0.975  # quantile of both ends of a 95 % interval
 RIVAL_CHI2 = t_quantile(SHARE_95, 1e6) ** 2  # a rival that explains this much less is ruled out
+MOSTLY = 0.9  # of pairs of runs: the share in which a change is to show
 AXIS_M = 1e-6  # a wheel so near an axis is to neither side of it
 DRAWS = 20_000  # of runs without a change: a rate of 5 % is known to 0.15 %
 

@@ -15,10 +15,10 @@ from twinmill.defaults import ALARM_RATE
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import Alarm, alarm
-from twinmill.runs.changes import SHARE_95, Change, Judged, kinds_of
+from twinmill.runs.changes import MOSTLY, SHARE_95, Change, Judged, kinds_of
 from twinmill.runs.difference import Difference, difference, mean_V
 from twinmill.runs.onset import Onset, onset
-from twinmill.runs.reference import day_of
+from twinmill.runs.reference import day_of, steadier
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,8 @@ class RunComparison:
         return {"value": value, "low": value - reach, "high": value + reach}
 
     def _number(self, change: Change) -> dict:
-        return {**change.to_json(), "smallest_shown": self.alarm.above * change.std}
+        sizes = [self.alarm.shown(change, share) for share in (0.5, MOSTLY)]
+        return {**change.to_json(), "smallest_shown": sizes[0], "shown_9_of_10": sizes[1]}
 
 
 def _run_json(opened: Opened) -> dict:
@@ -184,17 +185,23 @@ def compared(
     """
     whole = difference(first, second)
     keys = may_alarm(whole, first.one_clock and second.one_clock)
-    others = [pair.only(keys) for pair in healthy]
+    others = [both_ways(pair) for pair in healthy]
     kinds = kinds_of(first.model, keys)
 
     def judge(pair: Difference, pieces: int = 1) -> Alarm:
-        days = [day_of(pair, 0), *(day_of(other, 1) for other in others), day_of(pair, 1)]
-        return alarm(days, kinds, rate, pieces)
+        if not others:
+            return alarm([day_of(pair.only(keys), run) for run in (0, 1)], kinds, rate, pieces)
+        choices = zip(both_ways(pair), *others, strict=True)
+        days = [
+            [day_of(own.only(keys), 0), *(day_of(p.only(keys), 1) for p in (*rest, own))]
+            for own, *rest in choices
+        ]
+        return alarm(steadier(days, kinds), kinds, rate, pieces)
 
     own = whole.only(keys)
-    found = judge(own)
+    found = judge(whole)
     if not others:
-        pieces = (own, difference(first, second_half(second)).only(keys))
+        pieces = (whole, difference(first, second_half(second)))
         found = min((judge(pair, len(pieces)) for pair in pieces), key=lambda a: a.p_errors)
     named = []
     for change, rest in found.found:
@@ -202,9 +209,17 @@ def compared(
         named.append(Named(change, rest, onset(change, beside, own, rate)))
     since_s = max((n.onset.at_s for n in named), default=0.0)
     if since_s:
-        after = judge(difference(first, _since(second, since_s)).only(keys)).tested
+        after = judge(difference(first, _since(second, since_s))).tested
         named = [replace(n, change=_sized_anew(n, named, after)) for n in named]
     return RunComparison(first, second, whole, tuple(keys), found, tuple(named))
+
+
+def both_ways(pair: Difference) -> tuple[Difference, Difference]:
+    """As predictions tell it, and as white steps do: one suffers less from a model's faults.
+
+    The other suffers less from noise.
+    """
+    return pair, pair.precise()
 
 
 def second_half(opened: Opened) -> Opened:

@@ -26,6 +26,7 @@ from twinmill.model.parameters import (
     effect_parameters,
     newest_instance,
 )
+from twinmill.runs.white_step import white_step
 
 MOUNTING = ("marker_offset", "heading_bias")  # effects of how the marker sits on the robot
 BATTERY = "battery_sag"
@@ -60,6 +61,7 @@ class Difference:
         covariance: (K, K) by leaving out blocks of time.
         by_curvature: (K, K) covariance by the curvature of the cost: too wide as a whole, but it
             has an inverse where few blocks give none.
+        contrast: (K, P) a unit of each unknown of the fit in them.
         fit: to both runs, the first one first.
     """
 
@@ -67,6 +69,7 @@ class Difference:
     values: np.ndarray
     covariance: np.ndarray
     by_curvature: np.ndarray
+    contrast: np.ndarray
     fit: ScoreFit
 
     @cached_property
@@ -84,6 +87,17 @@ class Difference:
             values=self.values[kept],
             covariance=self.covariance[block],
             by_curvature=self.by_curvature[block],
+            contrast=self.contrast[kept],
+        )
+
+    def precise(self) -> "Difference":
+        """The most precise that both runs tell, with errors of their noise alone."""
+        white = white_step(self.fit)
+        return replace(
+            self,
+            values=self.values + self.contrast @ white.step,
+            covariance=self.contrast @ white.covariance @ self.contrast.T,
+            by_curvature=self.contrast @ white.by_curvature @ self.contrast.T,
         )
 
 
@@ -216,5 +230,6 @@ def _found(quantities: tuple[Quantity, ...], fit: ScoreFit) -> Difference:
         values,
         contrast @ fit.covariance @ contrast.T,
         contrast @ np.linalg.pinv(curvature) @ contrast.T,
+        contrast,
         fit,
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
+from scipy.linalg import eigh
 
 from twinmill.model.parameters import catalogue_name
 from twinmill.runs.changes import Judged, Kind
@@ -62,6 +63,23 @@ def _charge_is_missed(model: native.Model) -> bool:
     return follows_charge(model) and BATTERY not in map(catalogue_name, model.effects)
 
 
+def steadier(choices: Sequence[Sequence[Day]], kinds: Sequence[Kind]) -> Sequence[Day]:
+    """Those estimates of the same days by which changes show most among what days scatter.
+
+    The day in question counts as any other, so that the choice favours none.
+    """
+    return max(choices, key=lambda days: _shown(np.array([d.values for d in days]), kinds))
+
+
+def _shown(values: np.ndarray, kinds: Sequence[Kind]) -> float:
+    """Sum of the logarithms of what (N, K) values of days tell of a unit of each change."""
+    spread = np.cov(values.T)
+    if len(values) - 1 <= values.shape[1]:
+        spread = np.diag(np.diag(spread))
+    told = np.linalg.pinv(spread)
+    return float(sum(np.log(kind.direction @ told @ kind.direction) for kind in kinds))
+
+
 def judged(days: Sequence[Day], k: int, kinds: Sequence[Kind]) -> Judged:
     """One of several days against the mean of the others.
 
@@ -78,7 +96,7 @@ def judged(days: Sequence[Day], k: int, kinds: Sequence[Kind]) -> Judged:
     own = errors.pop(k)
     mean = np.mean([o.values for o in others], axis=0)
     between = _between_days(others, mean, errors) * (1 + 1 / count)
-    scatter = own + sum(errors) / count**2 + np.diag(between)
+    scatter = own + sum(errors) / count**2 + between
     free = sum(d.blocks for d in days) - len(days)
     return Judged(day.values - mean, scatter, max(free, 1), kinds)
 
@@ -102,11 +120,17 @@ def _errors(day: Day, wider: np.ndarray, common: np.ndarray) -> np.ndarray:
 def _between_days(
     others: Sequence[Day], mean: np.ndarray, errors: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """(K,) variances between days beyond their errors.
+    """(K, K) covariance between days beyond their errors.
 
-    By moments, no less than zero (DerSimonian and Laird 1986).
+    By moments, and of what scatters less than the errors none (Amemiya 1985, The American
+    Statistician 39). Days that are no more than the numbers tell only of each by itself.
     """
     if len(others) < 2:
-        return np.zeros(len(mean))
-    squares = sum((o.values - mean) ** 2 for o in others) / (len(others) - 1)
-    return np.maximum(squares - np.mean([np.diag(e) for e in errors], axis=0), 0.0)
+        return np.zeros((len(mean), len(mean)))
+    away = np.array([o.values - mean for o in others])
+    found, within = away.T @ away / (len(others) - 1), np.mean(errors, axis=0)
+    if len(others) <= len(mean):
+        return np.diag(np.maximum(np.diag(found - within), 0.0))
+    values, ways = eigh(found, within)
+    ways = within @ ways  # these are orthonormal by the errors, and so made what they stand for
+    return (ways * np.maximum(values - 1, 0.0)) @ ways.T

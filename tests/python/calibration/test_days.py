@@ -17,10 +17,11 @@ from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import alarm
 from twinmill.runs.changes import Judged, Kind
 from twinmill.runs.compare import compared, open_run
+from twinmill.runs.difference import difference
 from twinmill.runs.drift import drift
 from twinmill.runs.history import Calibration, Number, append, healthy_logs, read_history
 from twinmill.runs.rate import promised, rank_p, runs_for
-from twinmill.runs.reference import Day
+from twinmill.runs.reference import Day, steadier
 
 KINDS = [
     Kind("a", "a is", "weaker", "stronger", "1", np.array([1.0, 0.0])),
@@ -75,6 +76,33 @@ def test_what_varies_between_healthy_days_is_no_alarm_and_what_does_not_is():
     assert change.kind.key == "b" and change.value == pytest.approx(15.0, abs=4 / sqrt(30))
 
 
+def test_days_that_differ_in_one_way_hide_no_change_in_another():
+    """They scatter by 10 along a + b and not along a - b, of which a change of a by 5 is half."""
+    random = np.random.default_rng(5)
+    common = 10 * random.standard_normal((30, 1)) + random.standard_normal((30, 2))
+    days = [_day(v) for v in [*common, [5.0, 0.0]]]
+    ((change, _),) = alarm(days, KINDS, 0.05).found
+    assert change.kind.key == "a" or change.value < 0  # b less by 5 is the same half
+    assert abs(change.value) == pytest.approx(5.0, abs=4 * sqrt(2 * (1 + 1 / 30)))
+
+
+def test_of_two_estimates_the_one_that_scatters_less_from_day_to_day_is_taken():
+    random = np.random.default_rng(6)
+    values = random.standard_normal((20, 2))
+    rough, fine = ([_day(scale * v) for v in values] for scale in (3.0, 1.0))
+    assert steadier([rough, fine], KINDS) is fine
+    assert steadier([fine, rough], KINDS) is fine
+
+
+def test_nine_of_ten_changes_of_the_size_that_is_said_would_be_an_alarm():
+    """By normal variates: a threshold of 3 is passed by 9 of 10 from 3 + 1.2816 on, 2 each."""
+    own = replace(alarm([_day([0, 0])] * 2, KINDS, 0.05), healthy=(1.0,) * 18 + (3.0,))
+    change = replace(own.tested.changes()[0], std=2.0, free=1e6)
+    assert own.above == 3.0
+    size = own.shown(change, 0.9)
+    assert 0.5 * (1 - erf((3.0 - size / 2.0) / sqrt(2))) == pytest.approx(0.9, abs=1e-4)
+
+
 # -- two runs -----------------------------------------------------------------------------------
 
 
@@ -99,6 +127,12 @@ def test_a_weak_wheel_is_named_with_its_size(opened):
     assert change.kind.key == "wheel.fl" and own.onset.from_start
     low, high = change.interval
     assert low < -WEAKER < high and high < 0
+
+
+def test_white_steps_tell_by_how_much_a_wheel_is_weaker_to_a_tenth_of_it(opened):
+    white = difference(opened["first"], opened["weak"]).precise().only(["wheel.fl"])
+    bound = float(np.sqrt(white.by_curvature[0, 0]))
+    assert bound < WEAKER / 10 and abs(white.values[0] + WEAKER) < 4 * bound
 
 
 def test_the_moment_is_found_from_which_on_a_wheel_is_weak(opened):

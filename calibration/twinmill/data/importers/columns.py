@@ -300,7 +300,7 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
         larger, other = sorted(plane, key=lambda g: g.factor)
         why = f"in the unit of '{larger.column}', which {larger.why}"
         changed[other.column] = replace(other, factor=larger.factor, why=why)
-    changed |= _quaternion(table, known, named)
+    changed |= _quaternion(table, known, named) | _beside_quaternion(table, guesses)
     told = {target for guess in guesses for target in guess.targets}
     for name, column in named.items():
         if DIRECTION.search(name) and told & {*LEFT, *RIGHT}:
@@ -311,6 +311,17 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
     if counter and not has_time and "t_s" in known:
         changed[counter] = Guess(counter, ("t_s",), math.nan, ", ".join(lacks("t_s")), False)
     return [changed.get(guess.column, guess) for guess in guesses]
+
+
+def _beside_quaternion(table: Table, guesses: list[Guess]) -> dict[str, Guess]:
+    """Places without a unit that are in m: beside a quaternion, as TUM and EuRoC define it."""
+    told = {target for guess in guesses if guess.sure for target in guess.targets}
+    place = [g for g in guesses if g.targets in (("x_m",), ("y_m",), ("z_m",)) and not g.sure]
+    if not told.issuperset(QUATERNIONS[0]) or any(g.factor != 1.0 for g in place):
+        return {}
+    names = ", ".join(g.column for g in place)
+    note = f"{table.name}: {names} stand beside a quaternion, and are taken for m."
+    return {g.column: replace(g, sure=True, note=note if g is place[0] else "") for g in place}
 
 
 def _quaternion(table: Table, known: frozenset[str], named: dict[str, str]) -> dict[str, Guess]:

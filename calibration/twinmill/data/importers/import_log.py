@@ -57,7 +57,6 @@ from twinmill.data.importers.series import (
     multiply,
     stopped_when_silent,
 )
-from twinmill.data.importers.vicon import read_vicon
 from twinmill.data.log import Log, LogError, RobotLog, read_log
 from twinmill.data.measurement_table import Table
 from twinmill.data.track import make_track
@@ -203,6 +202,8 @@ def _read_capture(given: Sources, options: ImportOptions) -> list[PoseSeries]:
         return read_motive(
             given.motive, options.robots, up, absolute=absolute, only=options.robot_id
         )
+    from twinmill.data.importers.vicon import read_vicon  # with SciPy's geometry, 28 MB
+
     return read_vicon(given.vicon, options.robots, options.up or "z", options.robot_id)
 
 

@@ -17,7 +17,6 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from twinmill.arguments import option
 from twinmill.data.importers.series import PoseSeries, with_z_up
@@ -212,6 +211,8 @@ def _quaternion(turned: np.ndarray, rotation: str) -> np.ndarray:
     quaternion = np.full((len(turned), 4), np.nan)
     known = np.isfinite(turned).all(axis=1)
     ordered = turned[known][:, ["XYZ".index(axis) for axis in rotation]]
+    from scipy.spatial.transform import Rotation  # 28 MB, and most exports have quaternions
+
     about = Rotation.from_euler(rotation, ordered, degrees=True)
     quaternion[known] = about.as_quat(scalar_first=True)
     return quaternion

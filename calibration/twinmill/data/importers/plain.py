@@ -36,6 +36,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 WORLD = ("vx_world_mps", "vy_world_mps")
 INPUTS = ("speed_input", "turn_input")
 STEERED = ("vx_mps", "steering_rad")
+PASS = 10  # rows that share their times with others: packets that come late are fewer at once
 WRAP_DEG = 20  # more than a robot turns from row to row
 VALUES: dict[CommandKind, tuple[str, ...]] = {
     "duty": ("fl_pct", "fr_pct", "rl_pct", "rr_pct"),
@@ -474,6 +475,29 @@ def _utime_us(table: Table, t_s: np.ndarray) -> np.ndarray:
     return np.round(t_s * 1e6).astype(np.int64)
 
 
+def _check_passes(table: Table, rows: np.ndarray, stamps: np.ndarray, where: str) -> None:
+    """Raises LogError where a clock was set back, so that rows of two times share their stamps.
+
+    A packet that came late is no such: what is behind it goes on where it was before.
+    """
+    step = np.diff(stamps)
+    if not (step < 0).any():
+        return
+    at = int(step.argmin()) + 1
+    before, behind = stamps[:at], stamps[at:]
+    low, high = max(before.min(), behind.min()), min(before.max(), behind.max())
+    shared = int(((behind >= low) & (behind <= high)).sum())
+    if min(((before >= low) & (before <= high)).sum(), shared) < PASS:
+        return
+    back_s = f"{-step[at - 1] / 1e6:.6g} s"
+    raise LogError(
+        f"{where}row {table.line[rows[at]]} is {back_s} earlier than the row before, and {shared} "
+        "rows behind it fall among those before it: the clock was set back, or two recordings "
+        f"stand in one file; make a file of each part, or add {back_s} and the pause between them "
+        "to the stamps from that row on."
+    )
+
+
 def _by_robot(
     table: Table, ids: np.ndarray, utime_us: np.ndarray, said: list[str]
 ) -> Iterator[tuple[int, np.ndarray, list[str], str]]:
@@ -486,13 +510,14 @@ def _by_robot(
     for number in np.unique(ids).tolist():
         rows = np.flatnonzero(ids == number)
         stamps = utime_us[rows]
+        where = f"{table.name}: robot {number}: "
+        _check_passes(table, rows, stamps, where)
         late = int(np.count_nonzero(np.diff(stamps) < 0))
         rows = rows[np.argsort(stamps, kind="stable")]
         last = np.append(np.diff(utime_us[rows]) > 0, True)
-        where = f"{table.name}: robot {number}: "
-        notes = (
-            [f"{where}{counted(late, 'row')} earlier than the row before; sorted."] if late else []
-        )
+        most_s = -np.diff(stamps).min(initial=0) / 1e6
+        earlier = f"{counted(late, 'row')} earlier than the row before, by {most_s:.3g} s at most"
+        notes = [f"{where}{earlier}; sorted."] if late else []
         if not last.all():
             double = counted(np.count_nonzero(~last), "row repeats", "rows repeat")
             notes.append(f"{where}{double} a stamp; the last of each was kept.")

@@ -5,7 +5,6 @@ Poses of a tree are composed with what was told last of the frames between, as m
 """
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from twinmill.data.importers.ros_messages import Row
 from twinmill.data.importers.series import multiply, quaternion_from_heading
@@ -74,6 +73,8 @@ def on_floor(position_m: np.ndarray, turned_wxyz: np.ndarray) -> tuple[np.ndarra
     Returns:
         (N, 3) m, (N, 4), and what was done, in words.
     """
+    from scipy.spatial.transform import Rotation  # 28 MB, and few bags get here
+
     turned = Rotation.from_quat(turned_wxyz, scalar_first=True)
     up, by = _plane(position_m), "their places"
     if up is None:
