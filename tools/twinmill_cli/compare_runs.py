@@ -15,6 +15,8 @@ from twinmill_cli.options import Model, Out
 from twinmill_cli.output import AsJson, say, telling
 
 if working():  # not for --help
+    from threadpoolctl import threadpool_limits
+
     from twinmill.data.measurement import load_measurements
     from twinmill.report import runs as present
     from twinmill.runs.compare import RunComparison, compare_runs, of_robot
@@ -86,7 +88,7 @@ def _compare_runs(
     def run(path: Path):
         return of_robot(load_measurements([path], model_file.model), path.name, robot)
 
-    with telling("comparing runs") as tell:
+    with telling("comparing runs") as tell, threadpool_limits(1, "blas"):
         known = {m.log_sha256: m for m in map(run, [first, second])}
         more = [m for m in map(run, others) if m.log_sha256 not in known]
         result = compare_runs(
