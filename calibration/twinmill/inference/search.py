@@ -18,7 +18,7 @@ from twinmill.inference.hypothesis import Hypothesis, next_of_kind
 from twinmill.inference.moments import MOMENTS
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.settings import PRIORS
-from twinmill.model.parameters import catalogue_name
+from twinmill.model.parameters import catalogue_name, key_of, newest_instance
 
 MOST = 4  # effects of a set
 FITTED = 6  # effects that are fitted beside the best set, by what each would gain alone ...
@@ -26,6 +26,7 @@ BESIDE = 2  # ... and beside the likeliest dependence
 INSTEAD = 2  # effects tried in the place of each one of the best sets
 SETS = 2  # best sets whose effects are exchanged, within ...
 NEAR = 4.0  # ... this log odds of the best
+TRIED = (-2, -1, -0.5, 0.5, 1, 2, 4)  # sizes at which a fit may begin, times the card's
 WORTH = -3.0  # gain in log evidence below which an effect is not fitted
 
 
@@ -144,19 +145,29 @@ class Search:
         found = fitter.with_effect(h, c, start, grid=grid)
         if c.masks is not None or c.fixed is not None:
             return found
-        value, usual, low, high = (
-            np.array([getattr(p, k) for p in c.parameters])
-            for k in ("value", "usual", "min", "max")
-        )
+        value = np.array([p.value for p in c.parameters])
         best = found.log_evidence(found.linear(fitter.whiten))
-        for other in [start, value] if len(value) > 1 else [value, 2 * usual - value]:
-            other = np.clip(other, low, high)
-            if np.any(np.abs(other - usual) > 1e-12):
-                again = fitter.with_effect(h, c, other, grid=grid, told=True)
-                then = again.log_evidence(again.linear(fitter.whiten))
-                if then > best:
-                    found, best = again, then
+        for other in [start, value] if len(value) > 1 else [self._best_size(h, c)]:
+            again = fitter.with_effect(h, c, other, grid=grid, told=True)
+            then = again.log_evidence(again.linear(fitter.whiten))
+            if then > best:
+                found, best = again, then
         return found
+
+    def _best_size(self, h: Hypothesis, c: Candidate) -> np.ndarray:
+        """(1,) one of TRIED sizes of an effect of one number: what it leaves is least there.
+
+        The other numbers of the hypothesis are free in it, but linear.
+        """
+        (p,) = c.parameters
+        model, own = h.model.copy(), self.fitted[h.effects].linear
+        model.add_effect(c.name)
+        name = f"{newest_instance(model, c.name)}.{key_of(p.name)}"
+        sizes = np.clip(p.usual + np.array([0, *TRIED]) * (p.value - p.usual), p.min, p.max)
+        errors = self.problem.steps.errors(model, [name], sizes[:, None])
+        left = own.y + self.view.fitter.whiten(errors[1:] - errors[0])
+        squares = (left**2).sum(axis=1) - ((left @ own.basis.T) ** 2).sum(axis=1)
+        return sizes[1:][[np.argmin(squares)]]
 
     def _keep(self, h: Hypothesis) -> None:
         self.fitted[h.effects] = evidence(h, self.view, h.linear(self.view.fitter.whiten))
