@@ -552,6 +552,15 @@ def test_a_controller_told_the_exported_numbers_drives_as_fast_as_it_is_asked(fo
     np.testing.assert_allclose(np.multiply(ideal, (0.9, 0.9, 0.8)), (vx, vy, omega), rtol=1e-4)
 
 
+def test_an_export_hides_no_file_that_comes_with_the_twin(folder):
+    """twin_run looks for its robot in the working directory first, by names of these files."""
+    installed = {path.name for path in (DOCS.parent / "twin" / "models").rglob("*")}
+    assert {"turbopi.xml", "turbopi.toml"} <= installed
+    for to in KINDS:
+        (written,) = run(["export-model", "turbopi.toml", "--to", to, "--json"])["files"]
+        assert written not in installed and (folder / written).exists()
+
+
 def root_link(path):
     """Name of the one link that is no joint's child."""
     robot = ET.parse(path).getroot()
