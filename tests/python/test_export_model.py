@@ -552,6 +552,35 @@ def test_a_controller_told_the_exported_numbers_drives_as_fast_as_it_is_asked(fo
     np.testing.assert_allclose(np.multiply(ideal, (0.9, 0.9, 0.8)), (vx, vy, omega), rtol=1e-4)
 
 
+def test_an_export_hides_no_file_that_comes_with_the_twin(folder):
+    """twin_run looks for its robot in the working directory first, by names of these files."""
+    installed = {path.name for path in (DOCS.parent / "twin" / "models").rglob("*")}
+    assert {"turbopi.xml", "turbopi.toml"} <= installed
+    for to in KINDS:
+        (written,) = run(["export-model", "turbopi.toml", "--to", to, "--json"])["files"]
+        assert written not in installed and (folder / written).exists()
+
+
+def root_link(path):
+    """Name of the one link that is no joint's child."""
+    robot = ET.parse(path).getroot()
+    children = {joint.find("child").get("link") for joint in robot.iter("joint")}
+    (root,) = {link.get("name") for link in robot.iter("link")} - children
+    return root
+
+
+@pytest.mark.parametrize("wheels", ["mecanum", "differential"])
+def test_odometry_moves_the_root_of_the_urdf_so_no_frame_has_two_parents(
+    wheels, folder, model_text
+):
+    """What controllers publish is the transform from odom to base_frame_id, in tf a tree."""
+    open_text(folder, model_text("m").replace("mecanum", wheels))
+    for to in ("urdf", "ros2_control"):
+        run(["export-model", "m.toml", "--to", to])
+    _, controller = yaml.safe_load((folder / "m_control.yaml").read_text()).values()
+    assert controller["ros__parameters"]["base_frame_id"] == root_link(folder / "m.urdf")
+
+
 def test_a_differential_controller_knows_that_the_left_wheel_is_weak(folder, model_text):
     """The inverse kinematics of ros2_control's diff_drive_controller, by hand."""
     text = model_text("m").replace("mecanum", "differential")

@@ -43,6 +43,19 @@ def test_nan_is_refused_by_the_name_of_its_option(tmp_path, option):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_file_that_hides_the_installed_robot_is_named_and_the_robot_too(tmp_path):
+    """What the sentence says is done, and it drives."""
+    body = "<body><joint name='x'/><geom size='1'/></body>"
+    (tmp_path / "turbopi.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    command = [TWIN_RUN, "--n", "1", "--duration-s", "0.1", "--log", "a.lcmlog"]
+    hidden = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=60)
+    assert hidden.returncode == 1 and hidden.stderr.count("\n") == 1
+    assert "twinmill twin export" in hidden.stderr
+    named = ["--mjcf", hidden.stderr.split("--mjcf ")[1].strip()]
+    done = subprocess.run([*command, *named], capture_output=True, cwd=tmp_path, timeout=60)
+    assert done.returncode == 0
+
+
 @pytest.mark.parametrize("wheels", ["mecanum", "differential", "omni3", "ackermann", "none"])
 def test_wheels_that_the_firmware_mixes_duties_for_go_straight_and_others_are_refused(
     tmp_path, wheels

@@ -39,7 +39,10 @@ def _export_model(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", metavar="FILE", show_default=False, help="Default: M's name, here."
+            *("--out", "-o"),
+            metavar="FILE",
+            show_default=False,
+            help="Default: M's name, here; turbopi_mjcf.xml of turbopi.toml.",
         ),
     ] = None,
     robot: Annotated[

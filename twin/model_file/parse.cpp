@@ -12,6 +12,7 @@
 
 #include "effects/nearest.h"
 #include "fields.h"
+#include "model_file/installed.h"
 #include "model_file/model.h"
 
 namespace twin
@@ -390,6 +391,14 @@ private:
     Model model_;
 };
 
+std::filesystem::path InstalledModels()
+{
+    if (const char *from_environment = std::getenv("TWINMILL_MODELS"))
+        return from_environment;
+    return std::filesystem::is_directory(TWINMILL_MODELS_DIR) ? TWINMILL_MODELS_DIR
+                                                              : TWINMILL_INSTALLED_MODELS_DIR;
+}
+
 }  // namespace
 
 Model Model::FromToml(std::string_view text, const std::string &origin)
@@ -420,6 +429,16 @@ Model Model::Load(const std::string &name)
     return FromToml(text.str(), path);
 }
 
+std::optional<std::string> FindInstalledModelFile(const std::string &file)
+{
+    std::error_code unreadable;
+    for (const auto &entry :
+         std::filesystem::recursive_directory_iterator(InstalledModels(), unreadable))
+        if (entry.is_regular_file(unreadable) && entry.path().filename() == file)
+            return entry.path().lexically_normal().string();
+    return std::nullopt;
+}
+
 std::string FindModelFile(const std::string &name)
 {
     namespace fs = std::filesystem;
@@ -430,26 +449,17 @@ std::string FindModelFile(const std::string &name)
     for (const std::string &here : {name, file})
         if (fs::is_regular_file(here, unreadable))
             return here;
-    const char *from_environment = std::getenv("TWINMILL_MODELS");
-    const fs::path installed = from_environment ? from_environment
-                               : fs::is_directory(TWINMILL_MODELS_DIR)
-                                   ? TWINMILL_MODELS_DIR
-                                   : TWINMILL_INSTALLED_MODELS_DIR;
+    if (const auto found = FindInstalledModelFile(file))
+        return *found;
     std::set<std::string> others;
-    for (const auto &entry : fs::recursive_directory_iterator(installed, unreadable))
-    {
-        if (!entry.is_regular_file(unreadable))
-            continue;
-        if (entry.path().filename() == file)
-            return entry.path().string();
-        if (entry.path().extension() == kind)
+    for (const auto &entry : fs::recursive_directory_iterator(InstalledModels(), unreadable))
+        if (entry.is_regular_file(unreadable) && entry.path().extension() == kind)
             others.insert(entry.path().filename().string());
-    }
     std::string list;
     for (const std::string &other : others)
         list += (list.empty() ? "" : ", ") + other;
     Fail(name, "no such file here, nor among the installed models (" +
-                   (list.empty() ? "none in " + installed.string() : list) + ")");
+                   (list.empty() ? "none in " + InstalledModels().string() : list) + ")");
 }
 
 }  // namespace twin

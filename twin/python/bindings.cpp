@@ -15,6 +15,7 @@
 #include "pickle_bindings.h"
 
 #include "fw/mixing.h"
+#include "model_file/installed.h"
 #include "plant/kinematics.h"
 #include "predict/predict.h"
 #include "predict/steady.h"
@@ -386,6 +387,8 @@ NB_MODULE(twinmill_native, m)
           "All effects: cards and parameter tables, in alphabetical order.");
     m.def("find_model_file", &FindModelFile, "name"_a,
           "Path of a file in the working directory or among the installed models.");
+    m.def("find_installed_model_file", &FindInstalledModelFile, "file"_a,
+          "Path of the installed file with that name and ending; None: there is none.");
 
     nb::class_<Model>(m, "Model", "A robot model. Errors are ValueError with one sentence.")
         .def_static(

@@ -7,6 +7,8 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+import twinmill_native as native
+
 from twinmill.defaults import ModelFormat
 from twinmill.export.carried import Left, RobotModel
 from twinmill.export.mjcf import mjcf
@@ -53,8 +55,13 @@ class ExportedModel:
 
 
 def default_name(name: str, to: ModelFormat) -> Path:
-    """Where a model is written to if nothing is said: its name, in this folder."""
-    return Path(f"{Path(name).stem}{ENDINGS.get(to, f'.{to}')}")
+    """Where a model is written to if nothing is said: its name, in this folder.
+
+    With the format before the ending where that would hide an installed file from `twin_run`.
+    """
+    stem, ending = Path(name).stem, ENDINGS.get(to, f".{to}")
+    hides = native.find_installed_model_file(f"{stem}{ending}") is not None
+    return Path(f"{stem}_{to}{ending}" if hides else f"{stem}{ending}")
 
 
 def export_model(

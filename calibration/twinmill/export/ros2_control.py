@@ -5,6 +5,7 @@ from twinmill.arguments import option
 from twinmill.export.carried import ALL, Left, RobotModel
 from twinmill.export.drive import drive_of, wheel_gains
 from twinmill.export.steady import TOPS, limits_of, top_speed_left
+from twinmill.export.urdf import ROOT_LINK
 from twinmill.extras import needing
 
 TIMEOUT_S = 0.5  # without a command: stop
@@ -115,7 +116,7 @@ def _mecanum(robot: RobotModel) -> dict:
             "wheels_radius": _short(drive.radius_m),
             "sum_of_robot_center_projection_on_X_Y_axis": _short(drive.scale * lever_m),
         },
-        "base_frame_id": "base_link",
+        "base_frame_id": ROOT_LINK,
         "odom_frame_id": "odom",
         **_limits(robot),
     }
@@ -136,7 +137,7 @@ def _differential(robot: RobotModel) -> dict:
         "wheel_separation": _short(2 * drive.scale * robot.get("robot.half_track_m")),
         "wheel_radius": _short(drive.radius_m),
         "cmd_vel_timeout": TIMEOUT_S,
-        "base_frame_id": "base_link",
+        "base_frame_id": ROOT_LINK,
         "odom_frame_id": "odom",
         **_limits(robot),
     }
@@ -150,7 +151,17 @@ CARRIED = {
     "mecanum": {"acceleration_limit": ALL},
     "differential": {"wheel_gain": ALL, "acceleration_limit": ALL, "speed_limit": ALL},
 }
-HEADS = {"mecanum": ["mecanum_drive_controller obeys limits from its version 6.8 on."]}
+# https://github.com/ros-controls/ros2_controllers, by the changelogs and parameters of each branch.
+HEADS = {
+    "mecanum": [
+        "mecanum_drive_controller obeys limits from 4.41 (Jazzy), 5.16 (Kilted) and 6.8 (Lyrical)",
+        "on; Humble's obeys none.",
+    ],
+    "differential": [
+        "Humble's diff_drive_controller obeys limits only where has_velocity_limits and",
+        "has_acceleration_limits are set to true beside them, and has no max_deceleration.",
+    ],
+}
 CONTROLLERS = {
     "mecanum": ("mecanum_drive_controller/MecanumDriveController", _mecanum),
     "differential": ("diff_drive_controller/DiffDriveController", _differential),

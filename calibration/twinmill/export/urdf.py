@@ -9,6 +9,7 @@ import numpy as np
 from twinmill.export.carried import ALL, HULL_HEIGHT_M, WHEEL_WIDTH, Left, RobotModel
 from twinmill.export.steady import TOPS, limits_of, top_speed_left
 
+ROOT_LINK = "base_footprint"  # on the floor, below the middle; the frame that odometry moves
 EFFORT_NM = 1000.0  # a joint must state a limit, and the model knows none
 CARRIED = {
     "view_pan": ALL,
@@ -31,8 +32,8 @@ def urdf(robot: RobotModel) -> tuple[str, list[Left]]:
     text = "\n    ".join(line.replace("--", "- -") for line in said)
     root.append(ET.Comment(f"\n    {text}\n  "))
     wheel_m, body_m = robot.get("robot.wheel_radius_m"), robot.get("robot.body_radius_m")
-    ET.SubElement(root, "link", name="base_footprint")
-    _joint(root, "base_joint", "fixed", "base_footprint", child="base_link", place=(0, 0, wheel_m))
+    ET.SubElement(root, "link", name=ROOT_LINK)
+    _joint(root, "base_joint", "fixed", ROOT_LINK, child="base_link", place=(0, 0, wheel_m))
     base = _solid(
         root=root,
         name="base_link",

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 
 #include "mecanum_collider.h"
+#include "model_file/installed.h"
 #include "robot_mjcf.h"
 
 namespace twin
@@ -51,6 +53,19 @@ mjsGeom *FindGeom(mjSpec *spec, const std::string &name)
     return element ? mjs_asGeom(element) : nullptr;
 }
 
+// What else a file that is no robot of the twin's may be, and how to name the one that was meant.
+std::string MeantFile(const std::string &mjcf)
+{
+    std::string hint =
+        "; what `twinmill twin export` writes is for MuJoCo itself, and twin_run runs the model by "
+        "--model";
+    const auto installed = FindInstalledModelFile(std::filesystem::path(mjcf).filename().string());
+    std::error_code unreadable;
+    if (installed && !std::filesystem::equivalent(*installed, mjcf, unreadable))
+        hint += "; the file here hides the installed one: rename it, or give --mjcf " + *installed;
+    return hint;
+}
+
 void CheckWheel(const std::string &mjcf, mjSpec *spec, const Wheel &wheel)
 {
     const struct
@@ -64,7 +79,8 @@ void CheckWheel(const std::string &mjcf, mjSpec *spec, const Wheel &wheel)
             Fail(mjcf, std::string("has no ") + part.word + " \"" + name +
                            "\"; a robot needs a joint, a geom and an actuator for each of its "
                            "wheels fl, fr, rl, rr, or w1, w2, w3 of an omni3 robot (see "
-                           "turbopi.xml)");
+                           "turbopi.xml)" +
+                           MeantFile(mjcf));
     const mjsGeom *geom = FindGeom(spec, name);
     int size = 0;
     const double *user = mjs_getDouble(geom->userdata, &size);

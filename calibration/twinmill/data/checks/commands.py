@@ -104,12 +104,24 @@ def check_drive(track: Track, model: native.Model, label: str) -> list[InputFind
             f"the commands are {DRIVEN_BY[told]}, and the model is driven by "
             f"{DRIVEN_BY[model.drive]}",
             f'the log says {told}, the model drive = "{model.drive}"',
-            "take a model of this robot, or import the commands that the model is driven by",
+            _other_commands(told, model.drive),
             True,
             label,
             track.robot_id,
         )
     ]
+
+
+def _other_commands(told: CommandKind, drive: str) -> str:
+    """What to do about commands of another kind than the model's; a twin's can be computed."""
+    remedy = "take a model of this robot, or import the commands that the model is driven by"
+    if (told, drive) != ("duty", "twist"):
+        return remedy
+    return (
+        f"{remedy}: in a log of twin_run vx_mps is speed_input times base.speed_per_input_mps, "
+        "omega_radps is turn_input times base.turn_per_input_radps, both in telemetry.csv of "
+        "twinmill export"
+    )
 
 
 def check_commands(
