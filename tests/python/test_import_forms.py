@@ -8,6 +8,7 @@ the format's own page or program.
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -151,3 +152,101 @@ def test_a_table_of_wheels_on_the_bench_is_told_with_its_way_out(tmp_path):
     path.write_text(f"duty_pct,left_rpm,right_rpm\n{rows}")
     with pytest.raises(LogError, match="bench test; it needs no import: give it to compare"):
         import_log(path, None, tmp_path / "o.lcmlog", options=ImportOptions(robot_id=1))
+
+
+MERGED_POSE = "/mocap/pose/pose"
+MERGED_TOLD = ["/cmd_vel/linear/x", "/cmd_vel/angular/z"]
+
+
+def _merged(first: str, names: dict[str, str] | None = None) -> tuple[pd.DataFrame, ...]:
+    """Poses at 25 Hz, commands at 20 Hz, and one table of both with commands filled forward.
+
+    Args:
+        first: topic whose row comes first where both have a stamp.
+        names: new ones of columns.
+    """
+    seen_s, told_s = START_S + np.arange(1000) / 25, START_S + np.arange(800) / 20
+    turn_rad = np.cumsum(np.full(1000, 0.3 / 25))
+    seen = {"position/x": np.sin(turn_rad), "position/y": np.cos(turn_rad), "position/z": 0.05}
+    seen |= {f"orientation/{axis}": 0.0 for axis in "xy"}
+    seen |= {"orientation/z": np.sin(turn_rad / 2), "orientation/w": np.cos(turn_rad / 2)}
+    poses = pd.DataFrame({f"{MERGED_POSE}/{k}": v for k, v in seen.items()} | {"__time": seen_s})
+    speeds = 0.1 + np.arange(800) // 50 / 100
+    commands = pd.DataFrame({"__time": told_s, MERGED_TOLD[0]: speeds, MERGED_TOLD[1]: 0.3})
+    both = [poses, commands] if first == "pose" else [commands, poses]
+    table = pd.concat(both).sort_values("__time", kind="stable")
+    table[MERGED_TOLD] = table[MERGED_TOLD].ffill()
+    table = table[["__time", *table.columns.drop("__time")]]
+    return poses, commands, table.rename(columns=names or {})
+
+
+OWN_NAMES = {"__time": "t_s", MERGED_TOLD[0]: "vx_mps", MERGED_TOLD[1]: "omega_radps"} | {
+    f"{MERGED_POSE}/{theirs}/{axis}": f"{ours}{axis}{unit}"
+    for theirs, ours, unit, axes in (("position", "", "_m", "xyz"), ("orientation", "q", "", "wxyz"))
+    for axis in axes
+}
+
+
+@pytest.mark.parametrize("first", ["pose", "command"])
+@pytest.mark.parametrize("names", [None, OWN_NAMES], ids=["paths", "own names"])
+def test_commands_filled_forward_make_no_lost_poses(tmp_path, first, names):
+    """pandas' `concat`, `sort_values` and `ffill`: what was put together comes out again."""
+    poses, commands, table = _merged(first, names)
+    path = tmp_path / "all.csv"
+    table.to_csv(path, index=False, float_format="%.7f")
+    options = ImportOptions(robot_id=1, same_clock=True)
+    said = import_log(path, path, tmp_path / "o.lcmlog", options=options)
+    robot = read_log(tmp_path / "o.lcmlog").robots[1]
+    assert len(robot.pose_t_s) == np.count_nonzero(robot.valid) == len(poses)
+    np.testing.assert_allclose(robot.pose[:, 0], poses[f"{MERGED_POSE}/position/x"], atol=1e-6)
+    told_s = commands["__time"] - START_S
+    held = np.searchsorted(robot.command_t_s, told_s + 1e-5) - 1
+    np.testing.assert_allclose(robot.command[held, 0], commands[MERGED_TOLD[0]], atol=1e-6)
+    changes = np.count_nonzero(np.diff(commands[MERGED_TOLD[0]]))
+    assert said["robots"][0]["command_changes"] == changes
+    assert not any("stamp" in w or "empty" in w or "cut" in w for w in said["warnings"])
+
+
+def test_lost_poses_of_a_table_of_frames_stay_lost(tmp_path):
+    """A row a frame, with the command in each: every tenth frame and one second were lost."""
+    poses, _, table = _merged("pose", OWN_NAMES)
+    frames = table[table.x_m.notna()].reset_index(drop=True)
+    lost = (frames.index % 10 == 9) | ((frames.index > 500) & (frames.index <= 525))
+    frames.loc[lost, ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"]] = np.nan
+    frames = frames[frames.vx_mps.notna()]
+    frames.to_csv(tmp_path / "all.csv", index=False, float_format="%.7f")
+    path, out = tmp_path / "all.csv", tmp_path / "o.lcmlog"
+    import_log(path, path, out, options=ImportOptions(robot_id=1, same_clock=True))
+    robot = read_log(out).robots[1]
+    assert len(robot.pose_t_s) == len(frames)
+    assert np.count_nonzero(~robot.valid) == np.count_nonzero(frames.x_m.isna())
+
+
+def test_rows_without_anything_are_lost_poses_and_no_commands(tmp_path):
+    """A tracker's row without a number, beside a table that lacks the sideways speed."""
+    poses, commands, _ = _merged("pose")
+    poses.loc[300:311, poses.columns.drop("__time")] = np.nan
+    table = pd.concat([poses, commands]).sort_values("__time", kind="stable")
+    path, out = tmp_path / "all.csv", tmp_path / "o.lcmlog"
+    table.to_csv(path, index=False, float_format="%.7f")
+    said = import_log(path, path, out, options=ImportOptions(robot_id=1, same_clock=True))
+    robot = read_log(out).robots[1]
+    assert len(robot.pose_t_s) == len(poses)
+    np.testing.assert_array_equal(np.flatnonzero(~robot.valid), np.arange(300, 312))
+    assert said["robots"][0]["command_rows"] == len(commands)
+    assert not any("empty" in w for w in said["warnings"])
+
+
+@pytest.mark.parametrize("topic", ["/mocap", "/mocap/pose", "mocap.pose"])
+def test_a_topic_of_a_table_is_named_whole_or_without_its_end(tmp_path, topic):
+    poses, _, table = _merged("command")
+    table[["/odom/pose/pose/position/x", "/odom/pose/pose/position/y"]] = 0.0
+    path, out = tmp_path / "all.csv", tmp_path / "o.lcmlog"
+    table.to_csv(path, index=False, float_format="%.7f")
+    options = ImportOptions(robot_id=1, same_clock=True, pose_topics=(topic,))
+    import_log(path, path, out, options=options)
+    got = read_log(out).robots[1].pose[:, 0]
+    np.testing.assert_allclose(got, poses[f"{MERGED_POSE}/position/x"], atol=1e-6)
+    with pytest.raises(LogError, match=r"no column is of the topic /mocap/twist"):
+        options = ImportOptions(robot_id=1, pose_topics=("/mocap/twist",))
+        import_log(path, path, tmp_path / "p.lcmlog", options=options)

@@ -105,6 +105,61 @@ def test_a_bag_is_listed_and_pairs_are_guessed_by_namespace(tmp_path):
     assert "--pose /r11/pose --command /r11/cmd_vel" in command
 
 
+def test_motion_capture_is_suggested_before_odometry_of_the_same_bag(tmp_path):
+    """A robot's /odom stands beside a tracker's /mocap/pose and a goal, all in a bag of rosbags."""
+    identity = T["geometry_msgs/msg/Quaternion"](x=0, y=0, z=0, w=1)
+    counts = {"/odom": 6, "/mocap/pose": 20, "/goal_pose": 30, "/cmd_vel": 20}
+    kinds = dict.fromkeys(counts, "geometry_msgs/msg/PoseStamped")
+    kinds |= {"/odom": "nav_msgs/msg/Odometry", "/cmd_vel": "geometry_msgs/msg/Twist"}
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for topic, count in counts.items():
+            kind = kinds[topic]
+            connection = writer.add_connection(topic, kind, typestore=STORE)
+            for k in range(count):
+                at_ns = START_S * 10**9 + k * 10**8
+                stamp = T["builtin_interfaces/msg/Time"](*divmod(at_ns, 10**9))
+                header = T["std_msgs/msg/Header"](stamp=stamp, frame_id="map")
+                place = T["geometry_msgs/msg/Point"](x=0.1 * k, y=0, z=0)
+                pose = T["geometry_msgs/msg/Pose"](position=place, orientation=identity)
+                zero = T["geometry_msgs/msg/Vector3"](x=0, y=0, z=0)
+                twist = T["geometry_msgs/msg/Twist"](linear=zero, angular=zero)
+                covered = T["geometry_msgs/msg/PoseWithCovariance"](pose, np.zeros(36))
+                told = T["geometry_msgs/msg/TwistWithCovariance"](twist, np.zeros(36))
+                message = {
+                    "/odom": lambda h=header, p=covered, t=told: T[kinds["/odom"]](h, "base", p, t),
+                    "/cmd_vel": lambda t=twist: t,
+                }.get(topic, lambda h=header, p=pose: T[kinds["/mocap/pose"]](h, p))()
+                writer.write(connection, at_ns, STORE.serialize_cdr(message, kind))
+    result = CliRunner().invoke(app, ["import", "--bag", str(tmp_path / "bag"), "--json"])
+    assert result.exit_code == 0, result.output
+    command = json.loads(result.output)["command"]
+    assert "--pose /mocap/pose --command /cmd_vel --robot-id 1" in command
+    for name in ("/mocap/pose", "/mocap"):
+        out = tmp_path / f"{len(name)}.lcmlog"
+        options = ImportOptions(robot_id=1, pose_topics=(name,), command_topics=("/cmd_vel",))
+        import_log(None, None, out, bag=tmp_path / "bag", options=options)
+        np.testing.assert_allclose(read_log(out).robots[1].pose[:, 0], 0.1 * np.arange(20))
+
+
+@pytest.mark.parametrize(
+    ("poses", "best"),
+    [
+        ({"/r1/odom": "nav_msgs/msg/Odometry", "/vicon/r1/r1": "TransformStamped"}, "/vicon/r1/r1"),
+        ({"/r1/odom": "nav_msgs/msg/Odometry", "/amcl_pose": "PoseWithCovarianceStamped"},
+         "/amcl_pose"),
+        ({"/r1/odom": "nav_msgs/msg/Odometry", "/r2/pose": "PoseStamped"}, "/r1/odom"),
+        ({"/r1/odom": "nav_msgs/msg/Odometry", "/r1/goal": "PoseStamped"}, "/r1/odom"),
+    ],
+    ids=["a tracker", "an estimate", "another robot", "a goal"],
+)  # fmt: skip
+def test_poses_are_suggested_by_type_and_name_odometry_last(poses, best):
+    topics = [Topic("/r1/cmd_vel", "geometry_msgs/msg/Twist", 100, "command")]
+    for name, kind in poses.items():
+        kind = kind if "/" in kind else f"geometry_msgs/msg/{kind}"
+        topics.append(Topic(name, kind, 1000 if "odom" in name else 100, "pose"))
+    assert guess_pairs(topics) == [(best, "/r1/cmd_vel")]
+
+
 def test_odometry_is_said_and_what_others_measured_is_guessed_before_it(tmp_path):
     """A robot counts its wheels 100 times a second; a camera sees it 20 times."""
     bag = _bag(tmp_path / "bag", StoragePlugin.SQLITE3)

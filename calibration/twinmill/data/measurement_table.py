@@ -128,6 +128,7 @@ class Table:
     factor: dict[str, float] = field(default_factory=dict)  # of columns in another unit
     zero: dict[str, float] = field(default_factory=dict)  # what stands for nothing, if not 0
     notes: list[str] = field(default_factory=list)  # sentences on how the file was read
+    constants: frozenset[str] = frozenset()  # columns that the file lacks, of one value
 
     def under(self, sources: dict) -> "Table":
         """The same cells under other names and in other units; columns that nobody names stay."""
@@ -142,7 +143,15 @@ class Table:
         )
         factor = {name: source.factor for name, source in sources.items()}
         zero = {name: source.zero for name, source in sources.items()}
-        return replace(self, header=[*sources, *rest], rows=rows, factor=factor, zero=zero)
+        constants = frozenset(name for name, source in sources.items() if not source.column)
+        return replace(
+            self,
+            header=[*sources, *rest],
+            rows=rows,
+            factor=factor,
+            zero=zero,
+            constants=constants,
+        )
 
     def has(self, *columns: str) -> bool:
         """Whether all these columns are there."""

@@ -411,13 +411,13 @@ def _of_other_topics(
             targets.setdefault(name, set()).update(USUAL[field][0] if field in USUAL else ())
     wanted = WANTED["poses" if "x_m" in known else "commands"]
     telling = [name for name, held in targets.items() if wanted <= held]
-    chosen = topic and _plain_topic(topic)
-    if chosen and chosen not in targets:
+    chosen = _named_topic(topic, fields) if topic else None
+    if topic and chosen is None:
         raise LogError(
             f"{table.name}: no column is of the topic {topic}; its topics are "
             f"{', '.join(f'/{name}' for name in targets) or 'none'}."
         )
-    if not chosen:
+    if chosen is None:
         asked = [name for name in telling if not WANTED["poses"] <= targets[name]]
         telling = telling if "x_m" in known else asked or telling
         if len(telling) > 1:
@@ -428,14 +428,29 @@ def _of_other_topics(
                 f"{option(of_pose, [f'/{telling[0]}'])}."
             )
         chosen = telling[0] if telling else None
-    if not chosen:
+    if chosen is None:
         return set()
     return {column for column, (name, _) in fields.items() if name not in ("", chosen)}
 
 
-def _plain_topic(topic: str) -> str:
-    """A topic as `field_of` has it."""
-    return "/".join(plain_name(word) for word in APART.split(topic) if word)
+def _named_topic(topic: str, fields: dict[str, tuple[str, str]]) -> str | None:
+    """A topic as `field_of` has it, which leaves out a `pose` that ends its name.
+
+    Args:
+        topic: its whole name, or that without its end; None is returned where it is not there.
+        fields: of the columns, as `field_of` has them.
+    """
+    told = _path(topic)
+    names = {_path(column): name for column, (name, field) in fields.items() if field in USUAL}
+    if told in names.values():
+        return told
+    whole = (name for path, name in names.items() if path.startswith(f"{told}/"))
+    return next((name for name in whole if told.startswith(name)), None)
+
+
+def _path(name: str) -> str:
+    """Words of a path in plain spelling."""
+    return "/".join(plain_name(word) for word in APART.split(name) if word)
 
 
 def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:

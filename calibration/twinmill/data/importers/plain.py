@@ -87,7 +87,8 @@ class Columns:
     def read(self, path: Path, known: frozenset[str]) -> Table:
         """The table under our names, rows that are no samples of what is known left out."""
         named = read_mapped(path, known, mapping=self.mapping, rename=self.rename, topic=self.topic)
-        return samples_of(named, known - OF_ALL, KNOWN - known)
+        loses = known == OF_POSES
+        return samples_of(named, known - OF_ALL, KNOWN - known, loses=loses)
 
     def of_robot(self, robot_id: int | None) -> "Columns":
         """The same for rows of one robot alone."""
@@ -187,7 +188,7 @@ def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
             called=called,
             mixed=kind == "duty" and not table.has(*VALUES["duty"]),
         )
-        for number, rows, notes, called in _by_robot(table, ids, utime_us, notes)
+        for number, rows, notes, called in _by_robot(table, ids, utime_us, notes, value)
     ]
 
 
@@ -499,11 +500,16 @@ def _check_passes(table: Table, rows: np.ndarray, stamps: np.ndarray, where: str
 
 
 def _by_robot(
-    table: Table, ids: np.ndarray, utime_us: np.ndarray, said: list[str]
+    table: Table,
+    ids: np.ndarray,
+    utime_us: np.ndarray,
+    said: list[str],
+    held: np.ndarray | None = None,
 ) -> Iterator[tuple[int, np.ndarray, list[str], str]]:
     """Each robot, its rows in order of time, each stamp once (the last row), what was done, a name.
 
     The first robot tells what was done with the whole table, too. The name is that in the table.
+    Of values that are held, (rows, columns), a row that repeats its neighbour loses nothing.
     """
     said = [*table.notes, *said]
     named = table.header.index("robot_id") if table.has("robot_id") else None
@@ -518,8 +524,12 @@ def _by_robot(
         most_s = -np.diff(stamps).min(initial=0) / 1e6
         earlier = f"{counted(late, 'row')} earlier than the row before, by {most_s:.3g} s at most"
         notes = [f"{where}{earlier}; sorted."] if late else []
-        if not last.all():
-            double = counted(np.count_nonzero(~last), "row repeats", "rows repeat")
+        lost = ~last
+        if held is not None and lost.any():
+            changed = np.diff(held[rows], axis=0).any(axis=1)
+            lost &= np.append(True, changed) & np.append(changed, True)
+        if lost.any():
+            double = counted(np.count_nonzero(lost), "row repeats", "rows repeat")
             notes.append(f"{where}{double} a stamp; the last of each was kept.")
         called = "" if named is None else table.rows[rows[0]][named].strip()
         yield number, rows[last], said + notes, called

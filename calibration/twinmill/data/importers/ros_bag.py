@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -67,6 +68,12 @@ CLOCK_FROM_ZERO_S = 60.0  # the least stamp of a clock that began at 0, which is
 FULL_DUTIES = (1.0, 100.0, 255.0)
 SIDES = {2: "left, right", 4: "front left, front right, rear left, rear right"}
 OF_BASE = re.compile(r"base(_link|_footprint)?$")
+OF_TRACKER = re.compile(
+    r"mocap|motion_?capture|vicon|optitrack|natnet|vrpn|qualisys|ground_?truth", re.IGNORECASE
+)
+OF_ODOMETRY = re.compile(r"odom", re.IGNORECASE)
+OF_GOAL = re.compile(r"(^|_)(goal|target|setpoint|waypoint|desired)(_|$)", re.IGNORECASE)
+MESSAGE_NAMES = ("pose", "transform", "twist", "drive")  # that tables leave out of topics' names
 OF_CAMERA = re.compile(r"camera|optical|(^|_)cam(_|$)")  # frames whose z is ahead, not up
 
 
@@ -185,6 +192,7 @@ def _parts(kind: str, message: object) -> Iterator[str]:
 def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
     """Pose and command topic of each robot: of one name; the one with most messages, or stamped.
 
+    What a tracker measured comes before what the robot estimates, and odometry last, by `_Origin`.
     Where nothing is a command, what odometry measured stands in, beside its own poses if there are
     no others. Poses without either have an empty name as their command.
     """
@@ -193,7 +201,8 @@ def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
     if not all_commands:
         poses = [t for t in topics if t.role == "pose"]
         all_commands = [t for t in poses if t.kind == ODOMETRY]
-        topics = [t for t in poses if t.kind != ODOMETRY] or poses
+        apart = (_Origin.GOAL, _Origin.ODOMETRY)
+        topics = [t for t in poses if _origin(t) not in apart] or poses
         if not all_commands:
             robots = sorted({t.robot for t in poses})
             own = ([t for t in poses if t.robot == robot] for robot in robots)
@@ -205,10 +214,14 @@ def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
             t
             for t in topics
             if t.role == "pose"
-            and (t.robot == robot or len(robots) == 1 or _is_tag_of(t, commands[0].name))
+            and (
+                robot in (t.robot, *_words(t.name))
+                or len(robots) == 1
+                or _is_tag_of(t, commands[0].name)
+            )
         ]
         if poses:
-            best = max(poses, key=lambda t: (t.robot == robot, *_likely(t)))
+            best = max(poses, key=lambda t: _likely(t, robot))
             told = max(commands, key=lambda t: (t.count, t.kind.endswith("Stamped")))
             pairs.append((best.name, told.name))
     return pairs
@@ -220,16 +233,45 @@ def _is_tag_of(topic: Topic, command: str) -> bool:
     return of_tag and _told(topic.name.rpartition(":")[2], "", {}) == _told("", command, {})
 
 
-def _likely(topic: Topic) -> tuple[bool, bool, bool, bool, int]:
-    """Topics of their own before frames, what others measured before what the robot estimates.
+class _Origin(IntEnum):
+    """Where poses come from, by how well they judge a robot."""
 
-    Then frames of a base before wheels, then the most messages.
+    GOAL = 0
+    FRAME = 1
+    ODOMETRY = 2
+    ESTIMATE = 3
+    MEASURED = 4
+    TRACKER = 5
 
-    Of fixed frames only the base itself counts: sensors are often called after what carries them.
+
+def _origin(topic: Topic) -> _Origin:
+    """By name and type: goals are PoseStamped, too, and trackers may send odometry."""
+    if OF_TRACKER.search(topic.name):
+        return _Origin.TRACKER
+    if topic.kind in MANY:
+        return _Origin.FRAME
+    if OF_GOAL.search(topic.name.rpartition("/")[2]):
+        return _Origin.GOAL
+    if topic.kind == ODOMETRY or OF_ODOMETRY.search(topic.name):
+        return _Origin.ODOMETRY
+    return _Origin.ESTIMATE if topic.kind in ESTIMATES else _Origin.MEASURED
+
+
+def _likely(topic: Topic, robot: str | None = None) -> tuple[bool, _Origin, bool, bool, bool, int]:
+    """Poses of no other number first, then by origin, those in the robot's own namespace.
+
+    Then frames of a base before wheels, then the most messages. Of fixed frames only the base
+    itself counts: sensors are often called after what carries them.
+
+    Args:
+        topic: one of poses.
+        robot: word that tells the robot; None: any.
     """
+    origin = _origin(topic)
+    numbers = [_told(name, "", {}) for name in (topic.name, robot or "")]
+    own = origin == _Origin.TRACKER or None in numbers or numbers[0] == numbers[1]
     base = OF_BASE.search(topic.name) if topic.fixed else "base" in topic.name
-    measured = topic.kind not in ESTIMATES
-    return topic.kind not in MANY, measured, bool(base), not topic.fixed, topic.count
+    return own, origin, topic.robot == robot, bool(base), not topic.fixed, topic.count
 
 
 def numbering(pairs: list[tuple[str, str]]) -> dict[str, Any]:
@@ -576,7 +618,7 @@ def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
     frames, with_frames = Frames(), any(":" in topic for topic, _ in topics)
     with _open(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
-        names = [topic.partition(":")[0] for topic, _ in topics]
+        names = [_in_bag(topic.partition(":")[0], role, kinds) for topic, role in topics]
         if missing := [name for name in names if name not in kinds]:
             raise LogError(
                 f"{path.name}: has no topic {missing[0]}; it has {', '.join(sorted(kinds))}."
@@ -639,6 +681,15 @@ def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
             )
         raise LogError(f"{path.name}: {topic} holds nothing; choose another.")
     return found
+
+
+def _in_bag(name: str, role: str, kinds: dict[str, str]) -> str:
+    """A topic's whole name, where it was told without its end, as tables of several topics do."""
+    if name in kinds:
+        return name
+    ends = (f"{name.rstrip('/')}/{word}" for word in MESSAGE_NAMES)
+    whole = [end for end in ends if kinds.get(end) in VALUES[role]]
+    return whole[0] if len(whole) == 1 else name
 
 
 def _shown(path: Path, count: int, messages: Iterator) -> Iterator:
