@@ -182,7 +182,10 @@ def _merged(first: str, names: dict[str, str] | None = None) -> tuple[pd.DataFra
 
 OWN_NAMES = {"__time": "t_s", MERGED_TOLD[0]: "vx_mps", MERGED_TOLD[1]: "omega_radps"} | {
     f"{MERGED_POSE}/{theirs}/{axis}": f"{ours}{axis}{unit}"
-    for theirs, ours, unit, axes in (("position", "", "_m", "xyz"), ("orientation", "q", "", "wxyz"))
+    for theirs, ours, unit, axes in (
+        ("position", "", "_m", "xyz"),
+        ("orientation", "q", "", "wxyz"),
+    )
     for axis in axes
 }
 
