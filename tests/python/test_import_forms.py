@@ -193,7 +193,7 @@ OWN_NAMES = {"__time": "t_s", MERGED_TOLD[0]: "vx_mps", MERGED_TOLD[1]: "omega_r
 @pytest.mark.parametrize("first", ["pose", "command"])
 @pytest.mark.parametrize("names", [None, OWN_NAMES], ids=["paths", "own names"])
 def test_commands_filled_forward_make_no_lost_poses(tmp_path, first, names):
-    """pandas' `concat`, `sort_values` and `ffill`: what was put together comes out again."""
+    """Tables by pandas' `concat`, `sort_values` and `ffill`: what was put together comes out again."""
     poses, commands, table = _merged(first, names)
     path = tmp_path / "all.csv"
     table.to_csv(path, index=False, float_format="%.7f")
@@ -212,7 +212,7 @@ def test_commands_filled_forward_make_no_lost_poses(tmp_path, first, names):
 
 def test_lost_poses_of_a_table_of_frames_stay_lost(tmp_path):
     """A row a frame, with the command in each: every tenth frame and one second were lost."""
-    poses, _, table = _merged("pose", OWN_NAMES)
+    _, _, table = _merged("pose", OWN_NAMES)
     frames = table[table.x_m.notna()].reset_index(drop=True)
     lost = (frames.index % 10 == 9) | ((frames.index > 500) & (frames.index <= 525))
     frames.loc[lost, ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"]] = np.nan

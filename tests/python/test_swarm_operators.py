@@ -90,6 +90,24 @@ def test_a_start_says_what_the_robot_has_signed_since_and_not_what_it_said_befor
     assert (since.link_timeout_s, since.untethered) == (2.0, False)
 
 
+def test_a_robot_that_fell_silent_in_the_countdown_is_not_told_to_stand(monkeypatch):
+    """It was told as it had been when it accepted, eleven seconds after its last packet."""
+    fleet = fleet_of(known := robot(1))
+
+    def accept(_, command, *__, **___):
+        ack = turbopi.signed_ack_t()
+        ack.session, ack.accepted, ack.verb = SESSION, True, command.verb
+        ack.command_utime_us, known.signed_acks[command.seq] = command.utime_us, ack
+        known.heard_s -= 60
+
+    monkeypatch.setattr(Fleet, "send_signed", accept)
+    monkeypatch.setattr(tell, "stop", lambda *_, **__: [])
+    begun = tell.start(fleet, {1}, "", ahead_s=0.4, partial=False)
+    (told,) = begun.answers
+    assert begun.called_off and told.accepted
+    assert not told.stands and told.last_heard_s > 50
+
+
 def test_no_start_leaves_it_to_a_robots_file_how_long_it_needs_no_operator(monkeypatch):
     """Its `link_timeout_ms` may be 0: it would drive on once the link is lost, unasked."""
     fleet, sent = fleet_of(robot(1)), []

@@ -2,6 +2,7 @@
 """`twinmill swarm`: sentence, exit code and JSON say one thing, whatever robots answered."""
 
 import json
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -91,8 +92,15 @@ SENTENCES = [
     (of_stop([UNHEARD]), "NOT ALL STAND: R05: no stop was confirmed.", 1),
     (of_arm([GOOD]), "All are armed.", 0),
     (of_arm([REFUSED, GOOD]), "Not all are armed: R03", 1),
+    (of_arm([DOUBLE, GOOD]), "Not all are armed: R07: two robots have this number", 1),
     (of_select([GOOD], "milling"), "All chose milling.", 0),
+    (of_select([DOUBLE, GOOD], "milling"), "Not all did: R07: two robots have this number", 1),
     (of_select([REFUSED, GOOD], "dance"), "Not all did: R03 did not obey", 1),
+    (
+        of_start(begun(replace(GOOD, accepted=False, reason="no behaviour 'mlling'"), REFUSED)),
+        "NOBODY STARTED: R01, R03 refused",
+        1,
+    ),
     (of_start(begun(GOOD)), "Started at", 0),
     (of_start(begun(SHORT)), "Started at", 0),
     (of_start(begun(LOOSE)), "Started at", 1),

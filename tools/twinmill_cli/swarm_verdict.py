@@ -207,20 +207,27 @@ def _then(s: float, ahead_s: float) -> str:
 
 def of_arm(given: list[Answer]) -> Verdict:
     """Who may be started."""
-    wrong = _disobeyed(given)
-    if wrong:
-        words = f"Not all are armed: {_names(wrong)} did not obey{_because(wrong)}."
-        return Verdict(False, words)
-    return Verdict(True, "All are armed.")
+    wrong = _wrong(given)
+    return (
+        Verdict(False, f"Not all are armed: {wrong}.") if wrong else Verdict(True, "All are armed.")
+    )
 
 
 def of_select(given: list[Answer], behavior: str) -> Verdict:
     """Who does what was chosen."""
-    wrong = _disobeyed(given)
+    wrong = _wrong(given)
     if wrong:
-        words = f"Not all did: {_names(wrong)} did not obey{_because(wrong)}{_hint(given)}."
-        return Verdict(False, words)
+        return Verdict(False, f"Not all did: {wrong}{_hint(given)}.")
     return Verdict(True, f"All chose {behavior}.")
+
+
+def _wrong(given: list[Answer]) -> str:
+    """Who did not obey, or is two of whom one may not have; empty where all did."""
+    double = [a for a in given if a.is_double]
+    wrong = [a for a in _disobeyed(given) if a not in double]
+    told = [f"{_names(wrong)} did not obey{_because(wrong)}"] if wrong else []
+    told += [f"{_names(double)}: two robots have this number, one may not obey"] if double else []
+    return "; ".join(told)
 
 
 def of_start(begun: Start) -> Verdict:
@@ -233,6 +240,11 @@ def of_start(begun: Start) -> Verdict:
     standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
     if len(standing) == len(given):
         return Verdict(False, _of_nobody(begun, at))
+    if all(a.accepted is False for a in given):
+        going = [a for a in given if a not in standing]
+        verb = "goes" if len(going) == 1 else "go"
+        words = f"NOBODY STARTED: {_why(given)}. {_names(going)} {verb} on as before this start."
+        return Verdict(False, words)
     late = {a.robot_id for a in begun.late}
     idle = [a for a in standing if a.robot_id not in late]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING]

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import turbopi
@@ -447,8 +447,12 @@ def start(
     }
     if not called_off:
         fleet.listen(OTHERS_S, lambda: _all_say_how_long(fleet, command, robots))
-    # An answer that came after the start was called off does not tell why it was.
-    final = given if called_off else answers(fleet, command, robots)
+    final = answers(fleet, command, robots)
+    if called_off:  # an answer that came after that does not tell why it was
+        final = [
+            replace(now, accepted=a.accepted, signed=a.signed, reason=a.reason)
+            for now, a in zip(final, given, strict=True)
+        ]
     begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out)
     return Start(*begun, link_timeout_ms)
 
