@@ -193,7 +193,7 @@ OWN_NAMES = {"__time": "t_s", MERGED_TOLD[0]: "vx_mps", MERGED_TOLD[1]: "omega_r
 @pytest.mark.parametrize("first", ["pose", "command"])
 @pytest.mark.parametrize("names", [None, OWN_NAMES], ids=["paths", "own names"])
 def test_commands_filled_forward_make_no_lost_poses(tmp_path, first, names):
-    """Tables by pandas' `concat`, `sort_values` and `ffill`: what was put together comes out again."""
+    """Made by pandas' `concat`, `sort_values` and `ffill`: what was joined comes out again."""
     poses, commands, table = _merged(first, names)
     path = tmp_path / "all.csv"
     table.to_csv(path, index=False, float_format="%.7f")

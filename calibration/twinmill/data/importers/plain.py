@@ -188,7 +188,7 @@ def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
             called=called,
             mixed=kind == "duty" and not table.has(*VALUES["duty"]),
         )
-        for number, rows, notes, called in _by_robot(table, ids, utime_us, notes, value)
+        for number, rows, notes, called in _by_robot(table, ids, utime_us, notes, held=value)
     ]
 
 
@@ -504,6 +504,7 @@ def _by_robot(
     ids: np.ndarray,
     utime_us: np.ndarray,
     said: list[str],
+    *,
     held: np.ndarray | None = None,
 ) -> Iterator[tuple[int, np.ndarray, list[str], str]]:
     """Each robot, its rows in order of time, each stamp once (the last row), what was done, a name.

@@ -65,7 +65,8 @@ def _between(table: Table, sampled: np.ndarray, rest: np.ndarray) -> bool:
 
     Args:
         table: with our names.
-        sampled, rest: (rows,) bool, samples and the rows in question.
+        sampled: (rows,) bool, the samples.
+        rest: (rows,) bool, the rows in question.
     """
     try:
         t_s = table.seconds("t_s")
