@@ -101,6 +101,7 @@ SENTENCES = [
         "NOBODY STARTED: R01, R03 refused",
         1,
     ),
+    (of_start(begun(SHORT, replace(LOOSE, accepted=False))), "Started at", 1),
     (of_start(begun(GOOD)), "Started at", 0),
     (of_start(begun(SHORT)), "Started at", 0),
     (of_start(begun(LOOSE)), "Started at", 1),
@@ -206,6 +207,15 @@ SENTENCES = [
 def test_each_sentence_has_its_code(verdict, begins, code):
     assert verdict.sentence.startswith(begins)
     assert verdict.code == code and verdict.ok == (code == 0)
+
+
+def test_who_refused_a_start_and_drives_drives_for_somebody_else():
+    """An examiner was told that a start of a mistyped behaviour had taken over."""
+    told = of_start(
+        begun(SHORT, answer(3, accepted=False, reason="no behaviour 'mlling'"))
+    ).sentence
+    assert "refused it (no behaviour 'mlling'): R03 goes on as before this start" in told
+    assert "without having confirmed" not in told
 
 
 def test_a_fault_is_told_apart_from_driving():

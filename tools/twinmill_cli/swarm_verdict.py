@@ -240,20 +240,20 @@ def of_start(begun: Start) -> Verdict:
     standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
     if len(standing) == len(given):
         return Verdict(False, _of_nobody(begun, at))
+    going = [a for a in given if a.accepted is False and a.mode in DRIVING]
     if all(a.accepted is False for a in given):
-        going = [a for a in given if a not in standing]
-        verb = "goes" if len(going) == 1 else "go"
-        words = f"NOBODY STARTED: {_why(given)}. {_names(going)} {verb} on as before this start."
+        words = f"NOBODY STARTED: {_why(given)}. {_as_before(going or faulty)}."
         return Verdict(False, words)
     late = {a.robot_id for a in begun.late}
     idle = [a for a in standing if a.robot_id not in late]
-    unsure = [a for a in _disobeyed(given) if a.mode in DRIVING]
+    unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
     told = [
         f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
         if faulty
         else "",
         f"{_names(idle)} did not{_because(idle)}" if idle else "",
         f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
+        f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
         *_odd_links(begun),
     ]
@@ -266,6 +266,11 @@ def of_start(begun: Start) -> Verdict:
     return Verdict(False, words)
 
 
+def _as_before(given: list[Answer]) -> str:
+    """Who refused a start while it drove, for whomever that is."""
+    return f"{_names(given)} {'goes' if len(given) == 1 else 'go'} on as before this start"
+
+
 def _going_on(begun: Start) -> str:
     """How robots that drive stop, as was asked for, and who has not signed that yet."""
     if begun.link_timeout_ms == 0:
@@ -273,7 +278,8 @@ def _going_on(begun: Start) -> str:
     else:
         words = "Ctrl-C stops them; they stop by themselves "
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
-    waiting = [a for a in begun.answers if a.mode in DRIVING and a.link_timeout_s is None]
+    taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
+    waiting = [a for a in taken if a.link_timeout_s is None]
     return f"{words}{f', which {_names(waiting)} has not signed yet' if waiting else ''}."
 
 

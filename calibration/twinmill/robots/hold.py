@@ -92,13 +92,11 @@ class Held:
     """
 
     def __init__(self, fleet: Fleet, begun: Start):
-        """Takes all of them that have signed that they start, or drive all the same."""
+        """Takes all of them that have signed that they start, or drive and have not refused it."""
         self._fleet = fleet
         known = [fleet.robots[a.robot_id] for a in begun.answers if a.robot_id in fleet.robots]
-        accepted = {a.robot_id for a in begun.answers if a.accepted and a.signed}
-        self.robots = [
-            r for r in known if r.link and (r.robot_id in accepted or r.mode != "stopped")
-        ]
+        signed = {a.robot_id: bool(a.accepted) for a in begun.answers if a.signed}
+        self.robots = [r for r in known if r.link and signed.get(r.robot_id, r.mode != "stopped")]
         self._sessions = {
             r.robot_id: begun.sessions.get(r.robot_id, r.link.session) for r in self.robots
         }
