@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is printed when a command to the swarm has ended."""
+"""Prints how a command to the swarm ended: table, sentence or JSON."""
 
 from __future__ import annotations
 
