@@ -56,7 +56,8 @@ def _base_left(robot: RobotModel) -> list[Left]:
     """What such controllers do not know of the base."""
     why = "ros2_control has no place for it"
     left = robot.base_left(why, "ros2_control has its top speeds alone")
-    if missing := [way for way in _axes(robot).values() if way not in limits_of(robot).body]:
+    known = limits_of(robot).body
+    if missing := [way for way in _axes(robot).values() if way not in known]:
         so = f"the controller has no limit of speed ({', '.join(missing)})"
         left.append(top_speed_left(robot, so))
     forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")

@@ -79,8 +79,7 @@ def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     found: list[tuple[Kernel, float]] = []
     prior = 0.0
     while len(found) < MOST:
-        beside = _white(view, found)
-        own = evidence(h, view, bare if beside is None else bare.with_columns(beside))
+        own = evidence(h, view, bare.with_columns(_white(view, found)))
         forms = np.array(
             [sum(k.depends_on == kernel.depends_on for k in p.kernels) for kernel in p.kernels]
         )
@@ -99,11 +98,11 @@ def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     return _Grown(found, let_in.after(there), total, view.fitter.noise)
 
 
-def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray | None:
+def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     """(K, R) white columns of kernels at their sizes."""
     size = {k.name: s for k, s in found}
     own = [size[k.name] * view.white(f) for f, k in enumerate(view.kernels) if k.name in size]
-    return np.concatenate(own) if own else None
+    return np.concatenate([view.stacked[:0], *own])
 
 
 def _conditioned(p: Problem, h: Hypothesis, grown: _Grown) -> Always:
@@ -113,9 +112,7 @@ def _conditioned(p: Problem, h: Hypothesis, grown: _Grown) -> Always:
     labels = [*h.labels, *(label for k in there for label in weight_labels(k))]
     lasting = {label for k in there if k.lasting for label in weight_labels(k)}
     view = p.view(grown.noise)
-    linear = h.linear(view.fitter.whiten)
-    if there:
-        linear = linear.with_columns(_white(view, grown.kernels))
+    linear = h.linear(view.fitter.whiten).with_columns(_white(view, grown.kernels))
     weights = len(labels) - len(h.labels)
     root = block_diag(np.linalg.cholesky(h.cov), np.eye(weights))
     mean = np.r_[h.mean, np.zeros(weights)] + root @ linear.mean

@@ -87,7 +87,9 @@ class Linear:
         return self.y - self.mean @ self.x
 
     def with_columns(self, more: np.ndarray) -> "Linear":
-        """The model with more columns (K, R)."""
+        """The model with more columns (K, R); itself with none."""
+        if not len(more):
+            return self
         x, cross = np.concatenate([self.x, more]), more @ self.basis.T
         try:
             own = np.linalg.cholesky(_with_prior(more @ more.T - cross @ cross.T))

@@ -140,7 +140,7 @@ class Search:
         return grown
 
     def _fitted(self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float) -> Hypothesis:
-        """From the linear start, and where the effect may be bent from its default strength too."""
+        """From the linear start, and where the effect may be bent from another size, too."""
         fitter = self.view.fitter
         found = fitter.with_effect(h, c, start, grid=grid)
         if c.masks is not None or c.fixed is not None:

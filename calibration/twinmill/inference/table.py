@@ -189,10 +189,7 @@ class _Comparison:
         for other in self._others(usual):
             out += [self._alone(other), *self._with_words(other, self._evidence(other))]
         if whole:
-            cov = self.h.cov.copy()
-            count = len(self.problem.prior.mean)
-            cov[:count, :count] = self.problem.prior.stale
-            stale, _ = self._moments(cov)
+            stale, _ = self._moments(self._stale_cov)
             of_stale = self._evidence(stale)
             out += [self._alone(stale), *self._with_words(stale, of_stale)]
             for first in (news, self._likeliest(usual, own)):
@@ -310,15 +307,25 @@ class _Comparison:
         return evidence(self.h, self.view, self._linear(beside), beside.cov)
 
     def _linear(self, beside: _Beside) -> Linear:
-        bare = self._bare(beside.cov)
-        return bare.with_columns(beside.white) if len(beside.white) else bare
+        return self._bare(beside.cov).with_columns(beside.white)
 
     def _bare(self, cov: np.ndarray | None) -> Linear:
-        return self._known if cov is None else self.h.linear(self.view.fitter.whiten, cov)
+        return self._known if cov is None else self._stale
 
     @cached_property
     def _known(self) -> Linear:
         return self.h.linear(self.view.fitter.whiten)
+
+    @cached_property
+    def _stale(self) -> Linear:
+        return self.h.linear(self.view.fitter.whiten, self._stale_cov)
+
+    @cached_property
+    def _stale_cov(self) -> np.ndarray:
+        """(N, N) of the prior, the base's numbers as a data sheet knows them."""
+        cov, count = self.h.cov.copy(), len(self.problem.prior.mean)
+        cov[:count, :count] = self.problem.prior.stale
+        return cov
 
     def _alone(self, beside: _Beside) -> Entry:
         """The entry with no more than what is beside."""
