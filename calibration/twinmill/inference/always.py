@@ -4,16 +4,18 @@
 A fitted base is of another form than the robot. What it leaves in its own log (effects that a fit
 of the base's numbers leaves out, a coupling of turns, a slow wander, single moments) is no news in
 the next one. It is found by the same evidence that judges later logs: the likeliest set of effects,
-then kernel after kernel while the posterior odds rise. It enters
-their prior: a function of speed, heading or the past with its weights, one of time or place with
-its size alone (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
+then kernel after kernel while the posterior odds rise. It enters their prior: a function of speed,
+heading or the past with its weights, one of time or place with its size alone, and with the
+probability of each size, so that a wander too small to be sure of here is half expected there
+(Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
+from scipy.special import logsumexp
 
 from twinmill.data.measurement import Measurement
 from twinmill.inference import moments
@@ -59,10 +61,13 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     p = problem_of(measurements, model_file, sheet=True)
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
-    noise = noise_of(h, p)
-    noises = [p.noise, replace(noise, weight=p.noise.weight)]
-    best = max((_grown(p, h, p.view(n)) for n in noises), key=lambda g: g.log_evidence)
-    return _conditioned(p, h, best)
+    first = _grown(p, h, p.view(p.noise))
+    beside = [size * kernel.columns for kernel, size in first.kernels]
+    noises = noise_of(h, p), noise_of(h, p, np.concatenate([p.kernels[0].columns[:0], *beside]))
+    each = [first, *(_grown(p, h, p.view(n)) for n in noises)]
+    words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
+    wander = {word: _sizes(p, h, each, word) for word in words}
+    return _conditioned(p, h, max(each, key=lambda g: g.log_evidence), wander)
 
 
 def _lasts(effects: tuple[str, ...]) -> bool:
@@ -74,16 +79,12 @@ def _lasts(effects: tuple[str, ...]) -> bool:
 
 
 def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
-    words = len({k.depends_on for k in p.kernels}) + 1
     linear = bare = h.linear(view.fitter.whiten)
     found: list[tuple[Kernel, float]] = []
     prior = 0.0
     while len(found) < MOST:
         own = evidence(h, view, bare.with_columns(_white(view, found)))
-        forms = np.array(
-            [sum(k.depends_on == kernel.depends_on for k in p.kernels) for kernel in p.kernels]
-        )
-        odds = PRIORS.outside / words / forms[:, None] * CHANCE
+        odds = np.array([[_odds(p, k, s) for s in SIZES] for k in p.kernels])
         gains = own.gains + np.log(odds)
         f, s = np.unravel_index(gains.argmax(), gains.shape)
         linear = own.linear
@@ -92,10 +93,20 @@ def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
         prior += float(np.log(odds[f, s]))
         found.append((p.kernels[f], float(SIZES[s])))
     let_in = moments.find(linear, *view.moments, WORTH)
-    there = PRIORS.outside / words
+    there = PRIORS.outside / _count_words(p)
     of_moments = let_in.log_evidence(Rate(there))
     total = linear.log_evidence + prior + of_moments - view.log_size
     return _Grown(found, let_in.after(there), total, view.fitter.noise)
+
+
+def _odds(p: Problem, kernel: Kernel, size: float) -> float:
+    """Prior odds of a kernel with a size."""
+    forms = sum(k.depends_on == kernel.depends_on for k in p.kernels)
+    return float(PRIORS.outside / _count_words(p) / forms * CHANCE[size == SIZES][0])
+
+
+def _count_words(p: Problem) -> int:
+    return len({k.depends_on for k in p.kernels}) + 1  # and moments
 
 
 def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
@@ -105,7 +116,23 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     return np.concatenate([view.stacked[:0], *own])
 
 
-def _conditioned(p: Problem, h: Hypothesis, grown: _Grown) -> Always:
+def _sizes(p: Problem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.ndarray:
+    """(S,) posterior probabilities of the sizes of a dependence, each under its best noise."""
+    none, some = [], []
+    at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
+    for grown in each:
+        view = p.view(grown.noise)
+        rest = [(k, size) for k, size in grown.kernels if k.depends_on != word]
+        linear = h.linear(view.fitter.whiten).with_columns(_white(view, rest))
+        own = evidence(h, view, linear)
+        none.append(own.alone - view.log_size + sum(np.log(_odds(p, k, s)) for k, s in rest))
+        some.append(none[-1] + logsumexp(own.gains[at], axis=0) - np.log(len(at)))
+    there = PRIORS.outside / _count_words(p)
+    logs = np.r_[np.log(1 - there) + max(none), np.log(there * CHANCE) + np.max(some, axis=0)]
+    return np.exp(logs - logsumexp(logs))[1:]
+
+
+def _conditioned(p: Problem, h: Hypothesis, grown: _Grown, wander: dict[str, np.ndarray]) -> Always:
     """The base's and the effects' numbers and the lasting weights, given the base's own log."""
     size = {k.name: s for k, s in grown.kernels}
     there = [k for k in p.kernels if k.name in size]
@@ -126,8 +153,9 @@ def _conditioned(p: Problem, h: Hypothesis, grown: _Grown) -> Always:
         mean=mean[kept],
         cov=cov[np.ix_(kept, kept)],
         kernels=tuple(size.items()),
+        wander=wander,
         rate=grown.rate,
         usual=p.motion.usual,
         top=p.motion.top,
-        noise=np.array([noise.sensor, noise.drive, noise.memory_s]),
+        noise=np.exp(noise.logs),
     )

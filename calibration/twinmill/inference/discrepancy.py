@@ -18,7 +18,7 @@ from twinmill.inference.steps import Motion
 SIZES = np.array([0.01, 0.03, 0.1, 0.3])  # from barely seen to a third of the way, relative
 CHANCE = np.array([0.6, 0.25, 0.1, 0.05])  # that a dependence has each: small ones are common
 STEP = float(np.sqrt(SIZES[1] / SIZES[0]))  # half the distance of two sizes, as a factor
-GROWS = 1.01 * STEP**2  # times its size in one log, up to which a wander is as usual: one distance
+GROWS = 1.01 * STEP**2  # times its size in one log, that a wander may have in another: one distance
 # Chance that the relative error of a formula has each: an exponential distribution, of those with a
 # known mean the one that says least; the rest is too small to be seen, or too large for a formula.
 BINS = np.r_[SIZES[0] / STEP, np.sqrt(SIZES[1:] * SIZES[:-1]), SIZES[-1] * STEP]
@@ -44,6 +44,12 @@ class Kernel:
     name: str
     columns: np.ndarray = field(repr=False)
     lasting: bool
+
+
+def in_another_log(own: np.ndarray) -> np.ndarray:
+    """(S,) probabilities of the sizes of a robot's wander in a log, from (S,) those in its own."""
+    up_to = (GROWS * SIZES[:, None] >= SIZES) * CHANCE
+    return own @ (up_to / up_to.sum(axis=1, keepdims=True))
 
 
 def kernels(m: Motion) -> list[Kernel]:

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotrs
 
 
 def log_evidence(y: np.ndarray, x: np.ndarray) -> float:
@@ -117,10 +118,11 @@ def gains_by_size(gram: np.ndarray, push: np.ndarray, sizes) -> tuple[np.ndarray
         push: (K,) their products with y.
         sizes: (S,).
     """
-    values, ways = np.linalg.eigh(gram)
-    values, push2 = np.maximum(values, 0.0), (ways.T @ push) ** 2
-    size2 = np.square(sizes)[:, None]
-    lift = 1 + size2 * values
-    gains = 0.5 * np.sum(size2 * push2 / lift, axis=1) - 0.5 * np.log(lift).sum(axis=1)
-    falls = np.sum(size2 * push2 / lift * (1 + 1 / lift), axis=1)
-    return gains, falls
+    size2, diagonal = np.square(sizes), np.diag_indices(len(gram))
+    each = size2[:, None, None] * gram
+    each[:, *diagonal] += 1.0
+    low = np.linalg.cholesky(each)
+    solved = np.array([dpotrs(factor.T, push)[0] for factor in low])
+    along = solved @ push
+    gains = 0.5 * size2 * along - np.log(np.diagonal(low, axis1=1, axis2=2)).sum(axis=1)
+    return gains, size2 * (along + (solved**2).sum(axis=1))

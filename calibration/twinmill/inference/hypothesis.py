@@ -147,7 +147,7 @@ class Fitter:
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """(..., 3 W) of (..., W, 3)."""
-        return self.noise.whiten(rows, self.steps.stretches)
+        return self.noise.whiten(rows)
 
     def fit(self, h: Hypothesis, rounds: int = ROUNDS, known: int = 0) -> Hypothesis:
         """Levenberg and Marquardt from its numbers; so many of the first slopes are kept."""

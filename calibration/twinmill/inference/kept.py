@@ -36,6 +36,7 @@ def kept(model_file: ModelFile) -> Always | None:
             mean=np.array(table["mean"], float),
             cov=low @ low.T,
             kernels=tuple((str(name), float(size)) for name, size in table["kernels"].items()),
+            wander={str(word): np.array(p, float) for word, p in table["wander"].items()},
             rate=Rate(**table["rate"]),
             usual=np.array(table["usual"], float),
             top=np.array(table["top"], float),
@@ -57,6 +58,7 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
     document.setdefault("fit", tomlkit.table())["always"] = {
         "effects": list(always.effects),
         "kernels": dict(always.kernels),
+        "wander": {word: _short(p) for word, p in always.wander.items()},
         "rate": {k: _short([getattr(always.rate, k)])[0] for k in ("there", "on", "off")},
         "usual": _short(always.usual),
         "top": _short(always.top),

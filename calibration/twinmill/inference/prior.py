@@ -43,9 +43,11 @@ class Always:
             of them.
         mean, cov: (N,), (N, N) of these.
         kernels: name and size of each kernel of the discrepancy.
+        wander: probabilities of each of SIZES, by dependence whose function holds for one log alone;
+            the rest is that of none.
         rate: of moments.
         usual, top: scale of the kernels, see `Motion`.
-        noise: (3, 3) sensor, drive, memory of each channel, see `Noise`.
+        noise: (4, 3) sensor, drive, gain, memory of each channel, see `Noise`.
     """
 
     effects: tuple[str, ...]
@@ -53,6 +55,7 @@ class Always:
     mean: np.ndarray
     cov: np.ndarray
     kernels: tuple[tuple[str, float], ...]
+    wander: dict[str, np.ndarray]
     rate: Rate
     usual: np.ndarray
     top: np.ndarray

@@ -16,7 +16,7 @@ from twinmill.inference.duties import refined
 from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.moments import Rate
-from twinmill.inference.noise import Noise, first_noise, fit_noise, weights_of
+from twinmill.inference.noise import Course, Noise, first_noise, fit_noise, weights_of
 from twinmill.inference.prior import Always, Prior, base_prior, with_always
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
@@ -41,7 +41,7 @@ class View:
         parts: of each kernel in these.
         grams: of each kernel, (K, K) products.
         moments: white columns of moments, and their products, as `moments.find` takes them.
-        log_size: of the noise, less its log prior.
+        log_sizes: (R,) of the noise, less a share of its log prior.
         block: (R,) number of the block of time of each white row.
     """
 
@@ -51,8 +51,13 @@ class View:
     parts: list[slice]
     grams: list[np.ndarray]
     moments: tuple[np.ndarray, np.ndarray]
-    log_size: float
+    log_sizes: np.ndarray
     block: np.ndarray
+
+    @property
+    def log_size(self) -> float:
+        """What each log evidence under this noise is less by."""
+        return float(self.log_sizes.sum())
 
     def white(self, f: int) -> np.ndarray:
         """(K, R) white columns of a kernel."""
@@ -73,7 +78,7 @@ class Problem:
         rate: of moments, as the base's own log had them; None where that is not known.
         usual: noise as other logs had it.
         noise: what all flexible terms together leave.
-        wander: dependences on time and place that the base's own log had, and their sizes.
+        wander: dependences on time and place that are no news, and the probability of each size.
     """
 
     steps: Steps
@@ -85,7 +90,7 @@ class Problem:
     rate: Rate | None
     usual: Noise
     noise: Noise
-    wander: dict[str, float]
+    wander: dict[str, np.ndarray]
 
     def view(self, noise: Noise) -> View:
         """What may be missing, under a noise."""
@@ -102,7 +107,8 @@ class Problem:
             parts,
             [stacked[part] @ stacked[part].T for part in parts],
             (at_moments, flat @ flat.T),
-            noise.log_size(len(self.steps), self.steps.observed) - noise.log_odds(self.usual),
+            noise.log_sizes(self.steps.observed)
+            - noise.log_odds(self.usual) / (3 * len(self.steps)),
             np.tile(self.steps.block, 3),
         )
 
@@ -173,25 +179,15 @@ def problem_of(
     found = discrepancy.kernels(motion)
     if always is not None:
         prior = with_always(prior, always, found)
-    noise = _begin_noise(steps, model_file, always)
+    noise = _begin_noise(steps, motion, model_file, always)
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always else None
-    wander = _wander(always, found) if always else {}
+    wander = {w: discrepancy.in_another_log(p) for w, p in always.wander.items()} if always else {}
     rough = Problem(steps, motion, prior, base, found, names, rate, noise, noise, wander)
     noise = _flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
     return replace(rough, noise=noise, base=base)
-
-
-def _wander(always: Always, found: Sequence[Kernel]) -> dict[str, float]:
-    """Size of each dependence whose function holds for one log alone."""
-    word = {k.name: k.depends_on for k in found if not k.lasting}
-    sizes: dict[str, float] = {}
-    for name, size in always.kernels:
-        if name in word:
-            sizes[word[name]] = max(size, sizes.get(word[name], 0.0))
-    return sizes
 
 
 def _set_to(model: native.Model, prior: Prior, always: Always) -> None:
@@ -237,11 +233,13 @@ def _motion(steps: Steps, model: native.Model, always: Always | None) -> Motion:
     return motion_of(steps, moved, instant, (always.usual, always.top) if always else None)
 
 
-def _begin_noise(steps: Steps, model_file: ModelFile, always: Always | None) -> Noise:
-    step_s = float(np.median(steps.step_s))
+def _begin_noise(
+    steps: Steps, motion: Motion, model_file: ModelFile, always: Always | None
+) -> Noise:
+    course = Course(float(np.median(steps.step_s)), steps.stretches, motion.pace)
     if always is not None:
-        return Noise(*always.noise, step_s)
-    return first_noise(step_s, model_file.recorded_noise)
+        return Noise(*always.noise, course)
+    return first_noise(course, model_file.recorded_noise)
 
 
 def _flexible_noise(p: Problem) -> Noise:
@@ -252,8 +250,8 @@ def _flexible_noise(p: Problem) -> Noise:
             free.append(PRIORS.size * c.columns)
     free += [FLEXIBLE * k.columns for k in p.kernels]
     columns = np.concatenate(free)
-    noise = fit_noise(p.base.errors, columns, p.steps.stretches, p.noise)
-    white = noise.whiten(columns, p.steps.stretches)
-    y = noise.whiten(p.base.errors, p.steps.stretches)
+    noise = fit_noise(p.base.errors, columns, p.noise)
+    white = noise.whiten(columns)
+    y = noise.whiten(p.base.errors)
     left = Linear.of(y, white).residuals.reshape(3, -1)
     return replace(noise, weight=weights_of(left))

@@ -180,6 +180,11 @@ class Motion:
         relative = np.abs(self.moved) / np.maximum(self.top[:3], 1e-9)
         return np.clip(relative.max(axis=1) / 0.1, 0.0, 1.0)
 
+    @property
+    def pace(self) -> np.ndarray:
+        """(W,) how far the robot travels and turns in a step, over what is usual; mean square 1."""
+        return np.sqrt(((self.moved / self.usual) ** 2).sum(axis=1) / 2)
+
 
 def motion_of(steps: Steps, moved: np.ndarray, instant: np.ndarray, scale=None) -> Motion:
     """The motion of a log; `scale` (usual, top) is that of the base's own log, if it is known."""

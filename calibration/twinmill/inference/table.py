@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, FORMS, GROWS, OF_FORM, SIZES, STEP, forms_of
+from twinmill.inference.discrepancy import CHANCE, FORMS, OF_FORM, SIZES, STEP, forms_of
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
@@ -142,7 +142,7 @@ def noise_of(h: Hypothesis, p: Problem, beside: np.ndarray | None = None) -> Noi
     if beside is not None:
         columns = np.concatenate([columns, beside])
     at_mean = h.errors + np.tensordot(h.value - h.mean, h.slopes, 1)
-    return fit_noise(at_mean, columns, p.steps.stretches, p.noise)
+    return fit_noise(at_mean, columns, p.noise)
 
 
 @dataclass(frozen=True)
@@ -343,40 +343,39 @@ class _Comparison:
     def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
         """Entries with each dependence that is not beside already.
 
-        What the base's own log wanders with time or place is no news, of whatever form it is and up
-        to one step of the grid of sizes more.
+        As far as the robot wanders with time or place by itself it is no news.
         """
         out = []
         for word in self.words[:-1]:
-            if word in beside.words:
-                continue
-            usual = GROWS * self.problem.wander.get(word, 0.0) >= SIZES
-            for sizes, words in ((~usual, (*beside.words, word)), (usual, beside.words)):
-                if sizes.any():
-                    out.append(self._with_word(beside, own, word, sizes=sizes, words=words))
+            if word not in beside.words:
+                words = (*beside.words, word)
+                out.append(self._with_word(beside, own, word, chance=CHANCE, words=words))
+                if word in self.problem.wander:
+                    usual = self.problem.wander[word]
+                    out.append(self._with_word(beside, own, word, chance=usual, words=beside.words))
         return out
 
     def _with_word(
-        self, beside: _Beside, own: Evidence, word: str, *, sizes: np.ndarray, words: tuple
+        self, beside: _Beside, own: Evidence, word: str, *, chance: np.ndarray, words: tuple
     ) -> Entry:
-        """With a dependence of some of the sizes, told in these words."""
+        """With a dependence whose sizes have these chances, told in these words."""
         at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
-        gains = own.gains[at][:, sizes] - np.log(len(at))
-        likely = gains + np.log(CHANCE[sizes] / CHANCE[sizes].sum())
+        gains = own.gains[at] - np.log(len(at))
+        likely = gains + np.log(np.maximum(chance, 1e-300))
         total = float(logsumexp(likely))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
         if words and not beside.words:
-            relative = self._log_relative(own.falls[at][:, sizes])
+            relative = self._log_relative(own.falls[at])
             each = (gains + relative).reshape(len(relative), gains.size)
             mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
-        linear = own.linear.with_columns(SIZES[sizes][s] * own.white(self.view, at[f]))
+        linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
         return self._entry(
             beside,
             linear,
             words=words,
             log_evidence=own.alone + beside.log_chance + total,
-            fall=beside.fall if beside.words else float(own.falls[at][:, sizes][f, s]),
+            fall=beside.fall if beside.words else float(own.falls[at][f, s]),
             mimicked=mimicked,
         )
 
@@ -390,8 +389,8 @@ class _Comparison:
         fall: float,
         mimicked: np.ndarray | float,
     ) -> Entry:
-        share = self.view.log_size * np.bincount(self.view.block) / len(self.view.block)
-        blocks = linear.log_densities(self.view.block) - share + beside.local
+        sizes = np.bincount(self.view.block, self.view.log_sizes)
+        blocks = linear.log_densities(self.view.block) - sizes + beside.local
         found = log_evidence - self.view.log_size
         return Entry(
             self.h.effects,
@@ -417,9 +416,12 @@ class _Comparison:
 
 def _as_without_moments(entries: list[Entry]) -> list[Entry]:
     """Entries whose moments count whole, whatever blocks are drawn: they are of a few by nature."""
-    blocks = {(e.stale, frozenset(e.words)): e.blocks for e in entries}
+    order = sorted(entries, key=lambda e: e.log_evidence)  # of alike ones the likeliest is kept
+    blocks = {(e.stale, frozenset(e.words)): e.blocks for e in order}
     return [
         replace(e, blocks=blocks.get((e.stale, frozenset(e.words) - {MOMENTS}), e.blocks))
+        if MOMENTS in e.words
+        else e
         for e in entries
     ]
 

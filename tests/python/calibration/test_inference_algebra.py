@@ -6,7 +6,7 @@ from math import comb, log
 
 import numpy as np
 import pytest
-from scipy.linalg import toeplitz
+from scipy.linalg import block_diag, toeplitz
 from scipy.special import logsumexp
 from scipy.stats import expon, multivariate_normal
 
@@ -18,11 +18,12 @@ from twinmill.inference.discrepancy import (
     _aside,
     _way_since_back,
     forms_of,
+    in_another_log,
     kernels,
 )
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
-from twinmill.inference.noise import Noise
+from twinmill.inference.noise import Course, Noise
 from twinmill.inference.posterior import beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
@@ -31,36 +32,48 @@ from twinmill.inference.table import Entry, Table
 STEP_S = 0.1
 
 
-def dense_covariance(sensor, drive, memory_s, count):
-    """(count, count) of e = AR(1) disturbance + differences of white noise, by the definition."""
-    a = np.exp(-STEP_S / memory_s)
-    lags = drive**2 * a ** np.arange(count)
+def dense_covariance(sensor, drive, gain, memory_s, pace):
+    """Covariance of e = AR(1) disturbance + differences of white noise, by the definition.
+
+    Each push of the disturbance is as large as the pace of its step makes it.
+    """
+    a, count = np.exp(-STEP_S / memory_s), len(pace)
+    push = np.sqrt(drive**2 + gain**2 * pace**2) * np.r_[1, np.full(count - 1, np.sqrt(1 - a**2))]
+    response = toeplitz(a ** np.arange(count), np.zeros(count)) * push
     difference = np.zeros(count)
     difference[:2] = 2 * sensor**2, -(sensor**2)
-    return toeplitz(lags + difference)
+    return response @ response.T + toeplitz(difference)
 
 
 @pytest.mark.parametrize(
-    "sensor, drive, memory_s", [(3e-4, 5e-4, 0.15), (2e-3, 1e-3, 0.5), (1e-4, 3e-3, 1.0)]
+    "sensor, drive, gain, memory_s",
+    [(3e-4, 5e-4, 1e-6, 0.15), (2e-3, 1e-3, 2e-3, 0.5), (1e-4, 1e-4, 3e-3, 1.0)],
 )
-def test_whitened_errors_have_the_likelihood_of_the_dense_covariance(sensor, drive, memory_s):
-    """The filter forgets its start: after 100 steps log densities grow alike."""
-    count, begin = 400, 100
-    covariance = dense_covariance(sensor, drive, memory_s, count)
-    errors = np.random.default_rng(1).multivariate_normal(np.zeros(count), covariance)
+def test_whitened_errors_have_the_likelihood_of_the_dense_covariance(sensor, drive, gain, memory_s):
+    """Two stretches of a robot that stands, drives and hurries; they know nothing of each other."""
+    random = np.random.default_rng(1)
+    stretches, count = [slice(0, 150), slice(150, 400)], 400
+    pace = np.abs(random.normal(size=count)) * (random.random(count) > 0.3)
+    covariance = block_diag(
+        *(dense_covariance(sensor, drive, gain, memory_s, pace[part]) for part in stretches)
+    )
     rows = np.zeros((count, 3))
-    rows[:, 0] = errors
-    noise = Noise(np.full(3, sensor), np.full(3, drive), np.full(3, memory_s), STEP_S)
-    white = noise.whiten(rows, [slice(0, count)])[:count]
-    observed = np.array([True, False, False])
-    late = count - begin
-    ours = -0.5 * np.sum(white[begin:] ** 2) - noise.log_size(late, observed)
-    ours -= 0.5 * late * np.log(2 * np.pi)
+    rows[:, 0] = random.multivariate_normal(np.zeros(count), covariance)
+    course = Course(STEP_S, stretches, pace)
+    noise = Noise(*(np.full(3, size) for size in (sensor, drive, gain, memory_s)), course)
+    white = noise.whiten(rows)[:count]
+    ours = -0.5 * white @ white - noise.log_sizes(np.array([True, False, False])).sum()
+    ours -= 0.5 * count * np.log(2 * np.pi)
+    exact = multivariate_normal(np.zeros(count), covariance).logpdf(rows[:, 0])
+    assert ours == pytest.approx(exact, abs=1e-6)
 
-    def density(n):
-        return multivariate_normal(np.zeros(n), covariance[:n, :n]).logpdf(errors[:n])
 
-    assert ours == pytest.approx(density(count) - density(begin), abs=0.02)
+def test_a_wander_is_as_probable_in_a_later_log_as_in_its_own():
+    """By algebra: sizes are mixed, probability neither appears nor goes, none grows by two steps."""
+    one = np.array([0.7, 0.0, 0.0, 0.0])
+    assert in_another_log(one).sum() == pytest.approx(0.7)
+    assert in_another_log(one)[2] == 0 < in_another_log(one)[1]
+    assert np.all(in_another_log(np.zeros(4)) == 0)
 
 
 def test_evidence_is_that_of_the_marginal_normal_distribution():
