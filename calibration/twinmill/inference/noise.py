@@ -72,19 +72,18 @@ class Noise:
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """(..., 3 W) white errors or columns of (..., W, 3), channel after channel."""
-        out = np.empty((*rows.shape[:-2], 3, rows.shape[-2]))
-        for c in range(3):
-            out[..., c, :] = self._filters[c].white(rows[..., c])
+        *many, count, channels = rows.shape
+        out = self._filter.white(np.moveaxis(rows, -1, -2).reshape(*many, channels * count))
         if self.weight is not None:
-            out *= self.weight
-        return out.reshape(*rows.shape[:-2], 3 * rows.shape[-2])
+            out *= self.weight.ravel()
+        return out
 
     def log_sizes(self, observed: np.ndarray) -> np.ndarray:
         """(3 W,) log standard deviations of what is whitened: what the likelihood is divided by."""
-        found = np.array([f.log_sizes for f in self._filters])
+        found = self._filter.log_sizes
         if self.weight is not None:
-            found -= np.log(self.weight)
-        return (found * observed[:, None]).ravel()
+            found = found - np.log(self.weight).ravel()
+        return found * np.repeat(observed, len(self.course.pace))
 
     def log_odds(self, usual: "Noise") -> float:
         """Log prior of such a noise over that of the usual one: one unit of the logarithms wide."""
@@ -96,51 +95,50 @@ class Noise:
         return np.log([self.sensor, self.drive, self.gain, self.memory_s])
 
     @cached_property
-    def _filters(self) -> list["Filter"]:
-        return [Filter.of(self.logs[:, c], self.course) for c in range(3)]
+    def _filter(self) -> "Filter":
+        return Filter.of(self.logs, self.course)
 
 
 @dataclass(frozen=True)
 class Filter:
-    """Whitens one channel.
+    """Whitens rows of one channel, or of several that stand one after the other.
 
     Attributes:
-        a: share of the disturbance that is left after a step.
-        low: (3, W) bands of the Cholesky factor of the covariance of what AR leaves.
-        course: the steps.
+        kept: (R,) share of the disturbance that is left from the step before.
+        low: (3, R) bands of the Cholesky factor of the covariance of what AR leaves.
     """
 
-    a: float
+    kept: np.ndarray
     low: np.ndarray
-    course: Course
 
     @classmethod
     def of(cls, logs: np.ndarray, course: Course) -> "Filter":
-        """Of (4,) logarithms of sensor, drive, gain, memory in s."""
-        sensor2, drive2, gain2 = np.exp(2 * logs[:3])
-        a = float(np.exp(-course.step_s / np.clip(np.exp(logs[3]), *MEMORY_S)))
+        """Of (4, C) logarithms of sensor, drive, gain, memory in s of C channels."""
+        sensor2, drive2, gain2 = np.exp(2 * logs[:3])[:, :, None]
+        a = np.exp(-course.step_s / np.clip(np.exp(logs[3]), *MEMORY_S))[:, None]
         one, two = course.follows, course.follows.copy()
         two[1:] *= one[:-1]
         # shares of the pose before a step, and of the one before that, in what AR leaves
         before, last = -(1 + a * one), a * one
-        push2 = (drive2 + gain2 * course.pace**2) * (1 - a**2 * one)
-        band = np.zeros((3, len(one)))
+        push2 = (drive2 + gain2 * course.pace**2) * (1 - last**2)
+        band = np.zeros((3, *last.shape))
         band[0] = push2 + sensor2 * (1 + before**2 + last**2)
-        band[1, :-1] = sensor2 * (before + last * np.roll(before, 1))[1:] * one[1:]
-        band[2, :-2] = sensor2 * (last * two)[2:]
-        return cls(a, cholesky_banded(band, lower=True), course)
+        band[1, :, :-1] = sensor2 * ((before + last * np.roll(before, 1, axis=1)) * one)[:, 1:]
+        band[2, :, :-2] = sensor2 * (last * two)[:, 2:]
+        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True))
 
     def white(self, rows: np.ndarray) -> np.ndarray:
-        """(..., W) of (..., W)."""
-        left = np.array(rows, float).reshape(-1, rows.shape[-1])
-        left[:, 1:] -= self.a * (rows.reshape(left.shape)[:, :-1] * self.course.follows[1:])
+        """(..., R) of (..., R)."""
+        left = rows.copy()
+        left[..., 1:] -= self.kept[1:] * rows[..., :-1]
         if left.size:  # LAPACK's wrapper cannot be given none
-            left = dtbtrs(self.low, left.T, uplo="L", overwrite_b=True)[0].T
-        return left.reshape(rows.shape)
+            flat = left.reshape(-1, left.shape[-1])
+            left = dtbtrs(self.low, flat.T, uplo="L", overwrite_b=True)[0].T.reshape(rows.shape)
+        return left
 
     @property
     def log_sizes(self) -> np.ndarray:
-        """(W,) log standard deviation of each step, given those before."""
+        """(R,) log standard deviation of each row, given those before."""
         return np.log(self.low[0])
 
 
@@ -171,7 +169,7 @@ def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise) -> Noise:
     for c in range(3):
         if np.any(errors[:, c]):
             used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
-            own = _seen(columns[used][:, :, c], Filter.of(logs[:, c], begin.course))
+            own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], begin.course))
             both = np.concatenate([errors[None, :, c], own])
             logs[:, c] = _fit_channel(both, logs[:, c], begin.course)
     sensor, drive, gain, memory = np.exp(logs)
@@ -191,7 +189,7 @@ def _fit_channel(both: np.ndarray, start: np.ndarray, course: Course) -> np.ndar
     """(4,) logarithms of a channel's noise; `both` holds (1 + K, W) errors and columns."""
 
     def cost(logs: np.ndarray) -> float:
-        whitening = Filter.of(logs, course)
+        whitening = Filter.of(logs[:, None], course)
         white = whitening.white(both)
         found = log_evidence(white[0], white[1:]) - whitening.log_sizes.sum()
         return -found + 0.5 * float(np.sum((logs - start) ** 2))

@@ -75,24 +75,23 @@ def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
 
 
 def table_of(search: Search) -> Table:
-    """Evidence of the likely sets, each under the noise that suits it best of three.
+    """Evidence of the likely sets, each under the noise that suits it best of two.
 
-    Three noises: what all flexible terms leave, what the base leaves, what the best set leaves with
-    its likeliest dependence. With one noise for all, slow drive noise is told as a dependence on
-    time.
+    Two noises: what the best set leaves with its likeliest dependence, and what the base leaves.
+    With one noise for all, slow drive noise is told as a dependence on time.
     """
     p, order = search.problem, search.likely(BEYOND)
     inside = [k for k in search.fitted if set(k) < set(order[0])]
     kept = list(dict.fromkeys([(), *order[:COMPARED], *inside]))
     whole = {(), *order[:WHOLE]}
-    views = [search.view]
+    views = []
     fitted = {names: search.polished(names) for names in kept}
     best_set = search.fitted[order[0]]
-    for h, beside in ((fitted[()], None), (fitted[order[0]], _likeliest_columns(best_set, p))):
+    for h, beside in ((fitted[order[0]], _likeliest_columns(best_set, p)), (fitted[()], None)):
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
     entries: dict[tuple, Entry] = {}
-    falls: dict[tuple, float] = {}  # under the first noise, as the excess is
+    falls: dict[tuple, float] = {}  # under the first of them, as the excess is
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
     for names in kept:
         search.progress("comparing hypotheses")
@@ -116,7 +115,7 @@ def table_of(search: Search) -> Table:
     return Table(
         [replace(entry, fall=falls[key]) for key, entry in entries.items()],
         {names: own.numbers() for names, (_, own) in best.items()},
-        max(search.fitted[()].linear.left - rows, 1e-9),
+        max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
         tuple(p.names),
         search.words,
     )
