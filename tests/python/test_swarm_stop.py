@@ -102,16 +102,53 @@ def test_a_selection_that_cannot_be_read_stops_all_and_says_so(
 
 
 @pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("--json --robots", "'--robots' requires an argument"),
+        ("--json --robots 1 --robots 2", "is given twice"),
+        ("--json 1,2", "unexpected extra argument"),
+        ("--json --robots 1 2", "unexpected extra argument"),
+        ("--json --robot 1", "No such option: --robot"),
+        ("--robots=1 --jsn --json", "No such option: --jsn"),
+        ("--json --robots 1 --timeout-s nan", "nan is no finite number"),
+        ("--robots 1 --timeout-s 0 --json", "'--timeout-s'"),
+        ("--json=1 --json", "does not take a value"),
+        ("--json --host", "'--host' requires an argument"),
+        ("--json --key", "'--key' requires an argument"),
+        ("--json --channel-prefix", "'--channel-prefix' requires an argument"),
+    ],
+)
+def test_a_command_line_that_cannot_be_read_stops_all_and_says_so(
+    monkeypatch, tmp_path, twinmill, words, says
+):
+    """The principle of --robots, whatever the fault: nobody has to find it while robots drive."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told, fleet = [], swarm_stop.Fleet
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    monkeypatch.setattr(
+        swarm_stop, "Fleet", lambda url, prefix, *a: told.append((url, prefix)) or fleet(url)
+    )
+    prefix = "" if "--channel-prefix" in words else "TWIN_"
+    options = ["--lcm-url", "memq://", *(["--channel-prefix=TWIN_"] * bool(prefix)), *words.split()]
+    code, out, _ = twinmill("swarm", "stop", *options)
+    said = json.loads(out)
+    assert code == 2 and told == [("memq://", prefix), set()] and not said["ok"]
+    assert says in said["sentence"] and "So all robots are told to stop." in said["sentence"]
+
+
+@pytest.mark.parametrize(
     "words",
     [
         ["--lcm-url", "udp://1.2.3.4:7667"],
         ["--lcm-url", "udpm://239.255.76.67:7667?ttl=x"],
         ["--lcm-url", "udpm://10.0.0.1:7667"],
-        ["--timeout-s", "nan"],
-        ["--robot", "1"],
+        ["--lcm-url", "memq://", "--lcm-url", "memq://"],
+        ["--lcm-url"],
+        ["--robot", "1", "--lcm-url"],
     ],
 )
-def test_a_stop_that_is_refused_says_that_nothing_was_stopped(twinmill, words):
+def test_a_stop_whose_bus_cannot_be_read_says_that_nothing_was_stopped(twinmill, words):
+    """Nobody knows on which network those are who are meant."""
     code, _, err = twinmill("swarm", "stop", *words)
     assert code == 2 and "NOTHING WAS STOPPED" in err and len(err.splitlines()) == 1
 
