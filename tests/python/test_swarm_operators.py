@@ -125,38 +125,38 @@ def test_no_start_leaves_it_to_a_robots_file_how_long_it_needs_no_operator(monke
 
 @pytest.mark.parametrize("words", [["start"], ["arm"], ["select", "milling"], ["status", "--once"]])
 def test_where_this_computer_has_no_network_no_robot_is_asked_for(
-    monkeypatch, tmp_path, twinmill, words
+    monkeypatch, key_file, twinmill, words
 ):
     """They were asked whether they are switched on."""
     fleet = fleet_of()
     fleet.bus.fault = "wlan0: not connected"
     for module in (swarm, swarm_door):
         monkeypatch.setattr(module, "Fleet", lambda *_, **__: fleet)
-    code, _, err = twinmill("swarm", *words, "--key", tmp_path / "key")
+    code, _, err = twinmill("swarm", *words, "--key", key_file)
     assert code == 1 and "this computer has no network (wlan0: not connected)" in err
     assert "switched on" not in err
 
 
 @pytest.mark.parametrize("arm", [[], ["--arm"]])
 def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
-    monkeypatch, tmp_path, twinmill, arm
+    monkeypatch, key_file, twinmill, arm
 ):
     """Nobody was told to start: so there is no stop that a missing robot would have to confirm."""
     fleet = fleet_of(robot(1))
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
-    words = ["start", "--robots", "1,9", *arm, "--key", tmp_path / "key"]
+    words = ["start", "--robots", "1,9", *arm, "--key", key_file]
     code, _, err = twinmill("swarm", *words)
     assert code == 1 and "R09: not heard" in err
     assert fleet.bus.said == []
 
 
-def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, tmp_path, twinmill):
+def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, key_file, twinmill):
     """A start that none can obey would end in a stop, which all do."""
     strange = robot(1, DRIVING)
     strange.link = None
     fleet = fleet_of(strange)
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
-    code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", tmp_path / "key")
+    code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", key_file)
     assert code == 1 and "R01: nothing was started: signs nothing with this operator's key" in err
     assert fleet.bus.said == []
 
@@ -196,11 +196,11 @@ def test_status_says_that_nobody_is_heard_who_holds_a_robot(capsys):
 
 
 def test_a_script_that_is_not_here_is_said_before_what_else_is_missing(
-    monkeypatch, tmp_path, twinmill
+    monkeypatch, tmp_path, key_file, twinmill
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(characterise, "Fleet", lambda *_, **__: fleet_of(robot(1)))
-    words = ["--robot", "1", "--out", "run.lcmlog", "--key", tmp_path / "key"]
+    words = ["--robot", "1", "--out", "run.lcmlog", "--key", key_file]
     code, _, err = twinmill("characterise", "--script", "missing.csv", *words)
     assert code == 1 and "missing.csv: no such script here" in err and "no pose" in err
     (tmp_path / "there.csv").write_text("t_s,speed_input,turn_input\n0,0,0\n1,0,0\n")

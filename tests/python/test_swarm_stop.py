@@ -184,6 +184,29 @@ def test_a_key_that_cannot_be_used_is_named_with_its_remedy(
 
 
 @pytest.mark.parametrize(
+    "verb", ["start", "arm", "select milling", "characterise", "stop", "status"]
+)
+def test_a_key_that_is_named_and_not_there_is_refused_and_not_made(
+    monkeypatch, tmp_path, twinmill, verb
+):
+    """A mistyped name had made a key that no robot has, without a word."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.csv").write_text("t_s,speed_input,turn_input\n0,0,0\n1,0,0\n")
+    more = {
+        "characterise": "--robot 3 --script s.csv --out run.lcmlog",
+        "stop": "--timeout-s 0.5",
+        "status": "--once",
+    }.get(verb, "")
+    words = [*([] if verb == "characterise" else ["swarm"]), *verb.split(), *more.split()]
+    code, out, _ = twinmill(*words, "--key", "my.kye", "--lcm-url", "memq://", "--json")
+    told = json.loads(out)
+    said = told["key_fault"] if verb == "status" else told["sentence"]
+    assert code == 1 and "--key my.kye: there is no key here" in said
+    assert "`twinmill robot flash HOST --key my.kye`" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["s.csv"]
+
+
+@pytest.mark.parametrize(
     "words",
     [
         ["start", "--robots", ""],
@@ -205,12 +228,15 @@ def test_what_is_malformed_is_refused_at_the_door(monkeypatch, tmp_path, twinmil
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     code, out, err = twinmill("swarm", *words)
     assert code == 2 and not out and len(err.splitlines()) == 1, err
+    code, out, _ = twinmill("swarm", *words, "--json")
+    said = json.loads(out)
+    assert (said["verb"], said["ok"], said["verdict"]) == (words[0], False, "bad_input")
     assert not list(tmp_path.rglob("*.key"))
 
 
 @pytest.mark.parametrize(("verb", "words"), [("start", []), ("arm", []), ("select", ["milling"])])
 def test_ctrl_c_before_a_robot_was_told_anything_says_so(
-    monkeypatch, tmp_path, twinmill, verb, words
+    monkeypatch, key_file, twinmill, verb, words
 ):
     """While it looks who is there: nothing at all was said."""
 
@@ -225,7 +251,7 @@ def test_ctrl_c_before_a_robot_was_told_anything_says_so(
             return False
 
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, key: Fleet("", "", lambda _: Quiet(), key))
-    options = ["--key", tmp_path / "key", "--json"]
+    options = ["--key", key_file, "--json"]
     code, out, err = twinmill("swarm", verb, *words, *options)
     sentence = "Ended by a signal: nothing was said to any robot."
     assert code == 130 and err == f"twinmill: {sentence}\n"
