@@ -39,8 +39,8 @@ if working():  # not for --help
 WRONG_COMMAND_LINE = 2
 MISREAD = "twinmill_cli.misread"  # in a context: why not all of its command line was read
 FLAGS = ("--json",)
-# What of a command line that cannot be read counts, since it says nothing of which robots are meant;
-# fewer and fewer options, where these cannot be read, too.
+# What counts of a command line that cannot be read: it says nothing of which robots are meant.
+# Fewer and fewer options, where these cannot be read either.
 KEPT = (
     ("--host", "--key", "--lcm-url", "--channel-prefix"),
     ("--lcm-url", "--channel-prefix"),
