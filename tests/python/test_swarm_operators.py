@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Before a command is said: who is missing, who drives already, and whom an operator holds."""
 
+import json
 import time
 
 import pytest
@@ -193,6 +194,28 @@ def test_status_says_that_nobody_is_heard_who_holds_a_robot(capsys):
     hold(fleet, 1)
     PlainConsole(width=200).print(status_table([alone]))
     assert " held" in capsys.readouterr().out and alone.to_json()["held"] is True
+
+
+def test_a_clock_that_is_odd_is_told_by_status_and_at_both_ends_of_a_start(
+    monkeypatch, key_file, twinmill
+):
+    """The live table alone had shown the 30 s."""
+    ahead, right = robot(1), robot(2)
+    for known, s in ((ahead, 30.0), (right, 0.0)):
+        known.telemetry.utime_us = round((time.time() + s) * 1e6)
+        known.recent.append((time.monotonic(), time.time(), known.telemetry))
+    fleet = fleet_of(ahead, right)
+    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    said = "R01's clock is 30.00 s ahead of this computer's, with which R02 agrees: set its (NTP)."
+    code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file)
+    assert code == 0 and said in " ".join(out.split())
+    code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file, "--json")
+    told = json.loads(out)
+    assert code == 0 and told["ok"] and told["verb"] == "status"
+    assert told["sentence"] == f"Heard: R01, R02. {said}"
+    assert swarm.clocks(fleet, {1, 2}) == said and swarm.clocks(fleet, {2}) == ""
+    answer, _ = tell.answers(fleet, tell.make_command(VERBS_START), {1, 2})
+    assert answer.to_json()["clock_ahead_s"] == pytest.approx(30, abs=0.01)
 
 
 def test_a_script_that_is_not_here_is_said_before_what_else_is_missing(

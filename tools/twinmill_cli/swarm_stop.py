@@ -116,7 +116,7 @@ def stop(
             "--host",
             metavar="HOST",
             help="Tell this machine, too, though it was never heard: where multicast does not "
-            "pass. Repeatable.",
+            "pass. Answers come by multicast alone. Repeatable.",
         ),
     ] = None,
     key: KeyThere = None,
@@ -163,6 +163,7 @@ def stop(
             unheard=hosts.unheard(fleet),
             is_cut_short=is_cut_short,
             reach=fleet.reach,
+            to_all=not asked,
             key_fault=f"No robot's signature could be checked: {fault}" if fault else "",
         )
         verdict = of_stop(given, how, is_of_some=bool(asked)).beside(driving(fleet, asked))
