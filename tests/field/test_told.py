@@ -44,7 +44,10 @@ class Fault:
 FAULTS = {
     "ctrl_c": Fault("Ctrl-C", ("Started at", "All stand."), 0),
     "ctrl_c_at_the_first_move": Fault(
-        "Ctrl-C as the first wheel turns", ("All stand",), 0, is_brief=True
+        "Ctrl-C as the first wheel turns (1 where the tool has not heard of that yet)",
+        ("All stand",),
+        0,
+        is_brief=True,
     ),
     "ctrl_c_five_times": Fault("Ctrl-C, five times", ("All stand.",), 0),
     "terminal_halted_and_ctrl_c": Fault("Ctrl-S for 2.5 s, then Ctrl-C", ("All stand.",), 0),
@@ -369,7 +372,9 @@ def test_wheels_stand_and_the_truth_is_told_with_its_code(session, name):
     for part in fault.said:
         assert part in said[at:], said
         at = said.index(part, at)
-    assert row["code"] == fault.code, said
+    # A Ctrl-C at the first move may come before the tool has heard of that, and it says so.
+    is_known = "before it was known to have begun" not in said
+    assert row["code"] == (fault.code if is_known else 1), said
     if fault.limit_s is NEVER:
         assert row["after_s"] is None
     else:

@@ -112,14 +112,18 @@ def test_who_refuses_since_another_has_stopped_it_is_told_so(accepted, stop_us, 
 def test_a_stop_of_somebody_else_is_told_with_where_it_came_from(accepted):
     fleet, _ = accepted
     fleet.bus.sender = ("10.0.0.2", 40000)
-    stop, own, arm = (tell.make_command(v) for v in (VERBS.VERB_STOP, VERBS.VERB_STOP, ARM))
+    stop, own, arm, odd = (tell.make_command(v) for v in (VERBS.VERB_STOP,) * 2 + (ARM, 0))
     fleet.said.add(own.seq)
-    for command in (own, arm):
+    stop.robot_id, odd.robot_id = 3, 10**6
+    for command in (own, arm, odd):
         fleet._on_message("SWARM_COMMAND", command.encode())
     fleet._on_message("SWARM_COMMAND", b"half a message")
-    assert fleet.stop_heard == ""
+    assert fleet.stop_heard({1, 3}) == ""
     fleet._on_message("SWARM_COMMAND", stop.encode())
-    assert fleet.stop_heard.startswith("10.0.0.2 at ")
+    assert fleet.stop_heard({1, 3}).startswith("10.0.0.2 at ") and not fleet.stop_heard({1})
+    stop.robot_id, fleet.bus.sender = tell.ALL, ("10.0.0.9", 40000)
+    fleet._on_message("SWARM_COMMAND", stop.encode())
+    assert fleet.stop_heard({1}).startswith("10.0.0.9 at ")
 
 
 def test_what_was_signed_before_the_start_speaks_against_nothing(accepted):

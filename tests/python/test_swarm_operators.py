@@ -151,6 +151,18 @@ def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
     assert fleet.bus.said == []
 
 
+def test_a_stop_that_came_while_it_looked_is_not_undone_by_arm(monkeypatch, key_file, twinmill):
+    """Who had said it was told that all stand, and a second later they drove."""
+    fleet = fleet_of(robot(1))
+    fleet.bus.sender = ("10.0.0.2", 40000)
+    fleet.bus.hear("SWARM_COMMAND", tell.make_command(turbopi.swarm_command_t.VERB_STOP).encode())
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    words = ["start", "--arm", "--robots", "1", "--key", key_file]
+    code, _, err = twinmill("swarm", *words)
+    assert code == 1 and "nothing was started: a stop came from 10.0.0.2 at " in err
+    assert "ask there" in err and fleet.bus.said == []
+
+
 def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, key_file, twinmill):
     """A start that none can obey would end in a stop, which all do."""
     strange = robot(1, DRIVING)

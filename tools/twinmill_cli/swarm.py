@@ -26,6 +26,7 @@ from twinmill_cli.swarm_door import (
     key_if_there,
     parse_robots,
     refuse_doubles,
+    refuse_stopped,
     refuse_unheard,
 )
 from twinmill_cli.swarm_signals import commanding, ended_by_signals
@@ -118,6 +119,7 @@ def _start(
         refuse_doubles(fleet, asked)
         check_clocks(fleet, asked, in_s, may_differ=partial)
         busy = tell.find_busy(fleet, asked)
+        refuse_stopped(fleet, asked)
         if busy:
             say(f"{of_busy(busy)}; this start takes over.")
         if arm:

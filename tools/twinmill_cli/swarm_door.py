@@ -162,6 +162,15 @@ def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
             )
 
 
+def refuse_stopped(fleet: Fleet, robots: set[int]) -> None:
+    """Raises ValueError if somebody stopped some robots while this looked who is there."""
+    if heard := fleet.stop_heard(robots):
+        raise ValueError(
+            f"nothing was started: a stop came from {heard}: ask there before you arm and start "
+            "them again (--arm)."
+        )
+
+
 def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: bool) -> None:
     """Says on stderr whose clock would make the start no common one.
 

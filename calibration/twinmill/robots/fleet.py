@@ -24,6 +24,7 @@ WINDOW_S = 2.0  # over which rates and detections are told
 RUN_PERIOD_S = 5.5  # robots say who they are every 5 s
 SIGNED_S = 2.0  # robots sign ten times a second; half of all lost, so many in a row are not
 GONE_S = 1.0  # a robot that said nothing for so long is not there; it speaks 30 times a second
+ALL, ROBOTS_MAX = -1, 100  # in swarm_command_t, robot_id is one of 0..99, or all
 MODES = ("stopped", "running", "script", "fault")
 TELEMETRY = turbopi.telemetry_t
 # What keeps a robot from doing what it is told, or hides it, loudest first.
@@ -311,8 +312,8 @@ class Fleet:
         # Numbers of the commands that were said from here, and the highest counter of those.
         self.said: set[int] = set()
         self.counter = 0
-        # From where the newest stop came that was not said here, and when; empty: none was heard.
-        self.stop_heard = ""
+        # From where stops of others came, and when, by the robot that was told; the newest last.
+        self._stops: dict[int, str] = {}
         self._prefix, self._key, self._hold_s = channel_prefix, key, 0.0
         try:
             self.bus = connect(url)
@@ -396,9 +397,16 @@ class Fleet:
             command = turbopi.swarm_command_t.decode(data)
         except (ValueError, struct.error, IndexError):
             return
-        sender = getattr(self.bus, "sender", None)
-        if command.verb == command.VERB_STOP and command.seq not in self.said and sender:
-            self.stop_heard = f"{sender[0]} at {datetime.now():%H:%M:%S}"
+        sender, robot_id = getattr(self.bus, "sender", None), command.robot_id
+        is_stop = command.verb == command.VERB_STOP and ALL <= robot_id < ROBOTS_MAX
+        if is_stop and command.seq not in self.said and sender:
+            self._stops.pop(robot_id, None)
+            self._stops[robot_id] = f"{sender[0]} at {datetime.now():%H:%M:%S}"
+
+    def stop_heard(self, robots: set[int]) -> str:
+        """From where the newest stop of one of some robots came, and when; empty if none did."""
+        heard = [words for i, words in self._stops.items() if i in {ALL, *robots}]
+        return heard[-1] if heard else ""
 
     def others(self, robot: Robot, session: int) -> list[Heard]:
         """Commands of other operators that a robot has obeyed since it was told from here.

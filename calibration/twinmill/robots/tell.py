@@ -18,10 +18,9 @@ import turbopi
 
 from twinmill.arguments import option
 from twinmill.robots.countdown import NOT_BEGUN, Dropouts, find_dropouts, stopped_by_another
-from twinmill.robots.fleet import LINK_TIMEOUT_MS, Fleet, Robot
+from twinmill.robots.fleet import ALL, LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
-ALL = -1
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
 # Before the common instant: time to call a start off that not all have acknowledged.
 CALL_OFF_S = 0.3
@@ -471,7 +470,7 @@ def start(
             for now, a in zip(final, given, strict=True)
         ]
     begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out)
-    return Start(*begun, link_timeout_ms, fleet.stop_heard)
+    return Start(*begun, link_timeout_ms, fleet.stop_heard(robots))
 
 
 def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
