@@ -121,7 +121,7 @@ def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
 
 
 def _as_of_robots(words: list[str]) -> dict:
-    """What every object of a command to robots has."""
+    """Fields that every object of a command to robots has."""
     verb = words[1] if words[0] == "swarm" else ""
     return {"verb": verb, "ok": False, "robots": []} if verb in TO_ROBOTS else {}
 

@@ -170,7 +170,7 @@ def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdi
 
 
 def _besides(given: list[Answer]) -> str:
-    """What is to be known of robots that have confirmed a stop."""
+    """Remarks on robots that have confirmed a stop."""
     lost_link = [a for a in given if a.lost_link]
     before = f"{_names(lost_link)} stood before: it had lost its operator." if lost_link else ""
     return _joined(before, *(f"{_names([a])} {a.reason}." for a in given if a.reason))
