@@ -133,7 +133,16 @@ def test_a_command_line_that_cannot_be_read_stops_all_and_says_so(
     code, out, _ = twinmill("swarm", "stop", *options)
     said = json.loads(out)
     assert code == 2 and told == [("memq://", prefix), set()] and not said["ok"]
-    assert says in said["sentence"] and "So all robots are told to stop." in said["sentence"]
+    assert says in said["sentence"] and ". So all robots are told to stop." in said["sentence"]
+
+
+@pytest.mark.parametrize("words", ["Stop", "STOP --ROBOTS 1"])
+def test_a_stop_is_one_however_its_letters_are(monkeypatch, tmp_path, twinmill, words):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told = []
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    code, _, _ = twinmill("swarm", *words.split(), "--lcm-url", "memq://")
+    assert code == 1 and told == [{1} if "1" in words else set()]
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,7 @@ def register(app: typer.Typer) -> None:
     swarm = typer.Typer(
         help="Start, stop and watch the robots on the network, or those of twin_run.",
         no_args_is_help=True,
+        context_settings={"token_normalize_func": str.lower},  # STOP is a stop
     )
     swarm.command("start")(_start)
     swarm.command("arm")(_arm)

@@ -56,7 +56,13 @@ def _refusing() -> Iterator[None]:
     except typer.TyperException as error:
         if error.exit_code != WRONG_COMMAND_LINE:
             raise
-        raise typer.BadParameter(f"{error.format_message()} NOTHING WAS STOPPED.") from error
+        raise typer.BadParameter(f"{_sentence(error)} NOTHING WAS STOPPED.") from error
+
+
+def _sentence(error: typer.TyperException) -> str:
+    """Typer's, which may lack its full stop."""
+    words = error.format_message()
+    return words if words.endswith((".", "?")) else f"{words}."
 
 
 class StopCommand(TyperCommand):
@@ -80,7 +86,7 @@ class StopCommand(TyperCommand):
         except typer.TyperException as error:
             if error.exit_code != WRONG_COMMAND_LINE or not working():
                 raise
-            misread = error.format_message()
+            misread = _sentence(error)
         for kept in KEPT:
             try:
                 context = super().make_context(info_name, _kept(words, kept), *rest, **options)
@@ -182,7 +188,7 @@ def _selected(robots: str | None, misread: str) -> tuple[set[int], str]:
     try:
         asked = parse_robots(robots)
     except typer.BadParameter as error:
-        asked, misread = set(), error.format_message()
+        asked, misread = set(), _sentence(error)
     return asked, f"{misread} So all robots are told to stop." if misread else ""
 
 
