@@ -87,7 +87,7 @@ static void remark(const struct loop *loop, struct link_ack *ack)
     if (ack->verb == FW_VERB_STOP && loop->operator_link.latch.is_lost)
     {
         (void)snprintf(ack->reason, sizeof ack->reason,
-                       "obeyed, but forgotten when it is started anew: run_dir cannot be written");
+                       "stands, but forgets this stop if started anew: run_dir cannot be written");
     }
     else if (ack->verb == FW_VERB_ARM && ack->accepted)
     {

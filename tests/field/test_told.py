@@ -44,7 +44,10 @@ class Fault:
 FAULTS = {
     "ctrl_c": Fault("Ctrl-C", ("Started at", "All stand."), 0),
     "ctrl_c_at_the_first_move": Fault(
-        "Ctrl-C as the first wheel turns", ("All stand",), 0, is_brief=True
+        "Ctrl-C as the first wheel turns (1 where the tool has not heard of that yet)",
+        ("All stand",),
+        0,
+        is_brief=True,
     ),
     "ctrl_c_five_times": Fault("Ctrl-C, five times", ("All stand.",), 0),
     "terminal_halted_and_ctrl_c": Fault("Ctrl-S for 2.5 s, then Ctrl-C", ("All stand.",), 0),
@@ -219,6 +222,21 @@ FAULTS = {
         ("an empty list: must be numbers", "So all robots are told to stop.", "All stand."),
         2,
     ),
+    "stop_of_a_list_that_is_missing": Fault(
+        "`swarm stop --robots --key FILE` (from its first packet)",
+        (
+            "unexpected extra argument",
+            "So all robots are told to stop.",
+            "All stand. Those are all",
+        ),
+        2,
+    ),
+    "key_mistyped": Fault(
+        "`swarm start --key FILE` where there is no such file",
+        ("there is no key here", "Nothing was said to any robot."),
+        1,
+        NEVER,
+    ),
     "url_mistyped": Fault(
         "`swarm start --lcm-url udp://239.255.76.67:7667`",
         ("'--lcm-url': udp://239.255.76.67:7667: begins with none of",),
@@ -291,7 +309,11 @@ FAULTS = {
     ),
     "stop_of_a_host_that_is_not_there": Fault(
         "`swarm stop --host` with a wrong address (from its first packet)",
-        ("NOT ALL STAND: Nothing was heard from 10.0.1.77",),
+        (
+            "NOT ALL STAND: Nothing was heard from 10.0.1.77",
+            "Robots answer by multicast alone",
+            "SWITCH OFF BY HAND",
+        ),
         1,
     ),
     "stop_of_another_robot": Fault(
@@ -350,7 +372,9 @@ def test_wheels_stand_and_the_truth_is_told_with_its_code(session, name):
     for part in fault.said:
         assert part in said[at:], said
         at = said.index(part, at)
-    assert row["code"] == fault.code, said
+    # A Ctrl-C at the first move may come before the tool has heard of that, and it says so.
+    is_known = "before it was known to have begun" not in said
+    assert row["code"] == (fault.code if is_known else 1), said
     if fault.limit_s is NEVER:
         assert row["after_s"] is None
     else:
@@ -377,7 +401,7 @@ def test_who_takes_over_is_told_that_somebody_drove(session):
 def test_a_count_that_another_stopped_ends_with_it(session):
     """The stop itself is over after that; the instant was later."""
     row = session["stopped_in_the_countdown"]
-    assert row["ended_s"] < row["ahead_s"] - 1 and not row["ok"]
+    assert row["ended_s"] < row["ahead_s"] - 1 and not row["ok"] and row["instant"] is None
 
 
 def test_of_two_countdowns_the_last_is_the_one_that_starts(session):
@@ -432,3 +456,8 @@ def test_names_of_strangers_are_shown_as_they_are(session):
 @pytest.mark.skipif(not ALL, reason="part of make check-long")
 def test_a_stop_makes_no_key(session):
     assert not session["stop_without_a_key"]["made_a_key"]
+
+
+@pytest.mark.skipif(not ALL, reason="part of make check-long")
+def test_a_mistyped_key_is_not_made(session):
+    assert not session["key_mistyped"]["made_a_key"]

@@ -511,10 +511,11 @@ class Field:
         code = operator.end()
         ended_s = time.monotonic() - said_s
         data = json.loads(operator.plain[operator.plain.index("{") :].splitlines()[0])
-        fleet.listen(data["start_utime_us"] / 1e6 + 0.5 - time.time())
+        fleet.listen(said_s + ahead_s + 0.5 - time.monotonic())
         row = self._unmoved(begin_s, code)
         said = [data["sentence"]]
-        return row | {"said": said, "ended_s": ended_s, "ahead_s": ahead_s, "ok": data["ok"]}
+        row |= {"said": said, "instant": data["start_utime_us"], "ok": data["ok"]}
+        return row | {"ended_s": ended_s, "ahead_s": ahead_s}
 
     def _counting(self, *words: str) -> Operator:
         """A start whose robots have all accepted; its instant is seconds away."""
@@ -672,6 +673,15 @@ class Field:
 
     def stop_of_an_empty_list(self) -> dict:
         return self._stopped_by("--robots", "")
+
+    def stop_of_a_list_that_is_missing(self) -> dict:
+        """The next option is taken for it; the key counts all the same."""
+        return self._stopped_by("--robots")
+
+    def key_mistyped(self) -> dict:
+        begin_s, key = time.monotonic(), self.folder / "operator.kye"
+        self.operator = Operator(key, "start", terminal=False)
+        return self._unmoved(begin_s, self.operator.end()) | {"made_a_key": key.exists()}
 
     def _stopped_by(self, *words: str, key: Path | None = None) -> dict:
         """Robots that are held, by another command."""

@@ -19,6 +19,7 @@ import twinmill_native as native
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import RobotLog
+from twinmill.robots.key import load_or_make
 from twinmill_cli import main
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -161,6 +162,13 @@ def own_ctrl_c():
     before = signal.getsignal(signal.SIGINT)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def key_file(tmp_path) -> Path:
+    """An operator's key that is there."""
+    load_or_make(tmp_path / "key")
+    return tmp_path / "key"
 
 
 @pytest.fixture

@@ -502,6 +502,7 @@ def test_a_command_works_after_its_help_was_shown(twinmill):
 @pytest.mark.parametrize(("line", "code", "says"), [
     ("effects --json -- --help", 1, "effect '--help': not in the catalogue"),
     ("add coasting run.lcmlog -o --help", 2, "--help is the value of an option here"),
+    ("swarm stop --robots --help", 2, "--help is the value of an option here"),
 ])  # fmt: skip
 def test_help_may_be_a_value_and_is_said_to_be_one(line, code, says):
     program = [sys.executable, "-c", "from twinmill_cli.main import main; main()"]

@@ -79,6 +79,53 @@ def test_who_signs_something_else_since_drops_out(accepted, says, words):
     assert bool(dropouts(fleet, only_stopped=True)) == (words == STOPPED)
 
 
+def signed(verb, session_us, *, accepted=True):
+    """An answer to another command."""
+    ack = turbopi.signed_ack_t()
+    ack.session, ack.session_us, ack.accepted, ack.verb = SESSION, session_us, accepted, verb
+    return ack
+
+
+@pytest.mark.parametrize(
+    ("stop_us", "arm_us", "is_stop"),
+    [
+        (900_000, 800_000, True),  # between --arm and the start
+        (900_000, None, True),
+        (900_000, 950_000, False),  # armed since: it refuses for a reason of its own
+        (1_100_000, 800_000, False),
+        (None, 800_000, False),
+    ],
+)
+def test_who_refuses_since_another_has_stopped_it_is_told_so(accepted, stop_us, arm_us, is_stop):
+    """It was told to give --arm, which it had given."""
+    fleet, robot = accepted
+    robot.signed_acks[SEQ].accepted = False
+    if stop_us:
+        robot.signed_acks[77] = signed(VERBS.VERB_STOP, stop_us)
+    if arm_us:
+        robot.signed_acks[78] = signed(ARM, arm_us)
+    assert dropouts(fleet).words == ({1: STOPPED} if is_stop else {})
+    fleet.said.add(77)
+    assert not dropouts(fleet)
+
+
+def test_a_stop_of_somebody_else_is_told_with_where_it_came_from(accepted):
+    fleet, _ = accepted
+    fleet.bus.sender = ("10.0.0.2", 40000)
+    stop, own, arm, odd = (tell.make_command(v) for v in (VERBS.VERB_STOP,) * 2 + (ARM, 0))
+    fleet.said.add(own.seq)
+    stop.robot_id, odd.robot_id = 3, 10**6
+    for command in (own, arm, odd):
+        fleet._on_message("SWARM_COMMAND", command.encode())
+    fleet._on_message("SWARM_COMMAND", b"half a message")
+    assert fleet.stop_heard({1, 3}) == ""
+    fleet._on_message("SWARM_COMMAND", stop.encode())
+    assert fleet.stop_heard({1, 3}).startswith("10.0.0.2 at ") and not fleet.stop_heard({1})
+    stop.robot_id, fleet.bus.sender = tell.ALL, ("10.0.0.9", 40000)
+    fleet._on_message("SWARM_COMMAND", stop.encode())
+    assert fleet.stop_heard({1}).startswith("10.0.0.9 at ")
+
+
 def test_what_was_signed_before_the_start_speaks_against_nothing(accepted):
     """A link that came before the answer: armed and started since."""
     fleet, robot = accepted

@@ -223,7 +223,7 @@ def test_a_command_that_was_not_heard_shows_in_what_the_robot_has_obeyed(held):
     ("silent_s", "double", "stands"), [(0.1, False, True), (10.0, False, False), (0.1, True, False)]
 )
 def test_only_who_is_heard_and_is_one_is_said_to_stand(silent_s, double, stands):
-    """Telemetry of ten seconds ago tells nothing of now, and of two one may drive."""
+    """Ten seconds ago tells nothing of now, of two one may drive, and anybody says telemetry."""
     fleet = Fleet("", connect=lambda _: Nowhere())
     robot = fleet.robots[3] = Robot(3, telemetry=turbopi.telemetry_t())
     robot.telemetry.mode = STOPPED
@@ -231,7 +231,12 @@ def test_only_who_is_heard_and_is_one_is_said_to_stand(silent_s, double, stands)
     robot.heard_s = time.monotonic() - silent_s
     command = turbopi.swarm_command_t()
     command.verb = VERBS.VERB_START
+    (unsigned,) = answers(fleet, command, {3})
+    assert not unsigned.stands and not robot.to_json()["stands"]
+    robot.link, robot.link_s = turbopi.link_t(), robot.heard_s
+    robot.link.stands = True
     (answer,) = answers(fleet, command, {3})
-    assert answer.stands == stands and answer.last_heard_s == pytest.approx(silent_s, abs=0.5)
+    assert answer.stands == robot.to_json()["stands"] == stands
+    assert answer.last_heard_s == pytest.approx(silent_s, abs=0.5)
     Console(width=100, file=(said := io.StringIO())).print(answer_table([answer]))
     assert ("not heard for 10 s" in said.getvalue()) == (silent_s > 1)

@@ -24,7 +24,7 @@ from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
 from twinmill_cli import next as next_command
-from twinmill_cli import twin_sweep
+from twinmill_cli import swarm_stop, twin_sweep
 from twinmill_cli.options import ScriptForm
 from twinmill_cli.spelling import typed
 
@@ -98,7 +98,8 @@ def check(line: str) -> None:
         assert {word for word in words if "=" not in word} <= targets
     elif program == "twinmill":
         command, rest = command_of(words)
-        command.make_context(words[0], rest)
+        context = command.make_context(words[0], rest)
+        assert swarm_stop.MISREAD not in context.meta
     else:
         done = subprocess.run(
             [str(find_program(program)), "--help"], capture_output=True, text=True, check=True

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Before a command is said: who is missing, who drives already, and whom an operator holds."""
 
+import json
 import time
 
 import pytest
@@ -125,38 +126,50 @@ def test_no_start_leaves_it_to_a_robots_file_how_long_it_needs_no_operator(monke
 
 @pytest.mark.parametrize("words", [["start"], ["arm"], ["select", "milling"], ["status", "--once"]])
 def test_where_this_computer_has_no_network_no_robot_is_asked_for(
-    monkeypatch, tmp_path, twinmill, words
+    monkeypatch, key_file, twinmill, words
 ):
     """They were asked whether they are switched on."""
     fleet = fleet_of()
     fleet.bus.fault = "wlan0: not connected"
     for module in (swarm, swarm_door):
         monkeypatch.setattr(module, "Fleet", lambda *_, **__: fleet)
-    code, _, err = twinmill("swarm", *words, "--key", tmp_path / "key")
+    code, _, err = twinmill("swarm", *words, "--key", key_file)
     assert code == 1 and "this computer has no network (wlan0: not connected)" in err
     assert "switched on" not in err
 
 
 @pytest.mark.parametrize("arm", [[], ["--arm"]])
 def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
-    monkeypatch, tmp_path, twinmill, arm
+    monkeypatch, key_file, twinmill, arm
 ):
     """Nobody was told to start: so there is no stop that a missing robot would have to confirm."""
     fleet = fleet_of(robot(1))
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
-    words = ["start", "--robots", "1,9", *arm, "--key", tmp_path / "key"]
+    words = ["start", "--robots", "1,9", *arm, "--key", key_file]
     code, _, err = twinmill("swarm", *words)
     assert code == 1 and "R09: not heard" in err
     assert fleet.bus.said == []
 
 
-def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, tmp_path, twinmill):
+def test_a_stop_that_came_while_it_looked_is_not_undone_by_arm(monkeypatch, key_file, twinmill):
+    """Who had said it was told that all stand, and a second later they drove."""
+    fleet = fleet_of(robot(1))
+    fleet.bus.sender = ("10.0.0.2", 40000)
+    fleet.bus.hear("SWARM_COMMAND", tell.make_command(turbopi.swarm_command_t.VERB_STOP).encode())
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    words = ["start", "--arm", "--robots", "1", "--key", key_file]
+    code, _, err = twinmill("swarm", *words)
+    assert code == 1 and "nothing was started: a stop came from 10.0.0.2 at " in err
+    assert "ask there" in err and fleet.bus.said == []
+
+
+def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, key_file, twinmill):
     """A start that none can obey would end in a stop, which all do."""
     strange = robot(1, DRIVING)
     strange.link = None
     fleet = fleet_of(strange)
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
-    code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", tmp_path / "key")
+    code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", key_file)
     assert code == 1 and "R01: nothing was started: signs nothing with this operator's key" in err
     assert fleet.bus.said == []
 
@@ -195,12 +208,34 @@ def test_status_says_that_nobody_is_heard_who_holds_a_robot(capsys):
     assert " held" in capsys.readouterr().out and alone.to_json()["held"] is True
 
 
+def test_a_clock_that_is_odd_is_told_by_status_and_at_both_ends_of_a_start(
+    monkeypatch, key_file, twinmill
+):
+    """The live table alone had shown the 30 s."""
+    ahead, right = robot(1), robot(2)
+    for known, s in ((ahead, 30.0), (right, 0.0)):
+        known.telemetry.utime_us = round((time.time() + s) * 1e6)
+        known.recent.append((time.monotonic(), time.time(), known.telemetry))
+    fleet = fleet_of(ahead, right)
+    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    said = "R01's clock is 30.00 s ahead of this computer's, with which R02 agrees: set its (NTP)."
+    code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file)
+    assert code == 0 and said in " ".join(out.split())
+    code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file, "--json")
+    told = json.loads(out)
+    assert code == 0 and told["ok"] and told["verb"] == "status"
+    assert told["sentence"] == f"Heard: R01, R02. {said}"
+    assert swarm.clocks(fleet, {1, 2}) == said and swarm.clocks(fleet, {2}) == ""
+    answer, _ = tell.answers(fleet, tell.make_command(VERBS_START), {1, 2})
+    assert answer.to_json()["clock_ahead_s"] == pytest.approx(30, abs=0.01)
+
+
 def test_a_script_that_is_not_here_is_said_before_what_else_is_missing(
-    monkeypatch, tmp_path, twinmill
+    monkeypatch, tmp_path, key_file, twinmill
 ):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(characterise, "Fleet", lambda *_, **__: fleet_of(robot(1)))
-    words = ["--robot", "1", "--out", "run.lcmlog", "--key", tmp_path / "key"]
+    words = ["--robot", "1", "--out", "run.lcmlog", "--key", key_file]
     code, _, err = twinmill("characterise", "--script", "missing.csv", *words)
     assert code == 1 and "missing.csv: no such script here" in err and "no pose" in err
     (tmp_path / "there.csv").write_text("t_s,speed_input,turn_input\n0,0,0\n1,0,0\n")

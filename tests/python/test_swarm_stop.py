@@ -102,16 +102,62 @@ def test_a_selection_that_cannot_be_read_stops_all_and_says_so(
 
 
 @pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("--json --robots", "'--robots' requires an argument"),
+        ("--json --robots 1 --robots 2", "is given twice"),
+        ("--json 1,2", "unexpected extra argument"),
+        ("--json --robots 1 2", "unexpected extra argument"),
+        ("--json --robot 1", "No such option: --robot"),
+        ("--robots=1 --jsn --json", "No such option: --jsn"),
+        ("--json --robots 1 --timeout-s nan", "nan is no finite number"),
+        ("--robots 1 --timeout-s 0 --json", "'--timeout-s'"),
+        ("--json=1 --json", "does not take a value"),
+        ("--json --host", "'--host' requires an argument"),
+        ("--json --key", "'--key' requires an argument"),
+        ("--json --channel-prefix", "'--channel-prefix' requires an argument"),
+    ],
+)
+def test_a_command_line_that_cannot_be_read_stops_all_and_says_so(
+    monkeypatch, tmp_path, twinmill, words, says
+):
+    """The principle of --robots, whatever the fault: nobody has to find it while robots drive."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told, fleet = [], swarm_stop.Fleet
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    monkeypatch.setattr(
+        swarm_stop, "Fleet", lambda url, prefix, *a: told.append((url, prefix)) or fleet(url)
+    )
+    prefix = "" if "--channel-prefix" in words else "TWIN_"
+    options = ["--lcm-url", "memq://", *(["--channel-prefix=TWIN_"] * bool(prefix)), *words.split()]
+    code, out, _ = twinmill("swarm", "stop", *options)
+    said = json.loads(out)
+    assert code == 2 and told == [("memq://", prefix), set()] and not said["ok"]
+    assert says in said["sentence"] and ". So all robots are told to stop." in said["sentence"]
+
+
+@pytest.mark.parametrize("words", ["Stop", "STOP --ROBOTS 1"])
+def test_a_stop_is_one_however_its_letters_are(monkeypatch, tmp_path, twinmill, words):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told = []
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    code, _, _ = twinmill("swarm", *words.split(), "--lcm-url", "memq://")
+    assert code == 1 and told == [{1} if "1" in words else set()]
+
+
+@pytest.mark.parametrize(
     "words",
     [
         ["--lcm-url", "udp://1.2.3.4:7667"],
         ["--lcm-url", "udpm://239.255.76.67:7667?ttl=x"],
         ["--lcm-url", "udpm://10.0.0.1:7667"],
-        ["--timeout-s", "nan"],
-        ["--robot", "1"],
+        ["--lcm-url", "memq://", "--lcm-url", "memq://"],
+        ["--lcm-url"],
+        ["--robot", "1", "--lcm-url"],
     ],
 )
-def test_a_stop_that_is_refused_says_that_nothing_was_stopped(twinmill, words):
+def test_a_stop_whose_bus_cannot_be_read_says_that_nothing_was_stopped(twinmill, words):
+    """Nobody knows on which network those are who are meant."""
     code, _, err = twinmill("swarm", "stop", *words)
     assert code == 2 and "NOTHING WAS STOPPED" in err and len(err.splitlines()) == 1
 
@@ -147,6 +193,29 @@ def test_a_key_that_cannot_be_used_is_named_with_its_remedy(
 
 
 @pytest.mark.parametrize(
+    "verb", ["start", "arm", "select milling", "characterise", "stop", "status"]
+)
+def test_a_key_that_is_named_and_not_there_is_refused_and_not_made(
+    monkeypatch, tmp_path, twinmill, verb
+):
+    """A mistyped name had made a key that no robot has, without a word."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.csv").write_text("t_s,speed_input,turn_input\n0,0,0\n1,0,0\n")
+    more = {
+        "characterise": "--robot 3 --script s.csv --out run.lcmlog",
+        "stop": "--timeout-s 0.5",
+        "status": "--once",
+    }.get(verb, "")
+    words = [*([] if verb == "characterise" else ["swarm"]), *verb.split(), *more.split()]
+    code, out, _ = twinmill(*words, "--key", "my.kye", "--lcm-url", "memq://", "--json")
+    told = json.loads(out)
+    said = told["key_fault"] if verb == "status" else told["sentence"]
+    assert code == 1 and "--key my.kye: there is no key here" in said
+    assert "`twinmill robot flash HOST --key my.kye`" in said
+    assert [path.name for path in tmp_path.iterdir()] == ["s.csv"]
+
+
+@pytest.mark.parametrize(
     "words",
     [
         ["start", "--robots", ""],
@@ -168,12 +237,15 @@ def test_what_is_malformed_is_refused_at_the_door(monkeypatch, tmp_path, twinmil
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     code, out, err = twinmill("swarm", *words)
     assert code == 2 and not out and len(err.splitlines()) == 1, err
+    code, out, _ = twinmill("swarm", *words, "--json")
+    said = json.loads(out)
+    assert (said["verb"], said["ok"], said["verdict"]) == (words[0], False, "bad_input")
     assert not list(tmp_path.rglob("*.key"))
 
 
 @pytest.mark.parametrize(("verb", "words"), [("start", []), ("arm", []), ("select", ["milling"])])
 def test_ctrl_c_before_a_robot_was_told_anything_says_so(
-    monkeypatch, tmp_path, twinmill, verb, words
+    monkeypatch, key_file, twinmill, verb, words
 ):
     """While it looks who is there: nothing at all was said."""
 
@@ -188,7 +260,7 @@ def test_ctrl_c_before_a_robot_was_told_anything_says_so(
             return False
 
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, key: Fleet("", "", lambda _: Quiet(), key))
-    options = ["--key", tmp_path / "key", "--json"]
+    options = ["--key", key_file, "--json"]
     code, out, err = twinmill("swarm", verb, *words, *options)
     sentence = "Ended by a signal: nothing was said to any robot."
     assert code == 130 and err == f"twinmill: {sentence}\n"

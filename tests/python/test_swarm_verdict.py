@@ -77,6 +77,16 @@ TAKEN, TAKEN_AND_LOST = of_taken(BY_START), of_taken(BY_START, LINK_LOST)
 # What is said begins so, and the command ends with that code.
 SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
+    (
+        of_stop([LOST, STANDS], Saying(to_all=True)),
+        "All stand. Those are all that were heard: R08, R02. R08 stood before:",
+        0,
+    ),
+    (
+        of_stop([replace(STANDS, reason="stands, but forgets this stop if started anew: ...")]),
+        "All stand. R02 stands, but forgets this stop if started anew:",
+        0,
+    ),
     (of_stop([STANDS], is_of_some=True), "R02 stands.", 0),
     (
         of_stop([STANDS], Saying(unheard=["robot9"])),
@@ -121,7 +131,22 @@ SENTENCES = [
     ),
     (
         of_start(begun(GOOD, stopped=[STANDS], out={1: STOPPED, 2: STOPPED})),
-        "Called off: R01, R02 were stopped by another command. All were told to stop: All stand.",
+        "Called off: R01, R02 were stopped by another command. Ask who stopped them before you "
+        "start them again. All were told to stop: All stand. They must be armed",
+        1,
+    ),
+    (
+        of_start(
+            begun(
+                answer(1, accepted=False, reason="was stopped: arm it first", mode="stopped"),
+                stopped=[STANDS],
+                out={1: STOPPED},
+                stop_heard="10.0.0.2 at 12:00:01",
+            )
+        ),
+        "Called off: R01 was stopped by another command. A stop came from 10.0.0.2 at 12:00:01: "
+        "ask there before you start them again. All were told to stop: All stand. They must be "
+        "armed before they start (--arm).",
         1,
     ),
     (
@@ -146,7 +171,11 @@ SENTENCES = [
         "a signal after 2.5 s. R02 confirmed it.",
         1,
     ),
-    (of_stop([], CUT), "No robot was heard in 0.4 s; stop was said all the time.", 1),
+    (
+        of_stop([], CUT),
+        "No robot was heard in 0.4 s; stop was said all the time. SWITCH OFF BY HAND what still",
+        1,
+    ),
     (of_stop([STANDS], CUT), "R02 stands; others may not have been heard yet.", 1),
     (of_stop([STANDS], Saying(1.4, 1.4, is_cut_short=True)), "All stand.", 0),
     (of_stop([STANDS], CUT, is_of_some=True), "R02 stands.", 0),
@@ -250,6 +279,31 @@ def test_each_sentence_stands_alone(verdict):
 def test_what_is_called_off_says_whether_all_stand():
     still, moving = (of_start(begun(REFUSED, stopped=[a])) for a in (STANDS, GOOD))
     assert "All stand." in still.sentence and "NOT ALL STAND: R01" in moving.sentence
+
+
+@pytest.mark.parametrize("given", [[], [STANDS], [UNHEARD]])
+def test_an_answer_that_may_not_be_heard_is_said_to_come_by_multicast_alone(given):
+    """Robots that a stop by their address reached stood, and the address was doubted."""
+    for unheard in ([], ["robot9"]) if given != [STANDS] else (["robot9"],):
+        verdict = of_stop(given, Saying(unheard=unheard))
+        assert verdict.code == 1 and "SWITCH OFF BY HAND what still drives." in verdict.sentence
+        assert "by multicast" in verdict.sentence
+
+
+@pytest.mark.parametrize(
+    ("answers", "options", "is_told"),
+    [
+        ([GOOD], {}, True),
+        ([GOOD, REFUSED], {}, True),
+        ([replace(GOOD, accepted=None)], {}, True),  # drives, and has not confirmed it
+        ([STANDS], {}, True),  # by a clock that is behind it may begin late
+        ([REFUSED, replace(GOOD, accepted=False)], {}, False),
+        ([UNHEARD], {}, False),
+        ([GOOD], {"stopped": [STANDS]}, False),
+    ],
+)
+def test_an_instant_is_told_only_where_a_robot_was_to_start_at_it(answers, options, is_told):
+    assert (begun(*answers, **options).begun_utime_us is not None) == is_told
 
 
 def test_a_robot_that_was_never_heard_is_said_so_with_what_to_do():

@@ -44,7 +44,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import RUN_PERIOD_S, Fleet
     from twinmill.robots.hold import SCRIPT_OVER, Held
-    from twinmill.robots.key import load_or_make
+    from twinmill.robots.key import of_operator
     from twinmill.robots.remote import Remote
     from twinmill.terminal import progress_bar
     from twinmill_cli.keyboard import any_key
@@ -127,7 +127,7 @@ def _characterise(
     name = Path(script).name
     if host:
         copy_script(Remote(host, ssh_config), Path(script), name)
-    fleet, voice = Fleet(lcm_url, channel_prefix, key=load_or_make(key)), Voice()
+    fleet, voice = Fleet(lcm_url, channel_prefix, key=of_operator(key)), Voice()
     try:
         with Recorder(out, force) as recorder, any_key() as pressed:
             run = Run(fleet, recorder, robot, channel_prefix, voice, arm)

@@ -26,6 +26,7 @@ from twinmill_cli.output import (
 
 STDOUT, STDERR = 1, 2
 QUOTED = 80  # letters of what a sentence quotes
+TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
 
@@ -115,7 +116,14 @@ def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
         return
     findings = [] if {*words[:2]} & {*OF_TABLES} else _findings(error)
     with suppress(OSError):  # stdout itself may be what failed
-        print_object({"verdict": "bad_input", "sentence": sentence, "input": findings})
+        told = {"verdict": "bad_input", "sentence": sentence, "input": findings}
+        print_object({**_as_of_robots(words), **told})
+
+
+def _as_of_robots(words: list[str]) -> dict:
+    """Fields that every object of a command to robots has."""
+    verb = words[1] if words[0] == "swarm" else ""
+    return {"verb": verb, "ok": False, "robots": []} if verb in TO_ROBOTS else {}
 
 
 def _findings(error: Exception) -> list[dict]:

@@ -10,7 +10,7 @@ import typer
 
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import KeyFile, LcmUrl, SshConfig
+from twinmill_cli.options import LcmUrl, SshConfig
 from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
@@ -91,7 +91,15 @@ def _flash(
     ] = False,
     wait_s: Annotated[float, typer.Option("--wait-s", min=1, help="For telemetry.")] = 20.0,
     ssh_config: SshConfig = None,
-    key: KeyFile = None,
+    key: Annotated[
+        Path | None,
+        typer.Option(
+            "--key",
+            metavar="FILE",
+            help="The operator's key; made if it is not there. Default: twinmill/swarm.key in "
+            "~/.config.",
+        ),
+    ] = None,
     lcm_url: LcmUrl = URL,
     as_json: AsJson = False,
 ) -> int:

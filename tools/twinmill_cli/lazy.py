@@ -69,6 +69,9 @@ class LazyCommand(TyperCommand):
             # Typer reads all annotations; what a command returns is a type of the library.
             command.callback.__annotations__.pop("return", None)
         command = typer.main.get_group(app).commands[self.registered]
+        if not working():
+            for leaf in command.commands.values() if isinstance(command, TyperGroup) else [command]:
+                leaf.callback = _refuse
         if isinstance(command, TyperGroup):
             command.commands.update(self.below)
         elif self.below:
@@ -91,9 +94,10 @@ class LazyCommand(TyperCommand):
         if words and words[0] in self.below and not isinstance(command, TyperGroup):
             below = self.below[words[0]]
             return below.make_context(f"{info_name} {words[0]}", words[1:], *rest, **options)
-        context = command.make_context(info_name, args, *rest, **options)
-        ends = options.get("resilient_parsing") or isinstance(context.command, TyperGroup)
-        if not (working() or ends):
-            word = next(word for word in words if word in HELP)
-            raise typer.BadParameter(f"{word} is the value of an option here; write ./{word}.")
-        return context
+        return command.make_context(info_name, args, *rest, **options)
+
+
+def _refuse(**_: Any) -> None:
+    """Instead of a command whose help was to be shown, and was not."""
+    word = next(word for word in _options() if word in HELP)
+    raise typer.BadParameter(f"{word} is the value of an option here; write ./{word}.")

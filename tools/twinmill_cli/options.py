@@ -76,8 +76,8 @@ KeyFile = Annotated[
     typer.Option(
         "--key",
         metavar="FILE",
-        help="The operator's key; made if it is not there. Default: twinmill/swarm.key in "
-        "~/.config.",
+        help="The operator's key, which must be there. Default: twinmill/swarm.key in ~/.config, "
+        "made at first use.",
     ),
 ]
 Arm = Annotated[

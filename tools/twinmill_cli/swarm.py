@@ -26,6 +26,7 @@ from twinmill_cli.swarm_door import (
     key_if_there,
     parse_robots,
     refuse_doubles,
+    refuse_stopped,
     refuse_unheard,
 )
 from twinmill_cli.swarm_signals import commanding, ended_by_signals
@@ -38,7 +39,7 @@ if working():  # not for --help
     from twinmill.robots.fleet import LINK_TIMEOUT_MS, RUN_PERIOD_S, Fleet
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
-    from twinmill_cli.swarm_end import driving, finish
+    from twinmill_cli.swarm_end import clocks, driving, finish
     from twinmill_cli.swarm_screen import status_table
     from twinmill_cli.swarm_verdict import (
         Saying,
@@ -60,6 +61,7 @@ def register(app: typer.Typer) -> None:
     swarm = typer.Typer(
         help="Start, stop and watch the robots on the network, or those of twin_run.",
         no_args_is_help=True,
+        context_settings={"token_normalize_func": str.lower},  # STOP is a stop
     )
     swarm.command("start")(_start)
     swarm.command("arm")(_arm)
@@ -118,6 +120,7 @@ def _start(
         refuse_doubles(fleet, asked)
         check_clocks(fleet, asked, in_s, may_differ=partial)
         busy = tell.find_busy(fleet, asked)
+        refuse_stopped(fleet, asked)
         if busy:
             say(f"{of_busy(busy)}; this start takes over.")
         if arm:
@@ -161,11 +164,12 @@ def _drive(
         as_json: how it is printed.
         options: of tell.start().
     """
-    begun = held = None
+    begun, held, odd = None, None, ""
     try:
         started = tell.start(fleet, asked, behavior, **options)
-        begun, held = of_start(started), Held(fleet, started)
-        data |= {"start_utime_us": started.utime_us, "called_off": started.called_off}
+        odd = clocks(fleet, asked)
+        begun, held = of_start(started).more(odd), Held(fleet, started)
+        data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
         voice.tell(lambda: finish("start", started.answers, begun, data, as_json=as_json))
         if started.called_off or not held.robots:
             return begun
@@ -176,6 +180,7 @@ def _drive(
             return begun
         _hold(fleet, held, voice)
         ended = of_end(begun, held.states, None).beside(driving(fleet, asked))
+        ended = ended.more("" if odd else clocks(fleet, asked))
     except BaseException as error:
         if held:
             held.settle()
@@ -183,7 +188,7 @@ def _drive(
         states, known = held.ends() if held else {}, tell.have_confirmed(fleet, asked)
         stopped = of_stop(given, Saying(reach=fleet.reach))
         ended = of_end(begun, states, stopped, was_confirmed=known)
-        ended = ended.beside(driving(fleet, asked))
+        ended = ended.beside(driving(fleet, asked)).more("" if odd else clocks(fleet, asked))
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
             voice.tell(lambda: finish("start", given, ended, data, as_json=as_json))
@@ -298,8 +303,15 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
+    names = ", ".join(f"R{r.robot_id:02d}" for r in robots)
+    heard = Verdict(bool(robots), f"Heard: {names}." if robots else "No robot is heard.")
+    odd = clocks(fleet, fleet.robots)
     if as_json:
-        print_object({"robots": [r.to_json() for r in robots], "key_fault": key_fault or None})
+        data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
+        known = [r.to_json() for r in robots]
+        print_object({**data, "robots": known, "key_fault": key_fault or None})
     else:
         PlainConsole().print(status_table(robots, has_key=fleet.has_key))
-    return 0 if robots else 1
+        if odd:
+            PlainConsole().print(odd, soft_wrap=True)
+    return heard.code

@@ -16,7 +16,7 @@ if working():  # not for --help
     from twinmill.data.bus import check_url
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
-    from twinmill.robots.key import load, load_or_make
+    from twinmill.robots.key import load, of_operator
     from twinmill_cli.swarm_verdict import of_clocks
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def join(lcm_url: str, channel_prefix: str | None, key: Path | None) -> Fleet:
         ValueError: the key cannot be used, or there is no such bus; the sentence says so.
     """
     try:
-        operator_key = load_or_make(key)
+        operator_key = of_operator(key)
     except OSError as error:
         raise ValueError(f"{key_fault(error)} Nothing was said to any robot.") from error
     except ValueError as error:
@@ -160,6 +160,15 @@ def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
                 f"({', '.join(robot.senders.hosts)}): give one another number, "
                 "`twinmill robot flash HOST=ID`."
             )
+
+
+def refuse_stopped(fleet: Fleet, robots: set[int]) -> None:
+    """Raises ValueError if somebody stopped some robots while this looked who is there."""
+    if heard := fleet.stop_heard(robots):
+        raise ValueError(
+            f"nothing was started: a stop came from {heard}: ask there before you arm and start "
+            "them again (--arm)."
+        )
 
 
 def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: bool) -> None:

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 
 from rich.console import Group
 
+from twinmill.robots.tell import DRIVING
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_screen import answer_table
-from twinmill_cli.swarm_verdict import DRIVING
+from twinmill_cli.swarm_verdict import of_clocks_now
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.tell import Answer
     from twinmill_cli.swarm_verdict import Verdict
@@ -21,6 +24,12 @@ def driving(fleet: Fleet, asked: set[int]) -> list[str]:
     """Robots that drive and were not asked; nobody was asked where all were."""
     others = [fleet.robots[i] for i in sorted(set(fleet.robots) - asked)] if asked else []
     return [f"R{r.robot_id:02d}" for r in others if r.mode in DRIVING and r.is_here]
+
+
+def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
+    """Sentence on clocks of some robots that are odd now; empty if none is."""
+    known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
+    return of_clocks_now({f"R{r.robot_id:02d}": r.clock_s for r in known})
 
 
 def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_json: bool) -> int:

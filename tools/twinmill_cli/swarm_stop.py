@@ -37,6 +37,15 @@ if working():  # not for --help
     from twinmill_cli.voice import Voice
 
 WRONG_COMMAND_LINE = 2
+MISREAD = "twinmill_cli.misread"  # in a context: why not all of its command line was read
+FLAGS = ("--json",)
+# What counts of a command line that cannot be read: it says nothing of which robots are meant.
+# Fewer and fewer options, where these cannot be read either.
+KEPT = (
+    ("--host", "--key", "--lcm-url", "--channel-prefix"),
+    ("--lcm-url", "--channel-prefix"),
+    ("--lcm-url",),
+)
 
 
 @contextmanager
@@ -47,20 +56,64 @@ def _refusing() -> Iterator[None]:
     except typer.TyperException as error:
         if error.exit_code != WRONG_COMMAND_LINE:
             raise
-        raise typer.BadParameter(f"{error.format_message()} NOTHING WAS STOPPED.") from error
+        raise typer.BadParameter(f"{_sentence(error)} NOTHING WAS STOPPED.") from error
+
+
+def _sentence(error: typer.TyperException) -> str:
+    """Typer's, which may lack its full stop."""
+    words = error.format_message()
+    return words if words.endswith((".", "?")) else f"{words}."
 
 
 class StopCommand(TyperCommand):
-    """A stop whose options cannot be read stops nothing, but for --robots, and says so."""
+    """A stop whose command line cannot be read tells all robots to stop: whoever says it means one.
 
-    def make_context(self, *words: Any, **options: Any) -> typer.Context:
-        """Typer's; raises typer.BadParameter."""
+    Only where the bus cannot be read nobody knows where they are: then it says that nothing was
+    stopped.
+    """
+
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **options: Any
+    ) -> typer.Context:
+        """Typer's; where it would refuse, that of what is left without the words on robots.
+
+        Raises:
+            typer.BadParameter: the bus cannot be read.
+        """
+        words = list(args)
+        try:
+            return super().make_context(info_name, args, *rest, **options)
+        except typer.TyperException as error:
+            if error.exit_code != WRONG_COMMAND_LINE or not working():
+                raise
+            misread = _sentence(error)
+        for kept in KEPT:
+            try:
+                context = super().make_context(info_name, _kept(words, kept), *rest, **options)
+            except typer.TyperException as error:
+                refused = error
+                continue
+            context.meta[MISREAD] = misread
+            return context
         with _refusing():
-            return super().make_context(*words, **options)
+            raise refused
+
+
+def _kept(words: list[str], kept: Sequence[str]) -> list[str]:
+    """Some options of a command line, each with its value, if any is there."""
+    found = []
+    for place, word in enumerate(words):
+        name, has_value, _ = word.partition("=")
+        if name in FLAGS:
+            found.append(name)
+        elif name in kept:
+            found += words[place : place + (1 if has_value else 2)]
+    return found
 
 
 def stop(
     *,
+    context: typer.Context,
     robots: Robots = None,
     timeout_s: Annotated[float, typer.Option("--timeout-s", min=0.5, help="Give up after.")] = 10.0,
     host: Annotated[
@@ -69,7 +122,7 @@ def stop(
             "--host",
             metavar="HOST",
             help="Tell this machine, too, though it was never heard: where multicast does not "
-            "pass. Repeatable.",
+            "pass. Answers come by multicast alone. Repeatable.",
         ),
     ] = None,
     key: KeyThere = None,
@@ -79,14 +132,14 @@ def stop(
 ) -> int:
     """Stop robots: said again until each has signed that it stands.
 
-    They start again only after `twinmill swarm arm`, or by their button. Where --robots cannot be
-    read, all are stopped, and the exit code is 2.
+    They start again only after `twinmill swarm arm`, or by their button. Where the command line
+    cannot be read, all are stopped, and the exit code is 2.
 
     Example: twinmill swarm stop
     """
     voice = Voice()
     with counting_signals() as signals:
-        asked, misread = _selected(robots)
+        asked, misread = _selected(robots, context.meta.get(MISREAD, ""))
         with _refusing():
             check_bus(lcm_url, channel_prefix or None)
         operator_key, fault = key_if_there(key)
@@ -116,6 +169,7 @@ def stop(
             unheard=hosts.unheard(fleet),
             is_cut_short=is_cut_short,
             reach=fleet.reach,
+            to_all=not asked,
             key_fault=f"No robot's signature could be checked: {fault}" if fault else "",
         )
         verdict = of_stop(given, how, is_of_some=bool(asked)).beside(driving(fleet, asked))
@@ -129,12 +183,13 @@ def stop(
     return code
 
 
-def _selected(robots: str | None) -> tuple[set[int], str]:
-    """The robots to stop, all where that cannot be read, and a sentence on it."""
+def _selected(robots: str | None, misread: str) -> tuple[set[int], str]:
+    """The robots to stop, all where something could not be read, and then a sentence on it."""
     try:
-        return parse_robots(robots), ""
+        asked = parse_robots(robots)
     except typer.BadParameter as error:
-        return set(), f"{error.format_message()} So all robots are told to stop."
+        asked, misread = set(), _sentence(error)
+    return asked, f"{misread} So all robots are told to stop." if misread else ""
 
 
 def _ends_a_stop(signals: Sequence[int]) -> bool:

@@ -11,9 +11,17 @@ from twinmill.data.bus import Reach
 from twinmill.robots.countdown import STOPPED
 from twinmill.robots.fleet import Robot
 from twinmill.robots.hold import State
-from twinmill.robots.tell import AHEAD_S, LATE_S, NEVER_HEARD, STOP_LEAST_S, Answer, Start
+from twinmill.robots.tell import (
+    AHEAD_S,
+    DRIVING,
+    LATE_S,
+    NEVER_HEARD,
+    STOP_LEAST_S,
+    Answer,
+    Start,
+)
 
-DRIVING = ("running", "script")
+BY_HAND = "SWITCH OFF BY HAND what still drives."
 CLOCK_WARN_S = 0.05
 
 
@@ -39,7 +47,11 @@ class Verdict:
         if not driving:
             return self
         verb = "drives" if len(driving) == 1 else "drive"
-        return Verdict(self.ok, f"{self.sentence} {', '.join(driving)} {verb}, and was not asked.")
+        return self.more(f"{', '.join(driving)} {verb}, and was not asked.")
+
+    def more(self, words: str) -> Verdict:
+        """This outcome with words that change nothing of it; they may be empty."""
+        return Verdict(self.ok, _joined(self.sentence, words))
 
 
 @dataclass(frozen=True)
@@ -53,6 +65,7 @@ class Saying:
         is_cut_short: a signal ended it.
         reach: how far it got.
         key_fault: a sentence on why no robot's signature could be checked; empty: they were.
+        to_all: to all that hear it, none by its number.
     """
 
     passed_s: float = 10.0
@@ -61,14 +74,21 @@ class Saying:
     is_cut_short: bool = False
     reach: Reach = field(default_factory=Reach)
     key_fault: str = ""
+    to_all: bool = False
 
     @property
     def hint(self) -> str:
         """Advice where a robot was not heard."""
         if self.unheard:
             names = ", ".join(self.unheard)
-            return f"Nothing was heard from {names}: is the name or address right?"
-        return "Where the network carries no multicast, give a robot's address: swarm stop --host."
+            return (
+                f"Nothing was heard from {names}: is the name or address right? Robots answer by "
+                "multicast alone: where the network carries none, nobody hears that they obeyed."
+            )
+        return (
+            "Where the network carries no multicast, give a robot's address: swarm stop --host; it "
+            "obeys then, but its answer, by multicast, is not heard."
+        )
 
     @property
     def lost(self) -> str:
@@ -94,7 +114,7 @@ class Saying:
             return _joined(self.lost, f"{heard}.", by_hand)
         where = f" on {', '.join(sorted(self.reach.networks))}" if self.reach.networks else ""
         time = "" if self.lost else " all the time"
-        return _joined(f"{heard}; stop was said{time}{where}.", self.lost)
+        return _joined(f"{heard}; stop was said{time}{where}.", BY_HAND, self.lost)
 
 
 def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool = False) -> Verdict:
@@ -121,9 +141,10 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
     return Verdict(
         False,
         _joined(
-            f"NOT ALL STAND: {'; '.join(told)}. SWITCH OFF BY HAND what still drives.",
+            f"NOT ALL STAND: {'; '.join(told)}. {BY_HAND}",
             how.key_fault if unconfirmed else "",
             f"{_names(silent)}: {NEVER_HEARD}." if silent else "",
+            _besides(sure),
             how.lost,
             how.cut,
             f"{_names(sure)} confirmed it." if how.cut and sure else "",
@@ -135,16 +156,24 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
 def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdict:
     """All that answered have confirmed the stop; others may be there."""
     names = f"{_names(given)} {'stands' if len(given) == 1 else 'stand'}"
-    lost_link = [a for a in given if a.lost_link]
-    before = f"{_names(lost_link)} stood before: it had lost its operator." if lost_link else ""
+    more = _joined(_besides(given), how.lost)
     if how.unheard:
-        words = f"NOT ALL STAND: {how.hint} Whoever was heard stands."
-        return Verdict(False, _joined(words, before, how.lost, how.cut))
+        words = f"NOT ALL STAND: {how.hint} {BY_HAND} Whoever was heard stands: {_names(given)}."
+        return Verdict(False, _joined(words, more, how.cut))
     too_short = how.reached_s is not None and how.reached_s < STOP_LEAST_S
     if too_short and not is_of_some:
         words = f"{names}; others may not have been heard yet."
-        return Verdict(False, _joined(words, before, how.lost, how.cut))
-    return Verdict(True, _joined(f"{names}." if is_of_some else "All stand.", before, how.lost))
+        return Verdict(False, _joined(words, more, how.cut))
+    heard = f"Those are all that were heard: {_names(given)}." if how.to_all else ""
+    words = f"{names}." if is_of_some else _joined("All stand.", heard)
+    return Verdict(True, _joined(words, more))
+
+
+def _besides(given: list[Answer]) -> str:
+    """Remarks on robots that have confirmed a stop."""
+    lost_link = [a for a in given if a.lost_link]
+    before = f"{_names(lost_link)} stood before: it had lost its operator." if lost_link else ""
+    return _joined(before, *(f"{_names([a])} {a.reason}." for a in given if a.reason))
 
 
 def _joined(*sentences: str) -> str:
@@ -178,7 +207,22 @@ def of_clocks(clock_s: dict[str, float], ahead_s: float) -> str:
         clock_s: how far that of each robot is ahead of this computer's.
         ahead_s: from now to the start by this computer's clock.
     """
-    off = {name: s for name, s in clock_s.items() if abs(s) > CLOCK_WARN_S}
+    then = ", ".join(f"{name} {_then(s, ahead_s)}" for name, s in _off_clocks(clock_s).items())
+    return f"{_odd_clocks(clock_s)}. By that, {then}" if then else ""
+
+
+def of_clocks_now(clock_s: dict[str, float]) -> str:
+    """Sentence on whose clock is odd and by how much; empty if none is."""
+    odd = _odd_clocks(clock_s)
+    return f"{odd[0].upper()}{odd[1:]}." if odd else ""
+
+
+def _off_clocks(clock_s: dict[str, float]) -> dict[str, float]:
+    return {name: s for name, s in clock_s.items() if abs(s) > CLOCK_WARN_S}
+
+
+def _odd_clocks(clock_s: dict[str, float]) -> str:
+    off = _off_clocks(clock_s)
     right = [name for name in clock_s if name not in off]
     if not off:
         return ""
@@ -190,8 +234,7 @@ def of_clocks(clock_s: dict[str, float], ahead_s: float) -> str:
         told = "; ".join(f"{name}'s clock is {_off(s)} this computer's" for name, s in off.items())
         told += f", with which {', '.join(right)} agree{'s' * (len(right) == 1)}" if right else ""
         whose = ("its" if len(off) == 1 else "theirs") if right else "all"
-    then = ", ".join(f"{name} {_then(s, ahead_s)}" for name, s in off.items())
-    return f"{told}: set {whose} (NTP). By that, {then}"
+    return f"{told}: set {whose} (NTP)"
 
 
 def _off(s: float) -> str:
@@ -305,6 +348,8 @@ def _of_called_off(begun: Start) -> Verdict:
     words = f"Called off: {_why_called_off(begun)}."
     if taken:
         words += f" {_names(taken)}: left to that operator."
+    if STOPPED in begun.dropouts.words.values():
+        words += f" {_who_stopped(begun)}"
     if begun.stopped:
         whom = "The others" if taken else "All"
         stopped = of_stop(begun.stopped, is_of_some=bool(taken)).sentence
@@ -312,6 +357,13 @@ def _of_called_off(begun: Start) -> Verdict:
         words += f" {whom} were told to stop: {stopped} They must be armed before they start"
         words += f" (--arm){more}."
     return Verdict(False, words)
+
+
+def _who_stopped(begun: Start) -> str:
+    """From where another's stop came, and what to do about it."""
+    if begun.stop_heard:
+        return f"A stop came from {begun.stop_heard}: ask there before you start them again."
+    return "Ask who stopped them before you start them again."
 
 
 def _of_nobody(begun: Start, at: str) -> str:

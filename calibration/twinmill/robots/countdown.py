@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Until the instant of a start: who of those that accepted it will not start with the others."""
 
+import math
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
 import turbopi
 
-from twinmill.robots.fleet import GONE_S, TELEMETRY, Fleet, Robot
+from twinmill.robots.fleet import GONE_S, SIGNED_S, TELEMETRY, Fleet, Robot
 
-SIGNED_S = 2.0  # robots sign ten times a second; half of all lost, so many in a row are not
-
+ARM = turbopi.signed_command_t.VERB_ARM
 STOPPED = "stopped by another command"
 NOT_BEGUN = "not driving when the others had begun"
 UNHEARD = "told something by another operator who was not heard here"
@@ -18,7 +18,7 @@ UNHEARD = "told something by another operator who was not heard here"
 
 @dataclass(frozen=True)
 class Dropouts:
-    """Robots that have accepted a start and will not begin it with the others.
+    """Robots that will not begin a start: they accepted it, or another's stop came before that.
 
     Attributes:
         words: why, by number, to go on behind "was" or "were".
@@ -37,7 +37,9 @@ class Dropouts:
 
 
 def find_dropouts(fleet: Fleet, robots: set[int], seq: int, *, only_stopped: bool) -> Dropouts:
-    """Robots that have accepted a start, and what they have signed, or not, speaks against it.
+    """Robots for which a start is over, by what they have signed, or not, since they were armed.
+
+    Who refuses it for a reason of his own is none of them.
 
     Args:
         fleet: where they are.
@@ -46,8 +48,10 @@ def find_dropouts(fleet: Fleet, robots: set[int], seq: int, *, only_stopped: boo
         only_stopped: who does not begin is left behind; but a stop is meant for all.
     """
     words, taken = {}, set()
-    for robot, ack in _accepted(fleet, robots, seq):
-        why, is_taken = _why(fleet, robot, ack)
+    for robot, ack in _answered(fleet, robots, seq):
+        why, is_taken = (
+            _why(fleet, robot, ack) if ack.accepted else (_why_not(fleet, robot, ack), False)
+        )
         if why and (why == STOPPED or not only_stopped):
             words[robot.robot_id] = why
             taken |= {robot.robot_id} if is_taken else set()
@@ -58,20 +62,31 @@ def stopped_by_another(fleet: Fleet, robots: set[int], seq: int) -> dict[int, st
     """Those that have accepted a start, and signed since that they obeyed a stop not said here."""
     return {
         robot.robot_id: STOPPED
-        for robot, ack in _accepted(fleet, robots, seq)
-        if _obeyed_a_stop(fleet, robot, ack)
+        for robot, ack in _answered(fleet, robots, seq)
+        if ack.accepted and _obeyed_a_stop(fleet, robot, ack.session, after_us=ack.session_us)
     }
 
 
-def _accepted(fleet: Fleet, robots: set[int], seq: int) -> list[tuple[Robot, Any]]:
+def _answered(fleet: Fleet, robots: set[int], seq: int) -> list[tuple[Robot, Any]]:
     known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
-    return [(r, ack) for r in known if (ack := r.signed_acks.get(seq)) and ack.accepted]
+    return [(r, ack) for r in known if (ack := r.signed_acks.get(seq))]
+
+
+def _why_not(fleet: Fleet, robot: Robot, ack: Any) -> str:
+    """Reason of one that refused, where that is another's stop since it was armed."""
+    armed_us = [
+        a.session_us
+        for a in robot.signed_acks.values()
+        if a.verb == ARM and a.accepted and a.session == ack.session
+    ]
+    between = {"after_us": max(armed_us, default=0), "before_us": ack.session_us}
+    return STOPPED if _obeyed_a_stop(fleet, robot, ack.session, **between) else ""
 
 
 def _why(fleet: Fleet, robot: Robot, ack: Any) -> tuple[str, bool]:
     """Reason, empty where it will start; and whether it is another operator's."""
     link, now_s = robot.link, time.monotonic()
-    if _obeyed_a_stop(fleet, robot, ack):
+    if _obeyed_a_stop(fleet, robot, ack.session, after_us=ack.session_us):
         return STOPPED, False
     if link.session != ack.session:
         return "started anew, and has forgotten it", False
@@ -91,12 +106,14 @@ def _why(fleet: Fleet, robot: Robot, ack: Any) -> tuple[str, bool]:
     return "", False
 
 
-def _obeyed_a_stop(fleet: Fleet, robot: Robot, since: Any) -> bool:
-    """Of somebody else, after this signed_ack_t."""
+def _obeyed_a_stop(
+    fleet: Fleet, robot: Robot, session: int, *, after_us: int, before_us: float = math.inf
+) -> bool:
+    """Of somebody else, in this time of this session."""
     return any(
         ack.verb == turbopi.swarm_command_t.VERB_STOP
         and ack.accepted
-        and ack.session_us > since.session_us
+        and after_us < ack.session_us < before_us
         for seq, ack in robot.signed_acks.items()
-        if seq not in fleet.said and ack.session == since.session
+        if seq not in fleet.said and ack.session == session
     )

@@ -22,7 +22,9 @@ from twinmill.robots import key as keys
 BACKLOG_S = 0.02  # what waits is taken in for so long at once
 WINDOW_S = 2.0  # over which rates and detections are told
 RUN_PERIOD_S = 5.5  # robots say who they are every 5 s
+SIGNED_S = 2.0  # robots sign ten times a second; half of all lost, so many in a row are not
 GONE_S = 1.0  # a robot that said nothing for so long is not there; it speaks 30 times a second
+ALL, ROBOTS_MAX = -1, 100  # in swarm_command_t, robot_id is one of 0..99, or all
 MODES = ("stopped", "running", "script", "fault")
 TELEMETRY = turbopi.telemetry_t
 # What keeps a robot from doing what it is told, or hides it, loudest first.
@@ -35,13 +37,13 @@ ALARMS = (
     (TELEMETRY.STATUS_CAMERA_LOST, "camera lost"),
     (TELEMETRY.STATUS_BATTERY_LOW, "battery low"),
     (TELEMETRY.STATUS_LOG_LOST, "rows of a log lost"),
-    (TELEMETRY.STATUS_LATCH_LOST, "cannot keep in mind whether it was stopped"),
+    (TELEMETRY.STATUS_LATCH_LOST, "forgets a stop if started anew: run_dir cannot be written"),
 )
 # A robot with one of these may be moving, whatever it was told.
 MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
 # Fields of text, which may be anybody's: most of these messages are not signed.
 TEXTS = {"source": NAME_MAX, "version": NAME_MAX, "behavior": NAME_MAX, "reason": LINE_MAX}
-SIGNED_COMMANDS = "SWARM_SIGNED"
+SIGNED_COMMANDS, PLAIN_COMMANDS = "SWARM_SIGNED", "SWARM_COMMAND"
 COMMANDS = {
     turbopi.swarm_command_t.VERB_START: "start",
     turbopi.swarm_command_t.VERB_SELECT: "select",
@@ -124,6 +126,23 @@ class Robot:
         t = self.telemetry
         return (
             self.mode == "stopped" and not t.status_flags & MAY_MOVE and not any(t.wheel_duty_pct)
+        )
+
+    @property
+    def signs_that_it_stands(self) -> bool:
+        """It has signed just now that its board took zero.
+
+        What else it says, signed or not, may only contradict that.
+        """
+        link = self.link
+        return bool(
+            link
+            and time.monotonic() - self.link_s < SIGNED_S
+            and link.stands
+            and not link.status_flags & MAY_MOVE
+            and self.stands
+            and self.is_here
+            and not self.is_double
         )
 
     def confirms(self, seq: int) -> bool:
@@ -245,7 +264,7 @@ class Robot:
             "version": run.version if run else None,
             "behavior": run.behavior if run else None,
             "mode": self.mode or None,
-            "stands": self.stands,
+            "stands": self.signs_that_it_stands,
             "alarms": self.alarms,
             "hosts": self.senders.hosts,
             "signed": self.link is not None,
@@ -293,11 +312,14 @@ class Fleet:
         # Numbers of the commands that were said from here, and the highest counter of those.
         self.said: set[int] = set()
         self.counter = 0
+        # From where stops of others came, and when, by the robot that was told; the newest last.
+        self._stops: dict[int, str] = {}
         self._prefix, self._key, self._hold_s = channel_prefix, key, 0.0
         try:
             self.bus = connect(url)
             kinds = "TELEMETRY|RUN|ACK|LINK|SIGNED_ACK"
-            channels = f"{re.escape(channel_prefix)}(R[0-9]{{2,3}}_({kinds})|{SIGNED_COMMANDS})"
+            commands = f"{SIGNED_COMMANDS}|{PLAIN_COMMANDS}"
+            channels = f"{re.escape(channel_prefix)}(R[0-9]{{2,3}}_({kinds})|{commands})"
             self.bus.subscribe(channels, self._on_message)
         except RuntimeError as error:
             raise ValueError(
@@ -310,6 +332,9 @@ class Fleet:
         name, _, kind = channel.removeprefix(self._prefix).partition("_")
         if channel == self._prefix + SIGNED_COMMANDS:
             self._on_command(data)
+            return
+        if channel == self._prefix + PLAIN_COMMANDS:
+            self._on_plain_command(data)
             return
         try:
             message = getattr(turbopi, f"{kind.lower()}_t").decode(data)
@@ -365,6 +390,23 @@ class Fleet:
             robot.commands[sealed.counter] = Heard(
                 command.seq, command.verb, sealed.session, sealed.counter, words
             )
+
+    def _on_plain_command(self, data: bytes) -> None:
+        """Notes where a stop comes from, which anybody may say."""
+        try:
+            command = turbopi.swarm_command_t.decode(data)
+        except (ValueError, struct.error, IndexError):
+            return
+        sender, robot_id = getattr(self.bus, "sender", None), command.robot_id
+        is_stop = command.verb == command.VERB_STOP and ALL <= robot_id < ROBOTS_MAX
+        if is_stop and command.seq not in self.said and sender:
+            self._stops.pop(robot_id, None)
+            self._stops[robot_id] = f"{sender[0]} at {datetime.now():%H:%M:%S}"
+
+    def stop_heard(self, robots: set[int]) -> str:
+        """From where the newest stop of one of some robots came, and when; empty if none did."""
+        heard = [words for i, words in self._stops.items() if i in {ALL, *robots}]
+        return heard[-1] if heard else ""
 
     def others(self, robot: Robot, session: int) -> list[Heard]:
         """Commands of other operators that a robot has obeyed since it was told from here.
@@ -465,7 +507,7 @@ class Fleet:
             OSError: there is no way to.
         """
         self.said.add(command.seq)
-        channel = f"{self._prefix}SWARM_COMMAND"
+        channel = self._prefix + PLAIN_COMMANDS
         if not host:
             self.bus.publish(channel, command.encode())
         elif hasattr(self.bus, "tell"):  # other buses know no machines

@@ -25,6 +25,16 @@ def default_path() -> Path:
     return Path(config) / "twinmill" / "swarm.key"
 
 
+def of_operator(path: Path | None = None) -> bytes:
+    """The operator's key: a file that is named must be there, the user's own is made at first use.
+
+    Raises:
+        ValueError: as of load() and load_or_make().
+        OSError: it cannot be read.
+    """
+    return load(path) if path else load_or_make()
+
+
 def load_or_make(path: Path | None = None) -> bytes:
     """The operator's key; one is made if there is none yet.
 
@@ -53,10 +63,11 @@ def load(path: Path | None = None) -> bytes:
     """
     file = path or default_path()
     if not file.exists():
+        named = f" {option('key', str(file))}" if path else ""
         raise ValueError(
             f"{option('key', str(file))}: there is no key here, so no robot's answer is believed; "
-            "copy the "
-            "operator's, or make one: `twinmill robot flash`."
+            "copy the operator's, or make one and bring it to robots: "
+            f"`twinmill robot flash HOST{named}`."
         )
     if not file.is_file():
         raise ValueError(f"{option('key', str(file))}: is no file; name the file of a key.")

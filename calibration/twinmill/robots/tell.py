@@ -18,10 +18,9 @@ import turbopi
 
 from twinmill.arguments import option
 from twinmill.robots.countdown import NOT_BEGUN, Dropouts, find_dropouts, stopped_by_another
-from twinmill.robots.fleet import LINK_TIMEOUT_MS, Fleet, Robot
+from twinmill.robots.fleet import ALL, LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
-ALL = -1
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
 # Before the common instant: time to call a start off that not all have acknowledged.
 CALL_OFF_S = 0.3
@@ -34,6 +33,7 @@ STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard 
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
 STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
+DRIVING = ("running", "script")
 NEVER_HEARD = "was never heard"
 NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
@@ -59,6 +59,7 @@ class Answer:
         link_timeout_s: of a start that it accepted: how long it drives on without hearing this
             operator, as it has signed since; 0: for ever.
         lost_link: it has signed that it stood because it had lost its operator.
+        clock_ahead_s: how far its clock is ahead of this computer's; None if it was never heard.
     """
 
     robot_id: int
@@ -72,6 +73,12 @@ class Answer:
     last_heard_s: float | None = None
     link_timeout_s: float | None = None
     lost_link: bool = False
+    clock_ahead_s: float | None = None
+
+    @property
+    def is_driving(self) -> bool:
+        """Its telemetry says so."""
+        return self.mode in DRIVING
 
     @property
     def untethered(self) -> bool | None:
@@ -363,6 +370,7 @@ class Start:
             had not begun.
         dropouts: robots that had accepted, and for which it was called off.
         link_timeout_ms: that was sent with it; 0: they drive on without their operator.
+        stop_heard: from where a stop came that was not said here, and when; empty: none was heard.
     """
 
     utime_us: int
@@ -373,6 +381,13 @@ class Start:
     late: list[Answer] = field(default_factory=list)
     dropouts: Dropouts = field(default_factory=Dropouts)
     link_timeout_ms: int = LINK_TIMEOUT_MS
+    stop_heard: str = ""
+
+    @property
+    def begun_utime_us(self) -> int | None:
+        """The instant; None where no robot was to start at it in the end."""
+        begin = [a for a in self.answers if a.accepted or (a.accepted is None and a.is_driving)]
+        return self.utime_us if begin and not self.called_off else None
 
 
 def start(
@@ -387,9 +402,10 @@ def start(
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
-    Up to the instant a robot may drop out that has accepted: it starts anew, is not heard any more,
-    is stopped by another or told something else. Then all others are told to stop, and if one does
-    not begin with them, too. Robots that another operator is to start instead are left to him.
+    Up to the instant a robot may drop out: it starts anew, is not heard any more, is stopped by
+    another, be it before it could accept, or told something else. Then all others are told to stop,
+    and if one does not begin with them, too. Robots that another operator is to start instead are
+    left to him.
 
     From the instant on they are held: as long as the fleet listens, they hear that the operator is
     there. Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
@@ -454,7 +470,7 @@ def start(
             for now, a in zip(final, given, strict=True)
         ]
     begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out)
-    return Start(*begun, link_timeout_ms)
+    return Start(*begun, link_timeout_ms, fleet.stop_heard(robots))
 
 
 def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
@@ -496,12 +512,13 @@ def _answer(robot: Robot, command, unsigned: str) -> Answer:
         signed=signed is not None,
         reason=reason,
         mode=robot.mode,
-        stands=_stands(robot, command) and not robot.is_double,
+        stands=_stands(robot, command),
         is_double=robot.is_double,
         alarms=robot.alarms,
         last_heard_s=time.monotonic() - robot.heard_s if robot.heard_s else None,
         link_timeout_s=_link_timeout_s(robot, signed) if command.verb in STARTS else None,
         lost_link=robot.lost_link,
+        clock_ahead_s=robot.clock_s if robot.recent else None,
     )
 
 
@@ -520,10 +537,10 @@ def _link_timeout_s(robot: Robot, ack) -> float | None:
 
 
 def _stands(robot: Robot, command) -> bool:
-    """It confirmed this stop; or, of another command, it says so now."""
+    """It confirmed this stop; or, of another command, it signs so now."""
     if command.verb == VERBS.VERB_STOP:
-        return robot.confirms(command.seq)
-    return robot.stands and robot.is_here
+        return robot.confirms(command.seq) and not robot.is_double
+    return robot.signs_that_it_stands
 
 
 def _why_silent(robot: Robot, unsigned: str) -> str:
