@@ -383,6 +383,13 @@ def take_of_angles(head, angles):
     return head[: head.index("0,0.000")] + rows
 
 
+@pytest.mark.parametrize("take", [MOTIVE, "\ufeff" + MOTIVE, SAVED_AGAIN])
+def test_motive_exports_given_as_a_table_are_told_by_their_option(put, tmp_path, take):
+    """A ragged row had been blamed instead."""
+    with pytest.raises(LogError, match="is an export of Motive; give it with motive"):
+        import_log(put("take.csv", take), put("c.csv", COMMANDS), tmp_path / "o.lcmlog")
+
+
 def test_motive_euler_angles_are_about_axes_that_turn_with_the_body(put, tmp_path):
     """Yaw about Y first, by the vector that is carried along: turned 90 degrees, then nodding."""
     head = MOTIVE.replace("Quaternion", "YXZ")

@@ -262,6 +262,31 @@ def test_kinds_of_drive_must_not_mix(write_log, message):
         read_log(path)
 
 
+def test_what_drove_a_robot_stands_beside_what_its_camera_saw(write_log, message):
+    """As a twin says that is told velocities: its firmware's duties drove nothing."""
+    telemetry = [
+        (
+            "R07_TELEMETRY",
+            message("telemetry", robot_id=7, utime_us=t, detected=t // 10, battery_V=8.0),
+        )
+        for t in (10, 20, 30)
+    ]
+    drive = [
+        ("R07_DRIVE", message("drive", robot_id=7, utime_us=t, kind=2, value=[t / 100, 0, -1.0, 0]))
+        for t in (20, 30, 40)
+    ]
+    log = read_log(write_log(*telemetry, *drive))
+    robot = log.robots[7]
+    assert robot.command_kind == "twist" and robot.command[:, 0].tolist() == [0.2, 0.3]
+    np.testing.assert_allclose(robot.command_t_s, [0, 10e-6])
+    assert robot.detected.tolist() == [2, 3] and robot.battery_V.tolist() == [8, 8]
+    assert any("2 messages of telemetry or drive" in w for w in log.warnings)
+
+    log = read_log(write_log(*telemetry, *drive[2:]))
+    assert log.robots[7].command_kind == "duty" and len(log.robots[7].command) == 3
+    assert any("telemetry was used" in w for w in log.warnings)
+
+
 def test_valid_pose_without_unit_quaternion_is_lost(write_log, message):
     path = write_log(
         ("R07_POSE", message("pose", robot_id=7, orientation_wxyz=[0.0] * 4)),

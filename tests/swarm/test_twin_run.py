@@ -92,6 +92,7 @@ def test_log_holds_what_real_robots_would_say(tmp_path):
         for i in range(3)
         for name in (
             f"R{i:02d}_TELEMETRY",
+            f"R{i:02d}_DRIVE",
             f"R{i:02d}_POSE",
             f"R{i:02d}_RUN",
             f"TWIN_TRUTH_R{i:02d}",
@@ -104,6 +105,12 @@ def test_log_holds_what_real_robots_would_say(tmp_path):
     assert all(t.frame_utime_us == t.utime_us and t.mode == t.MODE_TABLE for t in telemetry)
     # Milling at full speed: the vendor's mixing gives 100 and 37.
     assert {tuple(sorted(t.wheel_duty_pct)) for t in telemetry} == {(37, 37, 100, 100)}
+    # This model is told velocities: of the paper's milling, 0.25 m/s and 45 degrees/s.
+    driven = messages["R01_DRIVE"]
+    assert [d.utime_us for d in driven] == [t.utime_us for t in telemetry]
+    assert {d.kind for d in driven} == {turbopi.drive_t.KIND_TWIST}
+    told = {(d.value[0], abs(d.value[2]), d.value[1], d.value[3]) for d in driven}
+    assert [pytest.approx(row) for row in told] == [(0.25, np.pi / 4, 0, 0)]
     assert 8.0 < telemetry[-1].battery_V < telemetry[0].battery_V <= 8.2
     assert len(messages["R01_RUN"]) == 3  # at 0, 5 and 10 s
     assert messages["R01_RUN"][0].source == "twin"
@@ -161,6 +168,7 @@ def test_script_is_played_instead_of_the_table(tmp_path):
     run("--n", 1, "--script", script, "--log", log, model="turbopi_nominal.toml")
     messages = read(log)[0]
     assert {t.mode for t in messages["R00_TELEMETRY"]} == {2}
+    assert "R00_DRIVE" not in messages  # the duties are what it was told
     truths = messages["TWIN_TRUTH_R00"]
     # Half of 0.36 m/s for a second, up to one control period longer.
     moved = np.hypot(truths[-1].x_m - truths[0].x_m, truths[-1].y_m - truths[0].y_m)

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "turbopi/body_t.hpp"
+#include "turbopi/drive_t.hpp"
 #include "turbopi/pose_t.hpp"
 #include "turbopi/run_t.hpp"
 #include "turbopi/telemetry_t.hpp"
@@ -39,9 +40,11 @@ Publisher::Publisher(Outlet &outlet, const Swarm &swarm, const std::vector<Model
     {
         const size_t i = static_cast<size_t>(id);
         const std::string name = RobotName(id), prefix = channel_prefix + name;
-        members_.push_back({std::move(robots[i]), DriveChain(models[i]), models[i].noise,
-                            models[i].robot.wheel_radius_m, Random(seed, id, "motion_capture"),
-                            swarm.State(id), prefix + "_TELEMETRY", prefix + "_POSE",
+        members_.push_back({std::move(robots[i]), models[i].base,
+                            Kinematics(models[i].robot, models[i].base.wheels),
+                            DriveChain(models[i]), models[i].noise, models[i].robot.wheel_radius_m,
+                            Random(seed, id, "motion_capture"), swarm.State(id),
+                            prefix + "_TELEMETRY", prefix + "_DRIVE", prefix + "_POSE",
                             prefix + "_RUN", "TWIN_TRUTH_" + name});
     }
 }
@@ -65,6 +68,8 @@ void Publisher::PublishDecisions(const Swarm &swarm)
         if (run_due)
             PublishRun(id, swarm.UtimeUs());
         PublishTelemetry(id, swarm);
+        if (members_[static_cast<size_t>(id)].base.drive != Drive::kDuty)
+            PublishDrive(id, swarm);
     }
 }
 
@@ -103,6 +108,25 @@ void Publisher::PublishTelemetry(int id, const Swarm &swarm)
     t.loop_us = 0;
     t.status_flags = out.status_flags;
     outlet_.Send(t.utime_us, members_[static_cast<size_t>(id)].telemetry, t);
+}
+
+// The firmware's duties drive nothing in such a robot. A steering angle is told as the velocities
+// that it asks for, as importers do: drive_t knows no angles.
+void Publisher::PublishDrive(int id, const Swarm &swarm)
+{
+    const Member &member = members_[static_cast<size_t>(id)];
+    const Wheels told = swarm.Told(id).value;
+    Twist twist{told[0], told[1], told[2]};
+    if (member.base.drive == Drive::kSteering)
+        twist = member.kinematics.Forward(member.kinematics.Steered(told[0], told[1]));
+    turbopi::drive_t drive{};
+    drive.utime_us = swarm.UtimeUs();
+    drive.robot_id = id;
+    drive.kind = turbopi::drive_t::KIND_TWIST;
+    drive.value[0] = twist.vx_mps;
+    drive.value[1] = twist.vy_mps;
+    drive.value[2] = twist.omega_radps;
+    outlet_.Send(drive.utime_us, member.drive, drive);
 }
 
 void Publisher::PublishPoses(const Swarm &swarm)

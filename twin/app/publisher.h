@@ -8,6 +8,7 @@
 
 #include "outlet.h"
 #include "plant/drive_chain.h"
+#include "plant/kinematics.h"
 #include "plant/random.h"
 #include "swarm/recent_poses.h"
 #include "swarm/swarm.h"
@@ -40,7 +41,8 @@ public:
     // What was published of poses, newest ones.
     const RecentPoses &recent() const { return recent_; }
 
-    // After Swarm::Decide(): R<nn>_TELEMETRY, and R<nn>_RUN and TWIN_BODY every 5 s.
+    // After Swarm::Decide(): R<nn>_TELEMETRY, R<nn>_DRIVE of robots told velocities, and R<nn>_RUN
+    // and TWIN_BODY every 5 s.
     void PublishDecisions(const Swarm &swarm);
     // At the start and after every Swarm::Advance(): the R<nn>_POSE and TWIN_TRUTH_R<nn> that fell
     // due, between the poses known before and after, and TWIN_BODY of bodies that move.
@@ -50,15 +52,18 @@ private:
     struct Member
     {
         Robot robot;
+        Base base;
+        Kinematics kinematics;
         DriveChain chain;
         Noise noise;
         double wheel_radius_m;
         Random random;
         RobotState last;
-        std::string telemetry, pose, run, truth;  // channels
+        std::string telemetry, drive, pose, run, truth;  // channels
     };
     void PublishRun(int id, int64_t utime_us);
     void PublishTelemetry(int id, const Swarm &swarm);
+    void PublishDrive(int id, const Swarm &swarm);
     void PublishPose(int id, double t_s, const Pose2 &pose);
     void PublishBody(const WorldBody &body, double t_s);
     void PublishTruth(int id, double t_s, const Pose2 &pose, const RobotState &state);

@@ -180,12 +180,7 @@ void Swarm::Decide()
         Member &member = members_[static_cast<size_t>(i)];
         Expose(i, now_us);
         DecideOne(member, now_us);
-        const fw_output &out = member.output;
-        const fw_input input{static_cast<int16_t>(out.speed_input_pct),
-                             static_cast<int16_t>(out.turn_input_milli)};
-        Command command = CommandFor(member.base, input, out.wheel_duty_pct);
-        command.battery_V = member.battery_V;
-        plant_->SetCommand(i, command);
+        plant_->SetCommand(i, Told(i));
     }
     ++step_count_;
 }
@@ -270,6 +265,17 @@ int64_t Swarm::UtimeUs() const
 const fw_output &Swarm::Output(int robot) const
 {
     return members_[static_cast<size_t>(robot)].output;
+}
+
+Command Swarm::Told(int robot) const
+{
+    const Member &member = members_[static_cast<size_t>(robot)];
+    const fw_output &out = member.output;
+    const fw_input input{static_cast<int16_t>(out.speed_input_pct),
+                         static_cast<int16_t>(out.turn_input_milli)};
+    Command command = CommandFor(member.base, input, out.wheel_duty_pct);
+    command.battery_V = member.battery_V;
+    return command;
 }
 
 double Swarm::BatteryV(int robot) const

@@ -267,21 +267,43 @@ def _decode_robot(
     warnings: list[str],
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Commands and poses of a robot, in order of time; None where there are none."""
-    name = f"R{robot_id:02d}"
-    if "TELEMETRY" in kinds and "DRIVE" in kinds:
-        warnings.append(f"{name}: has telemetry and drive messages; telemetry was used.")
-    series: list[np.ndarray | None] = []
-    for sources in (("TELEMETRY", "DRIVE"), ("POSE",)):
-        source = next((s for s in sources if s in kinds), None)
-        if source is None:
-            series.append(None)
+    name, said = f"R{robot_id:02d}", {}
+    for source in ("TELEMETRY", "DRIVE", "POSE"):
+        if source not in kinds:
             continue
         message = getattr(turbopi, f"{source.lower()}_t")
         channel = f"{name}_{source}"
         messages = decode(kinds[source], message, channel, warnings)
         messages = _undamaged(messages, channel, warnings)
-        series.append(_in_order(messages, channel, robot_id, warnings))
-    return series[0], series[1]
+        said[source] = _in_order(messages, channel, robot_id, warnings)
+    if "TELEMETRY" in said and "DRIVE" in said:
+        said["TELEMETRY"] = _driven(said["TELEMETRY"], said["DRIVE"], name, warnings)
+    return said.get("TELEMETRY", said.get("DRIVE")), said.get("POSE")
+
+
+def _driven(telemetry: np.ndarray, drive: np.ndarray, name: str, warnings: list[str]) -> np.ndarray:
+    """Telemetry with the command of the same control step, where its duties drove nothing."""
+    stamps, own, of_drive = np.intersect1d(
+        telemetry["utime_us"], drive["utime_us"], assume_unique=True, return_indices=True
+    )
+    if not len(stamps):
+        warnings.append(
+            f"{name}: has telemetry and drive messages, and none of the same stamp; telemetry was "
+            "used."
+        )
+        return telemetry
+    if alone := len(telemetry) + len(drive) - 2 * len(stamps):
+        warnings.append(
+            f"{name}: {counted(alone, 'message')} of telemetry or drive without the other of the "
+            "same stamp; left out."
+        )
+    told = ["kind", "value"]
+    both = np.empty(len(stamps), telemetry.dtype.descr + [(n, drive.dtype[n]) for n in told])
+    for key in telemetry.dtype.names or ():
+        both[key] = telemetry[key][own]
+    for key in told:
+        both[key] = drive[key][of_drive]
+    return both
 
 
 def _lacking(messages: dict[int, tuple[np.ndarray | None, np.ndarray | None]]) -> list[str]:
@@ -423,6 +445,7 @@ def _command_series(
         kind, command = _drive_kind(messages, robot_id), messages["value"].astype(float)
     else:
         kind, command = "duty", messages["wheel_duty_pct"].astype(float)
+    if "mode" in (messages.dtype.names or ()):
         series["battery_V"] = messages["battery_V"].astype(float)
         for name in ("mode", "detected_raw", "detected"):
             series[name] = messages[name].copy()

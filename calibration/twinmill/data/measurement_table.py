@@ -388,6 +388,8 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
         last = [""]
         reader = csv.reader(_remembered(lines, last), delimiter=delimiter, skipinitialspace=True)
         header = _names(next(reader, []))
+        if [name.lower() for name in header[:1]] == ["format version"]:
+            raise LogError(f"{path.name}: is an export of Motive; give it with {option('motive')}.")
         rows, line = PackedRows(), array("q")
         for row in reader:
             if not any(cell.strip() for cell in row) or row[0].lstrip().startswith("#"):

@@ -28,8 +28,14 @@ from twinmill.data.checks.words import described
 from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
+OTHER_DRIVE = "take a model of this robot, or import the commands that the model is driven by"
 OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
-DRIVEN_BY = {"duty": "duties", "wheel_speed": "wheel speeds", "twist": "velocities of the body"}
+DRIVEN_BY = {
+    "duty": "duties",
+    "wheel_speed": "wheel speeds",
+    "twist": "velocities of the body",
+    "steering": "steering angles",
+}
 POSES_IN = (  # measured over commanded speed, what it says, and columns under their right names
     ((300.0, 3000.0), "the positions are in millimetres", {"x_m": "x_mm", "y_m": "y_mm"}),
     ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
@@ -97,31 +103,21 @@ def columns_in_use(body: np.ndarray) -> int:
 def check_drive(track: Track, model: native.Model, label: str) -> list[InputFinding]:
     """A finding where the commands are of another kind than the model is driven by."""
     told = track.command_kind
-    if told not in KINDS or model.drive not in KINDS or told == model.drive:
+    if told not in KINDS or told == model.drive:
         return []
     return [
         InputFinding(
             f"the commands are {DRIVEN_BY[told]}, and the model is driven by "
             f"{DRIVEN_BY[model.drive]}",
             f'the log says {told}, the model drive = "{model.drive}"',
-            _other_commands(told, model.drive),
+            OTHER_DRIVE
+            if model.drive in KINDS
+            else 'take drive = "twist": logs hold steering angles as the velocities they ask for',
             True,
             label,
             track.robot_id,
         )
     ]
-
-
-def _other_commands(told: CommandKind, drive: str) -> str:
-    """What to do about commands of another kind than the model's; a twin's can be computed."""
-    remedy = "take a model of this robot, or import the commands that the model is driven by"
-    if (told, drive) != ("duty", "twist"):
-        return remedy
-    return (
-        f"{remedy}: in a log of twin_run vx_mps is speed_input times base.speed_per_input_mps, "
-        "omega_radps is turn_input times base.turn_per_input_radps, both in telemetry.csv of "
-        "twinmill export"
-    )
 
 
 def check_commands(

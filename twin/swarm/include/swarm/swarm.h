@@ -77,6 +77,8 @@ public:
     bool IsSilent(int robot) const { return plant_->IsSilent(robot); }
     // What the firmware decided last.
     const fw_output &Output(int robot) const;
+    // What the plant was told of that output, in the terms of the model's drive.
+    Command Told(int robot) const;
     double BatteryV(int robot) const;
     // What the robot's sensor drew last; empty if it draws nothing.
     Image LastImage(int robot) const;
