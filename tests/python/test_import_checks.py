@@ -101,7 +101,7 @@ def test_poses_before_their_commands_belie_one_clock_and_those_after_are_a_delay
     t_s, told, pose = _drive()
     commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
     said = _said(tmp_path, POSES, np.column_stack([t_s + late_s, pose]), BODY, commands)
-    assert ("so that one clock did not stamp both" in said) == (late_s < 0)
+    assert ("before the commands that they follow, which one clock" in said) == (late_s < 0)
     assert ("a delay of the robot (input_delay" in said) == (late_s > 0)
     if late_s:
         told_s = float(re.search(r"(\d+\.\d+) s (before|after)", said)[1])

@@ -73,13 +73,8 @@ class Measurement:
 
     @property
     def same_clock(self) -> bool:
-        """The log says that one clock stamped commands and poses, and they do not belie it."""
-        return self.track.same_clock and not self.two_clocks
-
-    @property
-    def two_clocks(self) -> bool:
-        """Poses that come before their commands belie that one clock stamped both."""
-        return any(f.two_clocks for f in self.findings)
+        """The log says that one clock stamped commands and poses."""
+        return self.track.same_clock
 
     @property
     def steady(self) -> bool:
@@ -157,7 +152,7 @@ class Measurement:
 
 
 def unsteady(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
-    """Sentences on when commands act by the input: not as declared, or later from some time on."""
+    """Sentences on when commands act by the input: after the motion, or later from some time on."""
     runs = [m for m in measurements if isinstance(m, Measurement)]
     told = [
         (m.label, _taken_into_account(f))

@@ -202,7 +202,6 @@ def _on_its_clock(measurement: Measurement, model_file: ModelFile) -> tuple[nati
     """
     model = model_file.model.for_robot(measurement.track.robot_id)
     told = model.clock_known and measurement.log_sha256 not in model_file.clock_logs
-    told = told and not measurement.two_clocks
     declared = measurement.same_clock
     if declared and not told:
         model.set(CLOCK, 0.0)

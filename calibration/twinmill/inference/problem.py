@@ -153,7 +153,7 @@ def problem_of(
     for name in always.effects if always else ():
         model.add_effect(name)
     known = model.clock_known and not any(
-        m.two_clocks or m.log_sha256 in model_file.clock_logs for m in measurements
+        m.log_sha256 in model_file.clock_logs for m in measurements
     )
     one_clock = all(m.same_clock for m in measurements)
     if one_clock and not known:

@@ -13,6 +13,7 @@ import numpy as np
 
 from twinmill.arguments import option
 from twinmill.data.checks.alternatives import Explained, Jump, Search, far_better, surely_better
+from twinmill.data.checks.causality import precedence
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.lateness import Lateness, lateness_of
 from twinmill.data.checks.motion import BLOCK_S
@@ -165,25 +166,14 @@ def check_one_clock(
     if not (track.same_clock and track.has_heading) or own.left > CHECKS.drift_left:
         return []
     late_s = shift_s(search, own.late_s)
-    if abs(late_s) < CHECKS.one_clock_s + track.timing.pose_period_s / 2:
-        return []
-    if not _is_shifted(search, late_s):
+    spare_s = CHECKS.one_clock_s + track.timing.pose_period_s / 2
+    if abs(late_s) < spare_s:
         return []
     without = f"import anew without {option('same_clock', True)}"
     if late_s < 0:
-        shift_by_s = round(float(-late_s), 3)
-        told = checked.finding(
-            f"the poses come {-late_s:.2f} s before the commands that they follow, so that one "
-            f"clock did not stamp both, as it is declared ({option('same_clock', True)})",
-            f"the commands explain {1 - own.left:.1%} of the motion with that shift",
-            lambda own: (
-                f"{without}, which estimates the offset, or with "
-                f"{option('pose_shift_s', shift_by_s, own)}; until then it is estimated"
-            ),
-            fatal=False,
-        )
-        return [replace(told, two_clocks=True)]
-    if not delays:
+        t = precedence(track, checked.body, -late_s, spare_s)
+        return [_of_precedence(checked, late_s, t, without)] if t > CHECKS.sure else []
+    if not delays or not _is_shifted(search, late_s):
         return []
     return [
         checked.finding(
@@ -194,6 +184,22 @@ def check_one_clock(
             fatal=False,
         )
     ]
+
+
+def _of_precedence(checked: CheckedTrack, late_s: float, t: float, without: str) -> InputFinding:
+    """Told, and no more: the user's word that there is one clock holds."""
+    shift_by_s = round(float(-late_s), 3)
+    told = checked.finding(
+        f"the poses come about {-late_s:.2f} s before the commands that they follow, which one "
+        f"clock does not do, as it is declared ({option('same_clock', True)})",
+        f"the motion before a change of the command is that of the command after it (t = {t:.0f})",
+        lambda own: (
+            f"if that declaration is wrong, {without}, which estimates the offset, or with "
+            f"{option('pose_shift_s', shift_by_s, own)}; until then it is kept"
+        ),
+        fatal=False,
+    )
+    return replace(told, two_clocks=True)
 
 
 def _is_no_clock(checked: CheckedTrack, late: Lateness) -> bool:

@@ -25,7 +25,7 @@ class InputFinding:
         steady: one offset of the clocks may hold for the whole log; false where what the commands
             do comes later, or sooner, from some time on.
         lateness: how it changes, where that is known.
-        two_clocks: poses and commands were stamped by two clocks, whatever was declared.
+        two_clocks: poses precede the commands that they follow, though one clock was declared.
         lever_m: the tracked point ahead and left of the point that the robot turns about, where
             that is far.
     """
