@@ -69,7 +69,7 @@ def test_whitened_errors_have_the_likelihood_of_the_dense_covariance(sensor, dri
 
 
 def test_a_wander_is_as_probable_in_a_later_log_as_in_its_own():
-    """By algebra: sizes are mixed, probability neither appears nor goes, none grows by two steps."""
+    """Sizes are mixed: by algebra no probability appears or goes, and none grows by two steps."""
     one = np.array([0.7, 0.0, 0.0, 0.0])
     assert in_another_log(one).sum() == pytest.approx(0.7)
     assert in_another_log(one)[2] == 0 < in_another_log(one)[1]
