@@ -43,8 +43,8 @@ class Always:
             of them.
         mean, cov: (N,), (N, N) of these.
         kernels: name and size of each kernel of the discrepancy.
-        wander: probabilities of each of SIZES, by dependence whose function holds for one log alone;
-            the rest is that of none.
+        wander: probabilities of each of SIZES, by dependence whose function holds for one log
+            alone; the rest is that of none.
         rate: of moments.
         usual, top: scale of the kernels, see `Motion`.
         noise: (4, 3) sensor, drive, gain, memory of each channel, see `Noise`.
