@@ -3,7 +3,8 @@
 
 Each channel is an ARMA(1, 2) series, with L the shift by one step and a = exp(-step / memory):
 
-    (1 - a L) e = w + (1 - a L)(1 - L) s,   var w = (drive^2 + gain^2 m^2)(1 - a^2),   var s = sensor^2
+    (1 - a L) e = w + (1 - a L)(1 - L) s
+    var w = (drive^2 + gain^2 m^2)(1 - a^2),   var s = sensor^2
 
 where m is how fast the robot moves: motors and floors disturb a robot that drives, not one that
 stands. What is left of AR has a banded covariance, whose Cholesky factor whitens errors and columns
