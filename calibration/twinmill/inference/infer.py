@@ -8,6 +8,7 @@ from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
+from twinmill.inference.discrepancy import SIZES
 from twinmill.inference.kept import kept
 from twinmill.inference.prior import Always
 from twinmill.inference.problem import problem_of
@@ -42,6 +43,7 @@ class Inference:
     def to_json(self) -> dict:
         """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
+        wander = self.always.wander.items() if self.always else ()
         return {
             **self.answer.to_json(),
             "robot_id": self.measurements[0].track.robot_id,
@@ -50,6 +52,7 @@ class Inference:
             "always": {
                 "effects": list(self.always.effects) if self.always else [],
                 "depends_on": [{"name": name, "size": size} for name, size in kernels],
+                "wander": {word: dict(zip(map(str, SIZES), p, strict=True)) for word, p in wander},
             },
             "settings": {name: value for name, value, _ in PRIORS.listed()},
         }
