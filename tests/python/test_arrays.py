@@ -110,6 +110,35 @@ def test_stamps_with_a_zone_are_the_epochs_and_an_index_of_stamps_is_said():
     tm.Log.from_frames(indexed.reset_index(names="t_s"), told)
 
 
+def test_durations_of_pandas_and_numpy_are_told_in_their_unit():
+    from_s = tm.Log.from_frames(POSES_FRAME, COMMANDS_FRAME)
+    for unit in ("ns", "us", "ms"):
+        poses, told = (
+            pd.DataFrame(f).assign(t_s=lambda f: pd.to_timedelta(f["t_s"], "s").dt.as_unit(unit))
+            for f in (POSES_FRAME, COMMANDS_FRAME)
+        )
+        assert tm.Log.from_frames(poses, told).duration_s == pytest.approx(from_s.duration_s, 1e-3)
+
+
+def test_headings_of_frames_are_quaternions_or_none():
+    """A turn by theta about z is cos(theta/2), 0, 0, sin(theta/2); positions alone are poses."""
+    theta = POSES_FRAME["theta_rad"]
+    turned = {k: v for k, v in POSES_FRAME.items() if k != "theta_rad"}
+    wxyz = dict(zip(("qw", "qx", "qy", "qz"), np.zeros((4, len(theta))), strict=True))
+    wxyz |= {"qw": np.cos(theta / 2), "qz": np.sin(theta / 2)}
+    found = tm.Log.from_frames(turned | wxyz, COMMANDS_FRAME).table()
+    np.testing.assert_allclose(np.exp(1j * found["theta_rad"]), np.exp(1j * theta))
+    alone = tm.Log.from_frames(turned, COMMANDS_FRAME)
+    assert alone.table()["valid"].all() and not alone.warnings
+    np.testing.assert_allclose(alone.table()["x_m"], POSES_FRAME["x_m"])
+
+
+def test_epochs_in_ns_are_no_seconds():
+    late = dict(POSES_FRAME, t_s=(T_S * 1e9).astype(int) + 1_777_896_000_000_000_000)
+    with pytest.raises(tm.LogError, match="is no time in s; divide by 1e9"):
+        tm.Log.from_frames(late, COMMANDS_FRAME)
+
+
 def test_steering_turns_as_a_bicycle():
     angle_rad = np.arctan(0.25 * OMEGA_RADPS / COMMANDS[0, 0])
     told = np.column_stack([COMMANDS[:, 0], np.full(len(COMMANDS), angle_rad)])

@@ -150,6 +150,7 @@ def problem_of(
     if whole.drive == "duty":
         whole = refined(model_file).model
     model = whole.for_robot(measurements[0].track.robot_id)
+    bare = model.copy()
     for name in always.effects if always else ():
         model.add_effect(name)
     known = model.clock_known and not any(
@@ -175,7 +176,8 @@ def problem_of(
     steps = Steps(logs)
     if always is not None:
         _set_to(model, prior, always)
-    motion = _motion(steps, model, always)
+    bare.set(CLOCK, model.get(CLOCK))
+    motion = _motion(steps, bare, always)  # as in its own log: weights belong to these columns
     found = discrepancy.kernels(motion)
     if always is not None:
         prior = with_always(prior, always, found)

@@ -10,14 +10,14 @@ import tomlkit
 import turbopi
 
 from twinmill.data.importers.log_writer import log_parts
-from twinmill.data.importers.plain import STEERED, VALUES
+from twinmill.data.importers.plain import QUATERNION, STEERED, VALUES
 from twinmill.data.importers.series import (
     CommandSeries,
     PoseSeries,
     quaternion_from_heading,
     velocities_of_steering,
 )
-from twinmill.data.log import Log, LogError, log_of
+from twinmill.data.log import Log, LogError, heading_rad, log_of
 
 Kind = Literal["twist", "duty", "wheel_speed", "steering"]
 # Columns that an array of commands may have, by its kind: the least and the most.
@@ -35,6 +35,7 @@ COLUMNS: dict[Kind, tuple[str, ...]] = {
 }
 POSE = ("x_m", "y_m", "theta_rad")
 FULL_DUTY_PCT = 100.0
+LATEST_S = 253_402_300_800  # end of the year 9999, the last that ISO 8601 has
 MOST_ROBOTS = 100  # their numbers have two digits in the names of channels
 
 
@@ -43,7 +44,7 @@ def poses_of(robot_id: int, t_s: Any, pose: Any) -> PoseSeries:
 
     Args:
         robot_id: 0..99.
-        t_s: (N,) s, or stamps of numpy's datetime64; ascending.
+        t_s: (N,) s, or numpy's datetime64 or timedelta64; ascending.
         pose: (N, 3) x_m, y_m, theta_rad; or (N, 2) without headings. A row with NaN is a lost pose.
 
     Raises:
@@ -144,7 +145,8 @@ def log_of_frames(
     """A log of two data frames, dictionaries or datasets, in memory.
 
     Args:
-        poses: columns t_s and POSE, the last of them optional; optional robot_id and valid.
+        poses: columns t_s and POSE, the last of them optional or by QUATERNION; optional robot_id
+            and valid.
         commands: columns t_s and one group of COLUMNS; optional robot_id.
         kind: of the commands; None: by their columns.
         robot_id: of frames that do not say.
@@ -156,8 +158,7 @@ def log_of_frames(
         LogError: a column is missing, or the numbers make no run.
     """
     kind = _kind_of(commands) if kind is None else kind
-    headed = POSE if POSE[-1] in poses else POSE[:-1]
-    pose = _columns(poses, headed, "poses")
+    pose = _poses(poses)
     if "valid" in poses:
         pose[~np.asarray(poses["valid"], bool)] = np.nan
     value = _columns(commands, COLUMNS.get(kind, ()), "commands")
@@ -174,6 +175,14 @@ def log_of_frames(
         name,
         same_clock,
     )
+
+
+def _poses(frame: Any) -> np.ndarray:
+    """(rows, 3) x_m, y_m, theta_rad; (rows, 2) without headings."""
+    if all(name in frame for name in QUATERNION):
+        turned = heading_rad(_columns(frame, QUATERNION, "poses"))
+        return np.column_stack([_columns(frame, POSE[:-1], "poses"), turned])
+    return _columns(frame, POSE if POSE[-1] in frame else POSE[:-1], "poses")
 
 
 def _kind_of(frame: Any) -> Kind:
@@ -224,8 +233,8 @@ def _stamps_us(name: str, t_s: Any) -> np.ndarray:
         import pandas as pd  # slow to import
 
         stamps = pd.to_datetime(stamps, utc=True).tz_convert(None).to_numpy()
-    if stamps.dtype.kind == "M":
-        utime_us = stamps.astype("datetime64[us]").astype(np.int64)
+    if stamps.dtype.kind in "Mm":  # dates, or durations since some start
+        utime_us = stamps.astype(f"{stamps.dtype.name[:-4]}[us]").astype(np.int64)
     else:
         try:
             times = stamps.astype(float)
@@ -233,6 +242,11 @@ def _stamps_us(name: str, t_s: Any) -> np.ndarray:
             raise LogError(f"{name}: is not all numbers ({error}).") from error
         if not np.isfinite(times).all():
             raise LogError(f"{name}: has times that are no numbers; leave such rows out.")
+        if np.abs(times).max() > LATEST_S:
+            raise LogError(
+                f"{name}: has {stamps[np.abs(times).argmax()]}, which is no time in s; divide by "
+                "1e9, 1e6 or 1e3 what counts ns, us or ms, or give dates."
+            )
         utime_us = np.round(times * 1e6).astype(np.int64)
     if (np.diff(utime_us) <= 0).any():
         row = int(np.argmax(np.diff(utime_us) <= 0)) + 1

@@ -163,8 +163,8 @@ def velocities_of_steering(
 
 
 def quaternion_from_heading(heading_rad: np.ndarray) -> np.ndarray:
-    """(N,) rad to (N, 4) w, x, y, z."""
-    zero = np.zeros_like(heading_rad)
+    """(N,) rad to (N, 4) w, x, y, z; all NaN where the heading is."""
+    zero = 0 * heading_rad
     return np.column_stack([np.cos(heading_rad / 2), zero, zero, np.sin(heading_rad / 2)])
 
 
