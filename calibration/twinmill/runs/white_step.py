@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.inference.noise import first_noise, fit_noise, weights_of
-from twinmill.inference.steps import Steps, StepsOfLog
+from twinmill.inference.noise import Course, first_noise, fit_noise, weights_of
+from twinmill.inference.steps import Steps, StepsOfLog, motion_of
 from twinmill.predict.datasets import Trajectory
 
 
@@ -63,10 +63,11 @@ def _blocks(fit: ScoreFit, i: int) -> list[_Block]:
     points = np.concatenate([fit.x[None, own], fit.x[own] + np.diag(up)])
     errors = steps.errors(fit.models[i], fit.names[i], points)[:, kept]
     columns = (errors[0] - errors[1:]) / up[:, None, None]
-    stretches = _stretches(steps, kept)
-    begin = first_noise(float(np.median(steps.step_s)), {})
-    noise = fit_noise(errors[0], columns * fit.std[own][:, None, None], stretches, begin)
-    both = noise.whiten(np.concatenate([errors[:1], columns]), stretches)
+    moved = steps.predicted(fit.models[i])
+    pace = motion_of(steps, moved, moved).pace[kept]
+    begin = first_noise(Course(float(np.median(steps.step_s)), _stretches(steps, kept), pace), {})
+    noise = fit_noise(errors[0], columns * fit.std[own][:, None, None], begin)
+    both = noise.whiten(np.concatenate([errors[:1], columns]))
     weight = weights_of(both[0].reshape(3, -1)).reshape(-1)
     left, slopes = both[0] * weight, both[1:] * weight
     block = np.tile(steps.block[kept], 3)
