@@ -556,6 +556,18 @@ class Field:
         time.sleep(1)
         return row
 
+    def camera_lost_before(self) -> dict:
+        """It accepts the start, and would drive whenever its camera came back."""
+        self.robots[2].camera.unplug()
+        time.sleep(1)
+        begin_s, self.operator = time.monotonic(), self._counting()
+        code = self.operator.end(40)
+        self.robots[2].camera.plug()
+        time.sleep(2)
+        moves_s = [t for t, duties in self.robots[1].rows() if t > begin_s and duties != ZERO]
+        unmoved = self._unmoved(begin_s, code, [2])["after_s"] is None
+        return self.row(moves_s[0], code, [1]) | {"other_stood": unmoved}
+
     def gone_at_the_instant(self) -> dict:
         """Too late to call the start off before it: the others drive for a moment, and stand."""
         begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")

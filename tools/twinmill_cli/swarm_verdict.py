@@ -46,8 +46,9 @@ class Verdict:
         """This outcome with a word on robots that were not asked, and that drive."""
         if not driving:
             return self
-        verb = "drives" if len(driving) == 1 else "drive"
-        return self.more(f"{', '.join(driving)} {verb}, and was not asked.")
+        verb = "drives, and was" if len(driving) == 1 else "drive, and were"
+        told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
+        return Verdict(self.ok, f"{told} {', '.join(driving)} {verb} not asked.")
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""
@@ -79,15 +80,17 @@ class Saying:
     @property
     def hint(self) -> str:
         """Advice where a robot was not heard."""
+        other = "Robots of another --lcm-url or --channel-prefix hear none of it."
         if self.unheard:
             names = ", ".join(self.unheard)
             return (
                 f"Nothing was heard from {names}: is the name or address right? Robots answer by "
-                "multicast alone: where the network carries none, nobody hears that they obeyed."
+                "multicast alone: where the network carries none, nobody hears that they obeyed. "
+                f"{other}"
             )
         return (
             "Where the network carries no multicast, give a robot's address: swarm stop --host; it "
-            "obeys then, but its answer, by multicast, is not heard."
+            f"obeys then, but its answer, by multicast, is not heard. {other}"
         )
 
     @property

@@ -34,6 +34,7 @@ VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
 STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 DRIVING = ("running", "script")
+STANDING = ("stopped", "fault")
 NEVER_HEARD = "was never heard"
 NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
@@ -448,7 +449,7 @@ def start(
         waiting = _not_begun(fleet, given, patience_s)
         waiting -= find_dropouts(fleet, robots, command.seq, only_stopped=False).taken
         if waiting and not partial:
-            out = dropouts().beside(dict.fromkeys(waiting, NOT_BEGUN))
+            out = dropouts().beside({i: _why_not_begun(fleet.robots[i]) for i in waiting})
         elif waiting and not link_timeout_ms:
             late = stop(fleet, waiting)
     called_off = bool(out) or not agreed
@@ -486,10 +487,15 @@ def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
 
 
 def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]:
-    """Waits until those that have accepted drive. Returns those that do not."""
+    """Waits until those that have accepted drive. Returns those that do not, or are in a fault."""
     accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-    fleet.listen(patience_s, lambda: not any(robot.mode == "stopped" for robot in accepted))
-    return {robot.robot_id for robot in accepted if robot.mode == "stopped"}
+    fleet.listen(patience_s, lambda: not any(robot.mode in STANDING for robot in accepted))
+    return {robot.robot_id for robot in accepted if robot.mode in STANDING}
+
+
+def _why_not_begun(robot: Robot) -> str:
+    alarms = "; ".join(robot.alarms)
+    return f"{NOT_BEGUN} ({alarms})" if alarms else NOT_BEGUN
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
