@@ -111,13 +111,13 @@ def test_stamps_with_a_zone_are_the_epochs_and_an_index_of_stamps_is_said():
 
 
 def test_durations_of_pandas_and_numpy_are_told_in_their_unit():
+    def since(frame, unit):
+        return dict(frame, t_s=pd.to_timedelta(frame["t_s"], "s").as_unit(unit))
+
     from_s = tm.Log.from_frames(POSES_FRAME, COMMANDS_FRAME)
     for unit in ("ns", "us", "ms"):
-        poses, told = (
-            pd.DataFrame(f).assign(t_s=lambda f: pd.to_timedelta(f["t_s"], "s").dt.as_unit(unit))
-            for f in (POSES_FRAME, COMMANDS_FRAME)
-        )
-        assert tm.Log.from_frames(poses, told).duration_s == pytest.approx(from_s.duration_s, 1e-3)
+        log = tm.Log.from_frames(since(POSES_FRAME, unit), since(COMMANDS_FRAME, unit))
+        assert log.duration_s == pytest.approx(from_s.duration_s, 1e-3)
 
 
 def test_headings_of_frames_are_quaternions_or_none():
