@@ -41,6 +41,7 @@ EUROC = ",".join(
 )
 FORMS = {
     "TUM without names": _text("{t} {x} {y} 0 0 0 {z} {w}"),
+    "of a quaternion what turns on the floor": _text("{t},{x},{y},{z},{w}", "t,x_m,y_m,qz,qw"),
     "TUM": _text("{t} {x} {y} 0 0 0 {z} {w}", "# timestamp tx ty tz qx qy qz qw"),
     "TUM in nanoseconds": _text("{ns} {x} {y} 0 0 0 {z} {w}"),
     "TUM with spaces at the ends": _text("{t}  {x} {y} 0 0 0  {z} {w} "),

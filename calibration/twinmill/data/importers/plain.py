@@ -386,12 +386,18 @@ def _values(
 
 
 def _orientation(table: Table) -> np.ndarray:
-    """(rows, 4) unit quaternions; NaN if the table has no heading, by any name."""
-    if not table.has(*QUATERNION):
+    """(rows, 4) unit quaternions; NaN if the table has no heading, by any name.
+
+    Of a robot on the floor qx and qy may be left out: they are 0, or the length tells.
+    """
+    if not table.has("qw", "qz"):
         if not table.has("theta_rad") and not any(map(HEADING_LIKE.search, table.strange)):
             return np.full((len(table.rows), 4), np.nan)
         return quaternion_from_heading(table.numbers("theta_rad", True))
-    quaternion = np.column_stack([table.numbers(name, True) for name in QUATERNION])
+    zero = np.zeros(len(table.rows))
+    quaternion = np.column_stack(
+        [table.numbers(name, True) if table.has(name) else zero for name in QUATERNION]
+    )
     norm = np.linalg.norm(quaternion, axis=1)
     table.refuse(
         (np.abs(norm - 1) > 0.05) & (norm > 0), "the length of qw, qx, qy, qz", norm, "must be 1"

@@ -317,9 +317,10 @@ def read_bag(
         LogError: unreadable, a topic that is not there or holds nothing that is known.
     """
     if not poses or (commands and len(poses) != len(commands)):
+        likely = ", ".join(" with ".join(filter(None, p)) for p in guess_pairs(list_topics(path)))
         raise LogError(
             f"{option('pose')} and {option('command')}: give one of each for each robot, in the "
-            "same order."
+            f"same order{f'; here that may be {likely}' if likely else ''}."
         )
     pairs = list(zip(poses, commands or [""] * len(poses), strict=True))
     numbers = [_number(pair, options, len(pairs)) for pair in pairs]
