@@ -236,7 +236,9 @@ def check_track(track: Track, label: str, own: int | None = None) -> list[InputF
         add(
             "many commands are lost",
             f"{lost_s / told_s:.0%} of the time passes in {len(track.lost_s)} holes of their beat",
-            "look for a full network or disk, since poses without their commands tell nothing",
+            "look for a full network or disk, since poses without their commands tell nothing; a "
+            "robot that stands as long as it hears no command is imported with "
+            f"{option('command_timeout_s', 0.5)}, its own time",
         )
     closed_loop = abs(timing.command_period_s / timing.pose_period_s - 1) < 0.2
     if timing.pose_period_s > CHECKS.slow_s and not closed_loop:
