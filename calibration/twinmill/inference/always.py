@@ -22,7 +22,6 @@ from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
-from twinmill.inference.noise import Noise
 from twinmill.inference.prior import Always, weight_labels
 from twinmill.inference.problem import Problem, View, problem_of
 from twinmill.inference.search import Search, evidence
@@ -42,13 +41,13 @@ class _Grown:
         kernels: each with its size.
         rate: of moments.
         log_evidence: with them.
-        noise: under which.
+        view: of that noise.
     """
 
     kernels: list[tuple[Kernel, float]]
     rate: Rate
     log_evidence: float
-    noise: Noise
+    view: View
 
 
 def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Always:
@@ -96,7 +95,7 @@ def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     there = PRIORS.outside / _count_words(p)
     of_moments = let_in.log_evidence(Rate(there))
     total = linear.log_evidence + prior + of_moments - view.log_size
-    return _Grown(found, let_in.after(there), total, view.fitter.noise)
+    return _Grown(found, let_in.after(there), total, view)
 
 
 def _odds(p: Problem, kernel: Kernel, size: float) -> float:
@@ -121,7 +120,7 @@ def _sizes(p: Problem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.n
     none, some = [], []
     at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
     for grown in each:
-        view = p.view(grown.noise)
+        view = grown.view
         rest = [(k, size) for k, size in grown.kernels if k.depends_on != word]
         linear = h.linear(view.fitter.whiten).with_columns(_white(view, rest))
         own = evidence(h, view, linear)
@@ -138,7 +137,7 @@ def _conditioned(p: Problem, h: Hypothesis, grown: _Grown, wander: dict[str, np.
     there = [k for k in p.kernels if k.name in size]
     labels = [*h.labels, *(label for k in there for label in weight_labels(k))]
     lasting = {label for k in there if k.lasting for label in weight_labels(k)}
-    view = p.view(grown.noise)
+    view = grown.view
     linear = h.linear(view.fitter.whiten).with_columns(_white(view, grown.kernels))
     weights = len(labels) - len(h.labels)
     root = block_diag(np.linalg.cholesky(h.cov), np.eye(weights))
@@ -146,7 +145,6 @@ def _conditioned(p: Problem, h: Hypothesis, grown: _Grown, wander: dict[str, np.
     mean[: len(h.labels)] = np.clip(mean[: len(h.labels)], h.low, h.high)
     cov = root @ linear.covariance @ root.T
     kept = [k for k, n in enumerate(labels) if k < len(h.labels) or n in lasting]
-    noise = grown.noise
     return Always(
         effects=h.effects,
         labels=tuple(labels[k] for k in kept),
@@ -157,5 +155,5 @@ def _conditioned(p: Problem, h: Hypothesis, grown: _Grown, wander: dict[str, np.
         rate=grown.rate,
         usual=p.motion.usual,
         top=p.motion.top,
-        noise=np.exp(noise.logs),
+        noise=np.exp(view.fitter.noise.logs),
     )
