@@ -128,6 +128,11 @@ def test_headings_of_frames_are_quaternions_or_none():
     wxyz |= {"qw": np.cos(theta / 2), "qz": np.sin(theta / 2)}
     found = tm.Log.from_frames(turned | wxyz, COMMANDS_FRAME).table()
     np.testing.assert_allclose(np.exp(1j * found["theta_rad"]), np.exp(1j * theta))
+    lost = {k: np.where(T_S < 1, 0, v) for k, v in wxyz.items()}  # as captures tell a lost body
+    valid = tm.Log.from_frames(turned | lost, COMMANDS_FRAME).table()["valid"]
+    np.testing.assert_array_equal(valid, T_S >= 1)
+    with pytest.raises(tm.LogError, match=r"row 0: .* is 2 long, must be 1"):
+        tm.Log.from_frames(turned | {k: 2 * v for k, v in wxyz.items()}, COMMANDS_FRAME)
     alone = tm.Log.from_frames(turned, COMMANDS_FRAME)
     assert alone.table()["valid"].all() and not alone.warnings
     np.testing.assert_allclose(alone.table()["x_m"], POSES_FRAME["x_m"])

@@ -48,7 +48,7 @@ class Verdict:
             return self
         verb = "drives, and was" if len(driving) == 1 else "drive, and were"
         told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
-        return Verdict(self.ok, f"{told} {', '.join(driving)} {verb} not asked.")
+        return Verdict(self.ok, told).more(f"{', '.join(driving)} {verb} not asked.")
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""

@@ -60,10 +60,10 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     p = problem_of(measurements, model_file, sheet=True)
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
-    first = _grown(p, h, p.view(p.noise))
-    beside = [size * kernel.columns for kernel, size in first.kernels]
-    noises = noise_of(h, p), noise_of(h, p, np.concatenate([p.kernels[0].columns[:0], *beside]))
-    each = [first, *(_grown(p, h, p.view(n)) for n in noises)]
+    each = [_grown(p, h, search.view), _grown(p, h, p.view(noise_of(h, p)))]
+    beside = [size * kernel.columns for kernel, size in each[0].kernels]
+    if beside:
+        each.append(_grown(p, h, p.view(noise_of(h, p, np.concatenate(beside)))))
     words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
     wander = {word: _sizes(p, h, each, word) for word in words}
     return _conditioned(p, h, max(each, key=lambda g: g.log_evidence), wander)
@@ -80,10 +80,9 @@ def _lasts(effects: tuple[str, ...]) -> bool:
 def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     linear = bare = h.linear(view.fitter.whiten)
     found: list[tuple[Kernel, float]] = []
-    prior = 0.0
+    prior, odds = 0.0, np.array([_odds(p, kernel) for kernel in p.kernels])
     while len(found) < MOST:
         own = evidence(h, view, bare.with_columns(_white(view, found)))
-        odds = np.array([[_odds(p, k, s) for s in SIZES] for k in p.kernels])
         gains = own.gains + np.log(odds)
         f, s = np.unravel_index(gains.argmax(), gains.shape)
         linear = own.linear
@@ -98,10 +97,10 @@ def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     return _Grown(found, let_in.after(there), total, view)
 
 
-def _odds(p: Problem, kernel: Kernel, size: float) -> float:
-    """Prior odds of a kernel with a size."""
+def _odds(p: Problem, kernel: Kernel) -> np.ndarray:
+    """(S,) prior odds of a kernel with each size."""
     forms = sum(k.depends_on == kernel.depends_on for k in p.kernels)
-    return float(PRIORS.outside / _count_words(p) / forms * CHANCE[size == SIZES][0])
+    return PRIORS.outside / _count_words(p) / forms * CHANCE
 
 
 def _count_words(p: Problem) -> int:
@@ -124,7 +123,8 @@ def _sizes(p: Problem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.n
         rest = [(k, size) for k, size in grown.kernels if k.depends_on != word]
         linear = h.linear(view.fitter.whiten).with_columns(_white(view, rest))
         own = evidence(h, view, linear)
-        none.append(own.alone - view.log_size + sum(np.log(_odds(p, k, s)) for k, s in rest))
+        prior = sum(float(np.log(_odds(p, k)[size == SIZES][0])) for k, size in rest)
+        none.append(own.alone - view.log_size + prior)
         some.append(none[-1] + logsumexp(own.gains[at], axis=0) - np.log(len(at)))
     there = PRIORS.outside / _count_words(p)
     logs = np.r_[np.log(1 - there) + max(none), np.log(there * CHANCE) + np.max(some, axis=0)]

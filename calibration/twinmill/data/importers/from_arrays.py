@@ -14,7 +14,9 @@ from twinmill.data.importers.plain import QUATERNION, STEERED, VALUES
 from twinmill.data.importers.series import (
     CommandSeries,
     PoseSeries,
+    is_no_turn,
     quaternion_from_heading,
+    unit_quaternions,
     velocities_of_steering,
 )
 from twinmill.data.log import Log, LogError, heading_rad, log_of
@@ -180,8 +182,11 @@ def log_of_frames(
 def _poses(frame: Any) -> np.ndarray:
     """(rows, 3) x_m, y_m, theta_rad; (rows, 2) without headings."""
     if all(name in frame for name in QUATERNION):
-        turned = heading_rad(_columns(frame, QUATERNION, "poses"))
-        return np.column_stack([_columns(frame, POSE[:-1], "poses"), turned])
+        turned, norm = unit_quaternions(_columns(frame, QUATERNION, "poses"))
+        if (wrong := is_no_turn(norm)).any():
+            row = int(wrong.argmax())
+            raise LogError(f"poses: row {row}: qw, qx, qy, qz: is {norm[row]:g} long, must be 1.")
+        return np.column_stack([_columns(frame, POSE[:-1], "poses"), heading_rad(turned)])
     return _columns(frame, POSE if POSE[-1] in frame else POSE[:-1], "poses")
 
 

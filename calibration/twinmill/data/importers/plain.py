@@ -21,7 +21,9 @@ from twinmill.data.importers.series import (
     CommandSeries,
     DetectionSeries,
     PoseSeries,
+    is_no_turn,
     quaternion_from_heading,
+    unit_quaternions,
     velocities_of_steering,
     with_z_up,
 )
@@ -398,11 +400,9 @@ def _orientation(table: Table) -> np.ndarray:
     quaternion = np.column_stack(
         [table.numbers(name, True) if table.has(name) else zero for name in QUATERNION]
     )
-    norm = np.linalg.norm(quaternion, axis=1)
-    table.refuse(
-        (np.abs(norm - 1) > 0.05) & (norm > 0), "the length of qw, qx, qy, qz", norm, "must be 1"
-    )
-    return quaternion / np.where(norm > 0, norm, np.nan)[:, None]
+    turned, norm = unit_quaternions(quaternion)
+    table.refuse(is_no_turn(norm), "the length of qw, qx, qy, qz", norm, "must be 1")
+    return turned
 
 
 def _refuse_degrees(table: Table, ids: np.ndarray) -> None:

@@ -168,6 +168,17 @@ def quaternion_from_heading(heading_rad: np.ndarray) -> np.ndarray:
     return np.column_stack([np.cos(heading_rad / 2), zero, zero, np.sin(heading_rad / 2)])
 
 
+def unit_quaternions(quaternion_wxyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 4) of length 1, NaN where the length is 0, as of a lost pose; and the lengths, (N,)."""
+    norm = np.linalg.norm(quaternion_wxyz, axis=1)
+    return quaternion_wxyz / np.where(norm > 0, norm, np.nan)[:, None], norm
+
+
+def is_no_turn(norm: np.ndarray) -> np.ndarray:
+    """(N,) bool, lengths that are of no unit quaternion, nor of a lost pose."""
+    return (np.abs(norm - 1) > 0.05) & (norm > 0)
+
+
 def with_z_up(
     position_m: np.ndarray, quaternion_wxyz: np.ndarray, up: str
 ) -> tuple[np.ndarray, np.ndarray]:
