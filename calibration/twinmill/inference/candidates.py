@@ -26,8 +26,7 @@ from twinmill.model.parameters import (
 )
 
 LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual limit: each a fifth more than the last
-SIDE = 9  # places along each side of the floor
-RADII = (0.12, 0.2, 0.35)  # of a place, times the floor's side
+RADII = (0.12, 0.2, 0.35, 0.6)  # of a place, times the floor's side
 LEAST_RADIUS_M = 0.15  # a robot's length
 MOMENTS, LEAST_S = 40, 4.0  # of a log, at which a while may begin or end; its least length
 
@@ -160,11 +159,21 @@ def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
 
 
 def _places(steps: Steps) -> tuple[np.ndarray, np.ndarray]:
-    """Masks (G, W) of circles on the floor, and (G, 3) their centres and radii in m."""
+    """Masks (G, W) of circles on the floor, and (G, 3) their centres and radii in m.
+
+    They overlap by half, and reach into the floor from outside, too.
+    """
     low, high = np.quantile(steps.place, (0.03, 0.97), axis=0)
     side_m = float(np.max(high - low))
-    radii = sorted({max(LEAST_RADIUS_M, f * side_m) for f in RADII})
-    at = np.array([(x, y, r) for r in radii for x, y in product(*np.linspace(low, high, SIDE).T)])
+    at = np.array(
+        [
+            (x, y, r)
+            for r in sorted({max(LEAST_RADIUS_M, f * side_m) for f in RADII})
+            for x, y in product(
+                *(np.arange(a - r, b + r, r) for a, b in zip(low, high, strict=True))
+            )
+        ]
+    )
     x, y = steps.place.T
     inside = np.hypot(x - at[:, :1], y - at[:, 1:2]) < at[:, 2:]
     used = inside.any(axis=1)

@@ -23,9 +23,12 @@ GROWS = 1.01 * STEP**2  # times its size in one log, that a wander may have in a
 # known mean the one that says least; the rest is too small to be seen, or too large for a formula.
 BINS = np.r_[SIZES[0] / STEP, np.sqrt(SIZES[1:] * SIZES[:-1]), SIZES[-1] * STEP]
 OF_FORM = -np.diff(np.exp(-BINS / PRIORS.form))
-FORMS = 6  # of that error
+FORMS = 7  # of that error
+ORDERS = np.arange(1, 5)  # of a smooth function of heading, of a length scale of 1 rad
+OF_ORDERS = (1.0 + ORDERS**2) ** -1.5 / np.sum((1.0 + ORDERS**2) ** -1.5)
 NODES = 7  # of a curve over speed: as a table of duties has
 LATEST = 10  # steps that a response to a command may last
+FADING = np.exp(-np.arange(LATEST + 1) / 4.0) / 3.5  # variance shares: it decays over 0.4 s
 
 
 @dataclass(frozen=True)
@@ -76,8 +79,8 @@ def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
     """FORMS arrays (K, W, 3): what an effect's formula may miss, for a relative error of one.
 
     The effect's own change, times a smooth function of how fast the robot is along its fastest
-    axis, of how fast it travels or turns, of time, place or heading; without its size, which is the
-    effect's own number.
+    axis, of how fast it travels or turns, of time, place or heading, or as it comes later; without
+    its size, which is the effect's own number.
 
     Args:
         change: (W, 3) of the prediction by the effect, m and rad.
@@ -92,10 +95,12 @@ def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
         _hats(np.abs(m.moved[:, 2]), m.top[4], NODES),
         np.sqrt(of_time)[:, None] * in_time,
         np.sqrt(of_place)[:, None] * in_place,
-        _harmonics(m.heading, (1, 2, 3, 4)) / np.sqrt(8),
+        np.sqrt(np.repeat(OF_ORDERS, 2) / 2)[:, None] * _harmonics(m.heading, ORDERS),
     )
-    weight = (change**2).sum(axis=1) / max(np.sum(change**2), 1e-300)
-    return tuple((f - (f @ weight)[:, None])[:, :, None] * change for f in forms)
+    late = np.array([_later(change, n) for n in range(1, LATEST + 1)])
+    each = *(f[:, :, None] * change for f in forms), np.sqrt(FADING[1:, None, None]) * late
+    unit = change / max(np.sqrt(np.sum(change**2)), 1e-300)
+    return tuple(c - np.tensordot(c, unit, 2)[:, None, None] * unit for c in each)
 
 
 Form = tuple[str, np.ndarray, np.ndarray | float]
@@ -187,15 +192,14 @@ def _of_coupling(m: Motion) -> Iterator[Form]:
 
 def _of_past(m: Motion) -> Iterator[Form]:
     axes = np.eye(3)
-    share = np.exp(-np.arange(LATEST + 1) / 4.0) / 3.5  # decays over 0.4 s
     late = [
         np.array([(_later(m.instant[:, k], n) - m.moved[:, k])[:, None] * axes[k]
                   for n in range(LATEST + 1)])
         for k in range(3)
     ]  # fmt: skip
-    yield "response of each axis", np.concatenate(late), np.tile(share, 3)
-    yield "response of the plane", np.concatenate(late[:2]), np.tile(share, 2)
-    yield "response of turns", late[2], share
+    yield "response of each axis", np.concatenate(late), np.tile(FADING, 3)
+    yield "response of the plane", np.concatenate(late[:2]), np.tile(FADING, 2)
+    yield "response of turns", late[2], FADING
     size = np.abs(m.instant)
     change = np.diff(size, axis=0, prepend=size[:1])
     way = np.sign(m.instant + m.moved)
@@ -235,8 +239,8 @@ def _way_since_back(moved: np.ndarray) -> np.ndarray:
 
 
 def _later(values: np.ndarray, steps: int) -> np.ndarray:
-    """(W,) values so many steps later, zero before."""
-    moved = np.roll(values, steps)
+    """(W, ...) values so many steps later, zero before."""
+    moved = np.roll(values, steps, axis=0)
     moved[:steps] = 0
     return moved
 

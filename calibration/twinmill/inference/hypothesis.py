@@ -27,8 +27,6 @@ RUNS_AWAY = 1e6  # m or rad in a step for a unit of a number: no slope, the moti
 SETTLED = 0.1  # units of the log posterior: less decides nothing
 LIMIT_SPREAD = 0.5  # prior of a limit about its start on the grid, relative: twice the grid's step
 LIMIT_STEP = 0.02  # of finite differences in a limit, relative: what it cuts off bends with it
-MOVES = (1.0, 1.0, 0.4)  # times the reach, in turn, by which a place or a while is moved
-REACH = {"place": 0.075, "moment": 0.5}  # m, s: half of what a step of the grid leaves open
 
 
 @dataclass(frozen=True)
@@ -172,14 +170,26 @@ class Fitter:
                 damping *= 10
             if fell < SETTLED:
                 break
+        return self.at(replace(h, value=value, slopes=slopes), errors, known)
+
+    def at(self, h: Hypothesis, errors: np.ndarray | None = None, known: int = 0) -> Hypothesis:
+        """A hypothesis linear about its numbers, its model set to them.
+
+        Args:
+            h: with these numbers.
+            errors: (W, 3) at them.
+            known: so many of the first slopes are kept.
+        """
         model = h.model.copy()
-        for name, v in zip(np.array(h.labels)[h.named], value[h.named], strict=True):
+        for name, v in zip(np.array(h.labels)[h.named], h.value[h.named], strict=True):
             model.set(str(name), float(v))
-        found = replace(h, model=model, value=value, errors=errors)
-        return replace(found, slopes=self._slopes(found, slopes, known))
+        if errors is None:
+            errors = self.steps.errors(model)[0] - self._always(h)
+        found = replace(h, model=model, errors=errors)
+        return replace(found, slopes=self._slopes(found, h.slopes, known))
 
     def with_effect(
-        self, h: Hypothesis, c: Candidate, start: np.ndarray, *, grid: float, told: bool = False
+        self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float
     ) -> Hypothesis:
         """The hypothesis with an effect more, fitted from a start.
 
@@ -188,8 +198,6 @@ class Fitter:
             c: the effect.
             start: (P,) values of its parameters.
             grid: log evidence of places, whiles or limits, less that of the best.
-            told: the base begins at the prior's mean: without the effect its numbers may have
-                gone far to stand in for it.
         """
         model = h.model.copy()
         model.add_effect(c.name)
@@ -206,9 +214,6 @@ class Fitter:
         cov = np.zeros((count + len(free),) * 2)
         cov[:count, :count] = h.cov
         cov[range(count, len(cov)), range(count, len(cov))] = std**2
-        # clocks stay where they are: the prior hardly knows them
-        back = np.array([told and not name.startswith("clock.") for name in h.labels])
-        base = np.where(back & ~h.of_effects, h.mean, h.value)
         grown = Hypothesis(
             effects=(*h.effects, effect),
             model=model,
@@ -219,15 +224,14 @@ class Fitter:
             low=np.r_[h.low, [p.min for p in free]],
             high=np.r_[h.high, [p.max for p in free]],
             step=np.r_[h.step, np.where(limit, LIMIT_STEP * np.abs(start), [p.step for p in free])],
-            value=np.r_[base, start],
+            value=np.r_[h.value, start],
             one_sided=np.r_[
                 h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
             ],
             grid={**h.grid, effect: grid},
             slopes=h.slopes,
         )
-        fitted = self.fit(grown, known=count)
-        return self._moved(fitted, c, instance) if local.any() else fitted
+        return self.fit(grown, known=count)
 
     def without(self, h: Hypothesis, effect: str) -> Hypothesis:
         """The hypothesis without one of its effects, of several of a kind the last, fitted anew."""
@@ -283,24 +287,6 @@ class Fitter:
             out[fresh] = difference / np.where(apart, apart, np.inf)[:, None, None]
         out[~(np.abs(out).max(axis=(1, 2)) < RUNS_AWAY)] = 0.0
         return out
-
-    def _moved(self, h: Hypothesis, c: Candidate, instance: str) -> Hypothesis:
-        """Place or while moved to the best near by, all else held; then all else is fitted anew."""
-        own = [p for p in c.parameters if p.role in WHERE_OR_WHEN]
-        names = [f"{instance}.{key_of(p.name)}" for p in own]
-        reach = np.array([REACH[p.role] for p in own])
-        low, high = (np.array([getattr(p, k) for p in own]) for k in ("min", "max"))
-        at = np.array([h.model.get(n) for n in names])
-        for share in MOVES:
-            moves = np.concatenate([sign * np.diag(reach * share) for sign in (-2, -1, 1, 2)])
-            tries = np.clip(np.vstack([at, at + moves]), low, high)
-            white = self.whiten(self.steps.errors(h.model, names, tries) - self._always(h))
-            at = tries[int(np.argmin((white**2).sum(axis=1)))]
-        model = h.model.copy()
-        for name, v in zip(names, at, strict=True):
-            model.set(name, float(v))
-        base = len(h.labels) - len(c.parameters) + len(own)
-        return self.fit(replace(h, model=model), rounds=3, known=base)
 
     def _always(self, h: Hypothesis) -> np.ndarray | float:
         """(W, 3) the base's discrepancy at the best weights."""

@@ -85,18 +85,27 @@ def beliefs(table: Table) -> list[Belief]:
     p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
     some = np.exp(logs - logsumexp(logs[~nothing]))
     p[~nothing] = some[~nothing] * (1 - p[nothing].sum())
-    return [_belief(mimicked, e, float(v)) for (mimicked, _, e), v in zip(rows, p, strict=True)]
+    return [
+        _belief(mimicked, e, float(v), table.swells.get(e.effects))
+        for (mimicked, _, e), v in zip(rows, p, strict=True)
+    ]
 
 
-def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float) -> Belief:
-    """What begins or ends several times is no effect of the catalogue, but depends on time."""
+def _belief(
+    mimicked: tuple[str, ...], entry: Entry, probability: float, swells: str | None
+) -> Belief:
+    """What begins or ends several times is no effect of the catalogue, but depends on time.
+
+    What comes and goes once, in several steps, is one thing of a kind.
+    """
     at_moments = [n for n in map(catalogue_name, entry.effects) if n in beginning_at_a_moment()]
-    again = at_moments if len(at_moments) > 1 else []
+    steps = [n for n in at_moments if n != swells] if len(at_moments) > 1 else []
 
     def once(effects) -> tuple[str, ...]:
-        return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in again)
+        return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in steps)
 
-    words = (AGAIN, *entry.words) if again and AGAIN not in entry.words else entry.words
+    again = steps and swells is None and AGAIN not in entry.words
+    words = (AGAIN, *entry.words) if again else entry.words
     real = once(n for n in entry.effects if n not in mimicked)
     like = tuple(n for n in once(mimicked) if n not in real)
     return Belief(real, like, words, entry, probability)

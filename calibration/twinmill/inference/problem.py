@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One robot, ready for inference: errors, prior, noise, and all that may be missing."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -112,20 +112,27 @@ class Problem:
             np.tile(self.steps.block, 3),
         )
 
-    def columns(self, h: Hypothesis) -> dict[str, Candidate]:
-        """What each effect that a hypothesis lacks would change; the base at its prior mean.
+    def told(self, h: Hypothesis) -> Hypothesis:
+        """A hypothesis with the base's numbers at the prior's mean, which hardly knows clocks.
+
+        Without an effect they may have gone far to stand in for it: what it would change, and what
+        they would, are compared where neither has yet.
+        """
+        known = np.array([not n.startswith("clock.") for n in h.labels]) & ~h.of_effects
+        value = np.where(known, np.clip(h.mean, h.low, h.high), h.value)
+        fitter = Fitter(self.steps, self.noise, self.prior.columns)
+        return fitter.at(replace(h, value=value, slopes=None))
+
+    def columns(self, h: Hypothesis, names: Collection[str] | None = None) -> dict[str, Candidate]:
+        """What each effect that a hypothesis lacks would change; of some effects, or of all.
 
         What acts at a place or for a while may be there more than once.
         """
-        model = h.model.copy()
-        for label, named, mean in zip(h.labels, h.named, h.mean, strict=True):
-            if named and label in self.prior.names and not label.startswith("clock."):
-                model.set(label, float(mean))
         found = {}
-        for name in self.names:
+        for name in self.names if names is None else names:
             if name not in h.effects or is_local(name):
                 try:
-                    found[name] = candidates.candidate(name, model, self.steps)
+                    found[name] = candidates.candidate(name, h.model, self.steps)
                 except ValueError:  # this model cannot have it
                     continue
         return found
@@ -184,7 +191,7 @@ def problem_of(
     noise = _begin_noise(steps, motion, model_file, always)
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
-    rate = always.rate if always else None
+    rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
     wander = {w: discrepancy.in_another_log(p) for w, p in always.wander.items()} if always else {}
     rough = Problem(steps, motion, prior, base, found, names, rate, noise, noise, wander)
     noise = _flexible_noise(rough)
@@ -246,14 +253,15 @@ def _begin_noise(
 
 def _flexible_noise(p: Problem) -> Noise:
     """The noise that all effects and all dependences together leave; far errors weigh less."""
-    free = [np.tensordot(np.linalg.cholesky(p.base.cov).T, p.base.slopes, 1)]
-    for c in p.columns(p.base).values():
+    base = p.told(p.base)
+    free = [np.tensordot(np.linalg.cholesky(base.cov).T, base.slopes, 1)]
+    for c in p.columns(base).values():
         if c.masks is None and len(c.columns):
             free.append(PRIORS.size * c.columns)
     free += [FLEXIBLE * k.columns for k in p.kernels]
     columns = np.concatenate(free)
-    noise = fit_noise(p.base.errors, columns, p.noise)
+    noise = fit_noise(base.errors, columns, p.noise)
     white = noise.whiten(columns)
-    y = noise.whiten(p.base.errors)
+    y = noise.whiten(base.errors)
     left = Linear.of(y, white).residuals.reshape(3, -1)
     return replace(noise, weight=weights_of(left))

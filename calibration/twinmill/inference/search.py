@@ -2,14 +2,13 @@
 """Search over sets of effects.
 
 Nothing is accepted or refused on the way: a set that was fitted competes in the end. Moves: one
-effect more, one exchanged, one left out.
+effect more, two at once, one exchanged, one left out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
 
 from twinmill.inference.candidates import Candidate
 from twinmill.inference.discrepancy import CHANCE, SIZES
@@ -17,6 +16,7 @@ from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis, next_of_kind
 from twinmill.inference.moments import MOMENTS
 from twinmill.inference.problem import Problem, View
+from twinmill.inference.screening import gains_of_pairs, nearby, screened
 from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import catalogue_name, key_of, newest_instance
 
@@ -24,6 +24,7 @@ MOST = 4  # effects of a set
 FITTED = 6  # effects that are fitted beside the best set, by what each would gain alone ...
 BESIDE = 2  # ... and beside the likeliest dependence
 INSTEAD = 2  # effects tried in the place of each one of the best sets
+PAIRS = 2  # of effects that are fitted together, by what they would gain together
 SETS = 2  # best sets whose effects are exchanged, within ...
 NEAR = 4.0  # ... this log odds of the best
 TRIED = (-2, -1, -0.5, 0.5, 1, 2, 4)  # sizes at which a fit may begin, times the card's
@@ -68,7 +69,7 @@ class Search:
         self._keep(problem.base)
 
     def run(self) -> "Search":
-        """Forward while more effects are likelier, then exchanges among the best sets."""
+        """Forward while more effects are likelier, pairs, then exchanges among the best sets."""
         frontier = self.problem.base
         for depth in range(MOST):
             self.progress(f"effect {depth + 1}")
@@ -79,6 +80,8 @@ class Search:
             if self._log_posterior(best.effects) < max(map(self._log_posterior, self.fitted)):
                 break
             frontier = self.polished(best.effects)
+        self.progress("pairs of effects")
+        self._pair()
         self.progress("exchanging effects")
         self._exchange()
         return self
@@ -102,7 +105,8 @@ class Search:
                 for name in _last_of_kinds(names) if len(names) > 1 else ():
                     if (names, name) not in asked:
                         asked.add((names, name))
-                        self._grow(self._without(names, name), INSTEAD, 1, never=name)
+                        others = [n for n in self.problem.names if n != name]
+                        self._grow(self._without(names, name), INSTEAD, 1, others)
             if self.likely()[0] == order[0]:
                 return
 
@@ -115,58 +119,96 @@ class Search:
         self._keep(less)
         return less
 
-    def _grow(self, h: Hypothesis, alone: int, beside: int, never: str = "") -> list[Hypothesis]:
-        """Fits the likeliest sets of one effect more."""
-        own = self.fitted[h.effects]
-        columns = self.problem.columns(h)
-        gains = screened(own.linear, columns, self.view)
-        order = sorted((n for n in gains if n != never), key=lambda n: -gains[n][0])[:alone]
-        if own.gains.max() > 0:
+    def _pair(self) -> None:
+        """Fits effects that gain together, none of which is the best alone, where growth begins."""
+        told = self.problem.told(self.problem.base)
+        linear = told.linear(self.view.fitter.whiten)
+        alone = screened(linear, self.problem.columns(told), self.view.fitter.whiten)
+        best = max(alone, key=lambda n: alone[n].gain)
+        gains = gains_of_pairs(linear, {n: own.white for n, own in alone.items() if n != best})
+        known = {tuple(sorted(k)) for k in self.fitted}
+        for pair in sorted(gains, key=lambda p: -gains[p])[:PAIRS]:
+            first, second = sorted(pair, key=lambda n: -alone[n].gain)
+            if tuple(sorted(pair)) not in known:
+                if (first,) not in self.fitted:
+                    self._grow(self.problem.base, 1, 0, (first,))
+                if (first,) in self.fitted:
+                    self._grow(self.fitted[(first,)].hypothesis, 1, 0, (second,))
+
+    def _grow(
+        self, h: Hypothesis, alone: int, beside: int, names: Collection[str] | None = None
+    ) -> list[Hypothesis]:
+        """Fits the likeliest sets of one effect more, one of some or of all."""
+        own, told = self.fitted[h.effects], self.problem.told(h)
+        columns, linear = self.problem.columns(told, names), told.linear(self.view.fitter.whiten)
+        each = screened(linear, columns, self.view.fitter.whiten)
+        order = sorted(each, key=lambda n: -each[n].gain)[:alone]
+        if own.gains.max() > 0 and beside:
             f, s = np.unravel_index(own.gains.argmax(), own.gains.shape)
-            with_likely = own.linear.with_columns(SIZES[s] * own.white(self.view, f))
-            other = screened(with_likely, columns, self.view)
-            more = sorted((n for n in other if n != never), key=lambda n: -other[n][0])[:beside]
-            gains |= {n: other[n] for n in more if n not in order}
+            with_likely = linear.with_columns(SIZES[s] * own.white(self.view, f))
+            other = screened(with_likely, columns, self.view.fitter.whiten)
+            more = sorted(other, key=lambda n: -other[n].gain)[:beside]
+            each |= {n: other[n] for n in more if n not in order}
             order += [n for n in more if n not in order]
         known = {tuple(sorted(k)) for k in self.fitted}
         grown = []
         for name in order:
-            gain, start, grid = gains[name]
-            if gain < WORTH or tuple(sorted((*h.effects, next_of_kind(h.effects, name)))) in known:
+            seen, more_of = each[name], tuple(sorted((*h.effects, next_of_kind(h.effects, name))))
+            if seen.gain < WORTH or more_of in known:
                 continue
-            found = self._fitted(h, columns[name], start, grid)
+            found = self._fitted(h, told, linear, columns[name], starts=seen.starts, grid=seen.grid)
             self._keep(found)
             grown.append(found)
         return grown
 
-    def _fitted(self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float) -> Hypothesis:
-        """From the linear start, and where the effect may be bent from another size, too."""
-        fitter = self.view.fitter
-        found = fitter.with_effect(h, c, start, grid=grid)
+    def _fitted(
+        self,
+        h: Hypothesis,
+        told: Hypothesis,
+        linear: Linear,
+        c: Candidate,
+        *,
+        starts: np.ndarray,
+        grid: float,
+    ) -> Hypothesis:
+        """From the linear start, and where the effect may be bent from another size, too.
+
+        Args:
+            h: without the effect.
+            told: the same with the base's numbers as known.
+            linear: its linear model.
+            c: the effect.
+            starts: (S, P) of its parameters.
+            grid: see `Fitter.with_effect`.
+        """
+        fitter, start = self.view.fitter, starts[0]
+        if c.masks is not None:
+            start = nearby(c, starts, told, linear, steps=fitter.steps, whiten=fitter.whiten)
+        found = fitter.with_effect(h, c, start, grid)
         if c.masks is not None or c.fixed is not None:
             return found
         value = np.array([p.value for p in c.parameters])
         best = found.log_evidence(found.linear(fitter.whiten))
-        for other in [start, value] if len(value) > 1 else [self._best_size(h, c)]:
-            again = fitter.with_effect(h, c, other, grid=grid, told=True)
+        for other in [start, value] if len(value) > 1 else [self._best_size(told, linear, c)]:
+            again = fitter.with_effect(told, c, other, grid)
             then = again.log_evidence(again.linear(fitter.whiten))
             if then > best:
                 found, best = again, then
         return found
 
-    def _best_size(self, h: Hypothesis, c: Candidate) -> np.ndarray:
+    def _best_size(self, told: Hypothesis, linear: Linear, c: Candidate) -> np.ndarray:
         """(1,) one of TRIED sizes of an effect of one number: what it leaves is least there.
 
         The other numbers of the hypothesis are free in it, but linear.
         """
         (p,) = c.parameters
-        model, own = h.model.copy(), self.fitted[h.effects].linear
+        model = told.model.copy()
         model.add_effect(c.name)
         name = f"{newest_instance(model, c.name)}.{key_of(p.name)}"
         sizes = np.clip(p.usual + np.array([0, *TRIED]) * (p.value - p.usual), p.min, p.max)
         errors = self.problem.steps.errors(model, [name], sizes[:, None])
-        left = own.y + self.view.fitter.whiten(errors[1:] - errors[0])
-        squares = (left**2).sum(axis=1) - ((left @ own.basis.T) ** 2).sum(axis=1)
+        left = linear.y + self.view.fitter.whiten(errors[1:] - errors[0])
+        squares = (left**2).sum(axis=1) - ((left @ linear.basis.T) ** 2).sum(axis=1)
         return sizes[1:][[np.argmin(squares)]]
 
     def _keep(self, h: Hypothesis) -> None:
@@ -229,42 +271,3 @@ def _taken(h: Hypothesis, view: View) -> np.ndarray:
         view.fitter.whiten(h.slopes[h.of_effects]) if h.effects else np.zeros((0, len(view.block)))
     )
     return np.linalg.qr(own.T)[0].T
-
-
-def screened(
-    linear: Linear, columns: dict[str, Candidate], view: View
-) -> dict[str, tuple[float, np.ndarray, float]]:
-    """Gain in log evidence of each effect, were it linear, best numbers, and offset of its grid."""
-    left = linear.y - linear.half @ linear.basis
-    return {
-        name: _screened(c, linear.basis, left, view.fitter.whiten) for name, c in columns.items()
-    }
-
-
-def _screened(c: Candidate, basis: np.ndarray, left: np.ndarray, whiten):
-    if c.fixed is not None:
-        white = whiten(c.fixed)
-        cross = white @ basis.T
-        gains = white @ left - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
-        best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
-        return total, c.at[best], total - float(gains[best])
-    masks = np.ones((1, c.columns.shape[1])) if c.masks is None else c.masks
-    white = PRIORS.size * np.stack([whiten(masks[:, :, None] * own) for own in c.columns], axis=1)
-    cross = white @ basis.T
-    gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2) + np.eye(len(c.columns))
-    push = white @ left
-    solved = np.linalg.solve(gram, push[..., None])[..., 0]
-    gains = 0.5 * (push * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
-    if c.one_sided.any():
-        spread = np.sqrt(np.diagonal(np.linalg.inv(gram), axis1=1, axis2=2))
-        sided = np.log(2) + log_ndtr(solved / spread)
-        gains = gains + np.where(c.one_sided, sided, 0.0).sum(axis=1)
-    best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
-    start = np.array([p.usual for p in c.parameters], float)
-    strength = np.array([p.value - p.usual for p in c.parameters])
-    start[c.sizes] += PRIORS.size * solved[best] * strength[c.sizes]
-    start = np.clip(start, [p.min for p in c.parameters], [p.max for p in c.parameters])
-    if c.masks is not None:
-        local = [k for k in range(len(start)) if k not in c.sizes]
-        start[local] = c.at[best]
-    return total, start, total - float(gains[best])

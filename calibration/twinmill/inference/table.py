@@ -16,7 +16,12 @@ from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import (
+    beginning_at_a_moment,
+    catalogue_name,
+    effect_names,
+    with_role,
+)
 
 COMPARED = 10  # sets of the table, within ...
 BEYOND = 12.0  # ... this log odds of the best: one in 160,000 decides nothing ...
@@ -59,6 +64,8 @@ class Table:
         excess: squares that the base leaves over those of noise.
         candidates: effects that compete.
         words: dependences that compete.
+        swells: of sets in which several effects act from moments on, the kind of the one thing
+            that they are steps of, where what they change together comes and goes once.
     """
 
     entries: list[Entry]
@@ -66,6 +73,7 @@ class Table:
     excess: float
     candidates: tuple[str, ...]
     words: tuple[str, ...]
+    swells: dict[tuple[str, ...], str]
 
 
 def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -118,7 +126,33 @@ def table_of(search: Search) -> Table:
         max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
         tuple(p.names),
         search.words,
+        {names: kind for names, h in fitted.items() if (kind := _swells(h))},
     )
+
+
+def _swells(h: Hypothesis) -> str | None:
+    """Kind of the one thing that several effects at moments are steps of; None if not of one."""
+    own = [n for n in h.effects if catalogue_name(n) in beginning_at_a_moment()]
+    steps: list[tuple[float, float]] = []
+    for name in own:
+        kind, instance = catalogue_name(name), h.instance(name)
+        size = h.model.get(f"{instance}.{with_role(kind, 'size')[0]}")
+        moments_s = [h.model.get(f"{instance}.{key}") for key in with_role(kind, "moment")]
+        steps += zip(moments_s, (size, -size), strict=False)
+    if len(own) < 2 or not swells_once(steps):
+        return None
+    return min(map(catalogue_name, own), key=lambda kind: len(with_role(kind, "moment")))
+
+
+def swells_once(steps: list[tuple[float, float]]) -> bool:
+    """Whether what begins at zero, and changes at times by so much each, grows once and then falls.
+
+    Args:
+        steps: time in s, and the change of the size at it.
+    """
+    course = np.round(np.cumsum([change for _, change in sorted(steps)]), 9)
+    grows = np.diff(np.abs(course), prepend=0.0) > 0
+    return bool((course * course[0] >= 0).all() and not (np.diff(grows.astype(int)) > 0).any())
 
 
 def _likeliest_columns(own: Evidence, p: Problem) -> np.ndarray:

@@ -15,9 +15,11 @@ import tomlkit
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.fit import fit
+from twinmill.inference.always import always_of
 from twinmill.inference.infer import infer, infer_robots
 from twinmill.inference.kept import kept, with_kept
 from twinmill.inference.problem import problem_of
+from twinmill.inference.screening import nearby, screened
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile
 
@@ -69,6 +71,53 @@ def test_a_marker_beside_the_axle_is_named_with_its_place(measure, one_clock_bas
         value, std = number(found.answer, "marker_offset", name)
         assert abs(value - truth) < 3 * std
         assert std < 1e-3
+
+
+def test_a_lag_more_is_looked_for_where_it_does_what_the_bases_own_does(
+    measure, tanh_robot, one_clock_base, own
+):
+    """The card adds the two; a fit of the base alone has put its own far from where it is known."""
+    p = problem_of(
+        [measure(tanh_robot(lag_s=0.2), 7)], one_clock_base, always_of([own], one_clock_base)
+    )
+    told = p.told(p.base)
+    lag = told.labels.index("base.motor_lag_s")
+    assert p.base.value[lag] > 1.2 * told.value[lag]
+    candidate = p.columns(told)["motor_lag"]
+    later = told.model.copy()
+    later.set("base.motor_lag_s", told.value[lag] + candidate.parameters[0].value)
+    change = p.steps.errors(told.model)[0] - p.steps.errors(later)[0]
+    assert candidate.columns[0] == pytest.approx(change, abs=1e-9)
+
+
+def test_a_patch_whose_centre_was_never_driven_to_is_found(
+    measure, tanh_robot, one_clock_base, own
+):
+    """A quarter slower on a disc; place and radius are right where the robot was."""
+    centre_m, radius_m = np.array([0.9, 0.2]), 0.7
+
+    class Patched(tanh_robot):
+        def hindered(self, motion):
+            at, heading, left = np.zeros(2), 0.0, motion.copy()
+            for k, (forward, side, turn) in enumerate(motion):
+                slow = 1 - 0.25 * (np.hypot(*(at - centre_m)) < radius_m)
+                left[k], heading = slow * motion[k], heading + slow * turn * STEP_S
+                c, s = np.cos(heading), np.sin(heading)
+                at = at + slow * np.array([c * forward - s * side, s * forward + c * side]) * STEP_S
+            return left
+
+    p = problem_of([measure(Patched(), 13)], one_clock_base, always_of([own], one_clock_base))
+    told, whiten = p.told(p.base), p.view(p.noise).fitter.whiten
+    linear, columns = told.linear(whiten), p.columns(told, ("floor_patch",))
+    starts = screened(linear, columns, whiten)["floor_patch"].starts
+    found = nearby(
+        columns["floor_patch"], starts, told, linear, steps=p.steps, whiten=whiten
+    )  # strength, x, y, radius
+    away_m = np.hypot(*(p.steps.place - centre_m).T)
+    assert away_m.min() > 0.3
+    inside = np.hypot(*(p.steps.place - found[1:3]).T) < found[3]
+    assert np.mean(inside == (away_m < radius_m)) > 0.97
+    assert found[0] == pytest.approx(0.25, abs=0.03)
 
 
 @pytest.mark.parametrize("begins_s", [(12.0,), (6.0, 24.0)], ids=["once", "again"])

@@ -25,9 +25,10 @@ from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise
 from twinmill.inference.posterior import beliefs
+from twinmill.inference.screening import gains_of_pairs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
-from twinmill.inference.table import Entry, Table
+from twinmill.inference.table import Entry, Table, swells_once
 
 STEP_S = 0.1
 
@@ -171,13 +172,27 @@ def test_a_gain_kernel_of_size_one_is_a_gain_error_of_one(word):
         assert variance.mean() == pytest.approx(1, rel=0.15), k.name
 
 
+def test_what_two_effects_gain_together_is_the_evidence_of_their_columns():
+    """Two columns that nearly cancel gain little alone, and much together."""
+    random = np.random.default_rng(6)
+    base, first, third = random.normal(size=(3, 80))
+    second = -first + 0.05 * random.normal(size=80)
+    white = {"a": 3 * first[None], "b": 3 * second[None], "c": np.array([third, third**2])}
+    linear = Linear.of(4.0 * (white["a"] + white["b"])[0] + random.normal(size=80), base[None])
+    found = gains_of_pairs(linear, white)
+    for (a, b), gain in found.items():
+        both = linear.with_columns(np.concatenate([white[a], white[b]]))
+        assert gain == pytest.approx(both.log_evidence - linear.log_evidence)
+    assert max(found, key=found.__getitem__) == ("a", "b")
+
+
 OF_TIME = ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss")
 OF_OTHERS = ("wheel_gain", "dead_zone", "motor_lag", "marker_offset", "floor_patch", "yaw_lag")
 
 
-def table(entries):
+def table(entries, swells=()):
     """Of ten effects, four of which act with time."""
-    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"))
+    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"), dict(swells))
 
 
 def entry(effects, words, log_evidence, mimicked=None):
@@ -266,6 +281,32 @@ def test_what_changes_at_several_moments_depends_on_time(effects):
     assert several.outside and several.words == ("time",)
     once = beliefs(table([entry((), (), -50), entry(effects[:1], (), 0)]))
     assert max(once, key=lambda b: b.probability).effects == effects[:1]
+
+
+def test_steps_of_one_thing_are_that_thing():
+    names = ("transient_loss", "abrupt_loss", "transient_loss#2")
+    entries = [entry((), (), -50), entry(names, (), 0)]
+    likely = max(beliefs(table(entries, {names: "abrupt_loss"})), key=lambda b: b.probability)
+    assert likely.effects == ("abrupt_loss",)
+    assert not likely.words
+
+
+@pytest.mark.parametrize(
+    "course, once",
+    [
+        ([1, 2, 1, 0], True),
+        ([1, 2], True),  # and stays
+        ([1, 2, 1], True),
+        ([-1, -2, 0], True),
+        ([1, 0, 1, 0], False),  # comes twice
+        ([2, 1, 2, 0], False),  # and in between not wholly goes
+        ([1, -2, 1, 0], False),  # a loss, a gain and a loss
+    ],
+)
+def test_what_grows_once_and_falls_once_is_told_from_what_comes_again(course, once):
+    changes = np.diff(course, prepend=0)
+    steps = [(5.0 * k, float(change)) for k, change in enumerate(changes)]
+    assert swells_once(steps[::-1]) == once
 
 
 def test_all_pairs_of_words_share_one_prior_of_something_outside():

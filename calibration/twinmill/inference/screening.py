@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What effects would gain beside a model, were they linear, and where one acts best."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import combinations, product
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from twinmill.inference.candidates import Candidate
+from twinmill.inference.evidence import Linear
+from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.steps import Steps
+from twinmill.model.parameters import WHERE_OR_WHEN, key_of, newest_instance
+
+REACH_S = 0.5  # by which a moment is moved: half of what a step of the grid leaves open
+REACH = 0.25  # by which a place and its radius are, times the radius: a fourth of the grid's step
+NEARER, NEAREST = 0.5, 0.2  # factor on the reach where no move is better, and the last
+MOVES = 8  # at most
+Whiten = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Screened:
+    """An effect, were it linear.
+
+    Attributes:
+        gain: in log evidence, averaged over its grid of places, whiles or limits.
+        starts: (S, P) best numbers; of what acts somewhere the best of each sign, since a loss at a
+            place is nearly a gain everywhere else.
+        grid: the gain less that of the grid's best point.
+        white: (k, R) columns at that point, scaled by the standard deviation of the prior.
+    """
+
+    gain: float
+    starts: np.ndarray
+    grid: float
+    white: np.ndarray = field(repr=False)
+
+
+def screened(linear: Linear, columns: dict[str, Candidate], whiten: Whiten) -> dict[str, Screened]:
+    """What each effect would gain beside a linear model."""
+    each = {}
+    for name, c in columns.items():
+        each[name] = _by_size(c, linear, whiten) if c.fixed is None else _fixed(c, linear, whiten)
+    return each
+
+
+def gains_of_pairs(linear: Linear, white: dict[str, np.ndarray]) -> dict[tuple[str, str], float]:
+    """Gain in log evidence by two effects together, for each pair of (k, R) white columns."""
+    parts, stacked = {}, np.concatenate([np.zeros((0, len(linear.y))), *white.values()])
+    for name, own in white.items():
+        begin = sum(len(other) for other in parts.values())
+        parts[name] = np.arange(begin, begin + len(own))
+    gram, push = linear.projected(stacked, stacked @ stacked.T)
+    found = {}
+    for pair in combinations(parts, 2):
+        at = np.concatenate([parts[name] for name in pair])
+        own = gram[np.ix_(at, at)] + np.eye(len(at))
+        gain = push[at] @ np.linalg.solve(own, push[at]) - np.linalg.slogdet(own)[1]
+        found[pair] = 0.5 * float(gain)
+    return found
+
+
+def nearby(
+    c: Candidate,
+    starts: np.ndarray,
+    h: Hypothesis,
+    linear: Linear,
+    *,
+    steps: Steps,
+    whiten: Whiten,
+) -> np.ndarray:
+    """(P,) numbers of an effect with its place or while where it gains most, near some starts.
+
+    Args:
+        c: the effect.
+        starts: (S, P) its numbers at points of the grid.
+        h: without it.
+        linear: the linear model of that; all its numbers are free.
+        steps: of the logs.
+        whiten: their noise.
+    """
+    model = h.model.copy()
+    model.add_effect(c.name)
+    instance = newest_instance(model, c.name)
+    names = [f"{instance}.{key_of(p.name)}" for p in c.parameters]
+    where = [k for k, p in enumerate(c.parameters) if p.role in WHERE_OR_WHEN]
+    low, high = (np.array([getattr(c.parameters[k], end) for k in where]) for end in ("min", "max"))
+    ways = np.array(list(product((0, -1, 1), repeat=len(where))), float)  # the first stays
+
+    def gains_at(tries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points = np.tile([p.usual for p in c.parameters], (len(tries), 1 + len(c.sizes), 1))
+        points[:, :, where] = tries[:, None]
+        for n, k in enumerate(c.sizes):
+            points[:, 1 + n, k] = c.parameters[k].value
+        errors = steps.errors(model, names, points.reshape(-1, len(names)))
+        errors = errors.reshape(*points.shape[:2], *errors.shape[1:])
+        white = PRIORS.size * whiten(errors[:, :1] - errors[:, 1:])
+        return _gains(white, linear, c.one_sided)
+
+    found = []
+    for at in starts[:, where]:
+        share = 1.0
+        for _ in range(MOVES):
+            reach = share * (REACH * at[-1] if c.parameters[where[0]].role == "place" else REACH_S)
+            tries = np.clip(at + reach * ways, low, high)
+            gains, weights = gains_at(tries)
+            best = int(np.argmax(gains))
+            if best == 0 and share < NEAREST:
+                break
+            at, share = tries[best], share if best else NEARER * share
+        found.append((float(gains[best]), _start(c, weights[best], at, where)))
+    return max(found, key=lambda f: f[0])[1]
+
+
+def _gains(
+    white: np.ndarray, linear: Linear, one_sided: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(G,) gains in log evidence by (G, k, R) white columns, and (G, k) their best weights."""
+    cross = white @ linear.basis.T
+    gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2) + np.eye(white.shape[1])
+    push = white @ (linear.y - linear.half @ linear.basis)
+    solved = np.linalg.solve(gram, push[..., None])[..., 0]
+    gains = 0.5 * (push * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
+    if one_sided.any():
+        spread = np.sqrt(np.diagonal(np.linalg.inv(gram), axis1=1, axis2=2))
+        sided = np.log(2) + log_ndtr(solved / spread)
+        gains = gains + np.where(one_sided, sided, 0.0).sum(axis=1)
+    return gains, solved
+
+
+def _by_size(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
+    masks = np.ones((1, c.columns.shape[1])) if c.masks is None else c.masks
+    white = PRIORS.size * np.stack([whiten(masks[:, :, None] * own) for own in c.columns], axis=1)
+    gains, solved = _gains(white, linear, c.one_sided)
+    order, total = np.argsort(-gains), float(logsumexp(gains) - np.log(len(gains)))
+    best = order[0]
+    if c.masks is None:
+        starts = [_start(c, solved[best], np.zeros(0), [])]
+    else:
+        where = [k for k in range(len(c.parameters)) if k not in c.sizes]
+        other = [k for k in order if solved[k, 0] * solved[best, 0] < 0][:1]
+        starts = [_start(c, solved[k], c.at[k], where) for k in (best, *other)]
+    return Screened(total, np.array(starts), total - float(gains[best]), white[best])
+
+
+def _start(c: Candidate, weights: np.ndarray, at: np.ndarray, where: list[int]) -> np.ndarray:
+    """(P,) numbers of an effect, of weights of its sizes and where it acts."""
+    start = np.array([p.usual for p in c.parameters], float)
+    strength = np.array([p.value - p.usual for p in c.parameters])
+    start[c.sizes] += PRIORS.size * weights * strength[c.sizes]
+    start = np.clip(start, [p.min for p in c.parameters], [p.max for p in c.parameters])
+    start[where] = at
+    return start
+
+
+def _fixed(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
+    """An effect of limits, which has no size."""
+    white = whiten(c.fixed)
+    cross, left = white @ linear.basis.T, linear.y - linear.half @ linear.basis
+    gains = white @ left - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
+    best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
+    return Screened(total, c.at[[best]], total - float(gains[best]), white[[best]])
