@@ -3,6 +3,7 @@
 
 import json
 import time
+from contextlib import contextmanager
 
 import pytest
 import turbopi
@@ -182,6 +183,22 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R01 drives already, held by another operator" in said
     assert "R02 drives already, and no operator is heard who holds it" in said
     assert "R03 drives already, untethered" in said
+
+
+def test_arming_shows_for_whom_it_waits(monkeypatch, key_file, twinmill):
+    """Of three robots one was switched off: five seconds without a word."""
+    shown = []
+
+    @contextmanager
+    def telling(words):
+        shown.append(words)
+        yield
+
+    monkeypatch.setattr(swarm, "telling", telling)
+    monkeypatch.setattr(swarm.tell, "arm", lambda *_: [])
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet_of(robot(1)))
+    twinmill("swarm", "arm", "--robots", "1,3", "--key", key_file)
+    assert shown == ["arming R01, R03, up to 5 s until each has answered"]
 
 
 def test_a_robot_whose_fault_keeps_it_standing_is_not_said_to_drive():

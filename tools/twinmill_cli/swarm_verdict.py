@@ -160,15 +160,14 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
 
 def _reasons(given: list[Answer], how: Saying) -> list[str]:
     """Sentences on why no stop was confirmed, as by robots that have another key."""
-    told = {a.reason: None for a in given if a.reason and not (how.key_fault and a.reason == NO_KEY)}
+    known = {"", NO_KEY if how.key_fault else ""}
     sentences = []
-    for reason in told:
+    for reason in dict.fromkeys(a.reason for a in given if a.reason not in known):
         those = [a for a in given if a.reason == reason]
         sentences.append(f"{_names(those)}: {reason}{'' if reason.endswith('?') else '.'}")
     strange = [a for a in given if a.reason == NO_SIGNATURE and a.mode == "stopped"]
     if strange:
-        word = "its word, which nobody can check, it stands"
-        sentences.append(f"{_names(strange)}: by {word}.")
+        sentences.append(f"{_names(strange)}: by its word, which nobody can check, it stands.")
     return sentences
 
 
@@ -216,9 +215,7 @@ def of_busy(busy: list[Robot]) -> str:
         else:
             who = f"already, {who}"
         moves = robot.drives and not in_fault
-        by.setdefault(("drive" if moves else "stand", who), []).append(
-            f"R{robot.robot_id:02d}"
-        )
+        by.setdefault(("drive" if moves else "stand", who), []).append(f"R{robot.robot_id:02d}")
     return "; ".join(
         f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
         for (verb, who), names in by.items()
