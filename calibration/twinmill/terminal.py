@@ -23,6 +23,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from twinmill.foreign_text import printable
+from twinmill.streams import STDERR_NAME, STDOUT_NAME, naming
 
 MOST_WIDE = 1000  # columns that no terminal has
 BAR_FROM = 60  # columns of a terminal that has room for more than words and numbers
@@ -37,6 +38,11 @@ class PlainConsole(Console):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, **options)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Rich's; an OSError names the stream."""
+        with naming(STDERR_NAME if self.stderr else STDOUT_NAME):
+            super().print(*objects, **options)
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 import errno
 import hashlib
+import io
 import json
 import os
 import re
@@ -18,7 +19,9 @@ from hypothesis import strategies as st
 from twinmill.extras import missing
 from twinmill.files import plain
 from twinmill.report.tables import number
+from twinmill.terminal import PlainConsole
 from twinmill_cli import main as cli
+from twinmill_cli.ending import _told
 from twinmill_cli.lazy import LazyCommand
 
 
@@ -337,6 +340,46 @@ def test_an_option_that_is_no_finite_number_is_refused_by_name(twinmill, argumen
     code, out, err = twinmill(*arguments, value)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert arguments[-1] in err and f"{value} is no finite number" in err
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "shown"),
+    [
+        ("--in-s", "abc", "abc"),
+        ("--in-s", "", "an empty text"),
+        ("--in-s", "-1", "-1"),
+        ("--in-s", "1e400", "1e400"),
+        ("--in-s", "700", "700"),
+        ("--link-timeout-s", "0.1", "0.1"),
+    ],
+)
+def test_a_number_that_is_refused_is_named_with_its_option(twinmill, option, value, shown):
+    code, out, err = twinmill("swarm", "start", option, value, "--json")
+    told = json.loads(out)
+    assert code == 2 and told["ok"] is False and err == f"twinmill: {told['sentence']}\n"
+    assert f"'{option}': {shown}" in err
+
+
+@pytest.mark.parametrize(
+    ("cause", "why"),
+    [
+        (errno.ENOSPC, "no space is left"),
+        (errno.EFBIG, "ulimit -f"),
+        (errno.EDQUOT, "quota"),
+    ],
+)
+@pytest.mark.parametrize("stream", ["stdout", "stderr"])
+def test_a_stream_that_takes_no_more_is_named(cause, why, stream):
+    class Full(io.StringIO):
+        def write(self, _):
+            raise OSError(cause, os.strerror(cause))
+
+    console = PlainConsole(file=Full(), stderr=stream == "stderr")
+    with pytest.raises(OSError) as failed:
+        console.print("All stand.")
+    code, sentence = _told(failed.value)
+    name = {"stdout": "standard output", "stderr": "standard error"}[stream]
+    assert code == 1 and sentence.startswith(f"{name}: ") and why in sentence
 
 
 def test_an_option_for_one_value_is_not_given_twice(twinmill, tmp_path):

@@ -3,13 +3,14 @@
 
 import json
 import time
+from contextlib import contextmanager
 
 import pytest
 import turbopi
 
 from twinmill.robots import key as keys
 from twinmill.robots import tell
-from twinmill.robots.fleet import TELEMETRY, Fleet, Robot
+from twinmill.robots.fleet import MODES, TELEMETRY, Fleet, Robot
 from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_screen import status_table
@@ -182,6 +183,32 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R01 drives already, held by another operator" in said
     assert "R02 drives already, and no operator is heard who holds it" in said
     assert "R03 drives already, untethered" in said
+
+
+def test_arming_shows_for_whom_it_waits(monkeypatch, key_file, twinmill):
+    """Of three robots one was switched off: five seconds without a word."""
+    shown = []
+
+    @contextmanager
+    def telling(words):
+        shown.append(words)
+        yield
+
+    monkeypatch.setattr(swarm, "telling", telling)
+    monkeypatch.setattr(swarm.tell, "arm", lambda *_: [])
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet_of(robot(1)))
+    twinmill("swarm", "arm", "--robots", "1,3", "--key", key_file)
+    assert shown == ["arming R01, R03, up to 5 s until each has answered"]
+
+
+def test_a_robot_whose_fault_keeps_it_standing_is_not_said_to_drive():
+    """It was started without its camera, and no wheel has turned."""
+    held = robot(1, DRIVING)
+    held.telemetry.mode = MODES.index("fault")
+    hold(fleet_of(held), 1)
+    said = of_busy([held])
+    assert "R01 stands still in a fault" in said and "held by another operator" in said
+    assert "drives already" not in said
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,11 @@
 
 import json
 import os
+import pty
 import signal
+import sys
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -306,3 +309,26 @@ class LostBus:
             return
         self.reach.note(set(), "eth0: Network is unreachable")
         raise OSError("the bus cannot be reached")
+
+
+TELLS_IN_BACKGROUND = """
+set -m; stty tostop
+{python} -c 'from twinmill_cli.swarm_signals import counting_signals as counting
+with counting():
+    print("robots drive", flush=True)' &
+wait $!; echo ended $?; kill -KILL %1
+"""
+
+
+def test_a_terminal_that_halts_who_writes_in_the_background_halts_no_operator():
+    """Robots drove for the 2 s in which they had not lost it, and nobody was told."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.execvp("bash", ["bash", "-c", TELLS_IN_BACKGROUND.format(python=sys.executable)])
+    said = b""
+    with suppress(OSError):  # the end of a terminal
+        while got := os.read(terminal, 4096):
+            said += got
+    os.waitpid(pid, 0)
+    os.close(terminal)
+    assert b"robots drive" in said and b"ended 0" in said

@@ -21,7 +21,7 @@ from twinmill.robots.hold import (
     SILENT,
     of_taken,
 )
-from twinmill.robots.tell import NEVER_HEARD, Answer, Start
+from twinmill.robots.tell import NEVER_HEARD, NO_SIGNATURE, Answer, Start
 from twinmill_cli.swarm_end import finish
 from twinmill_cli.swarm_verdict import (
     Saying,
@@ -397,3 +397,12 @@ def test_the_clock_that_is_odd_is_named(clock_s, says):
 def test_what_an_odd_clock_makes_of_a_start_is_what_the_robot_does(ahead_s, then):
     """fw_command_judge() refuses over FW_START_LATE_US and FW_START_AHEAD_US."""
     assert of_clocks({"R01": 0.0, "R02": ahead_s}, 1.0).endswith(f"By that, R02 {then}")
+
+
+def test_a_stop_says_that_a_robot_has_another_key():
+    """It may well stand, and this operator cannot know."""
+    told = of_stop([STANDS, replace(UNSIGNED, reason=NO_SIGNATURE)])
+    assert not told.ok and "R04: no stop was confirmed" in told.sentence
+    assert "R04: signs nothing with this operator's key" in told.sentence
+    assert "R04: by its word, which nobody can check, it stands." in told.sentence
+    assert "R02: signs" not in told.sentence

@@ -27,6 +27,11 @@ from twinmill_cli.output import (
 STDOUT, STDERR = 1, 2
 QUOTED = 80  # letters of what a sentence quotes
 TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
+NO_ROOM = {  # why a file takes no more, and what to do
+    errno.ENOSPC: "no space is left there; make room, then do it again",
+    errno.EDQUOT: "your quota of that disk is used up; make room, then do it again",
+    errno.EFBIG: "no file may become so large here (ulimit -f); raise that, then do it again",
+}
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
 
@@ -98,10 +103,10 @@ def _told(error: Exception) -> tuple[int, str]:
         if (error.name or "twinmill").startswith("twinmill"):
             raise error
         return 1, missing(error.name)
+    if isinstance(error, OSError) and error.errno in NO_ROOM:
+        return 1, _short(f"{error.filename or 'the output'}: {NO_ROOM[error.errno]}.")
     if isinstance(error, OSError) and error.filename:
         return 1, _short(f"{error.filename}: {error.strerror}.")
-    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
-        return 1, "no space is left where the output goes; make room, then do it again."
     return 1, _short(str(error))
 
 

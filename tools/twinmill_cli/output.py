@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 import typer
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill.streams import STDERR_NAME, STDOUT_NAME, naming
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -69,13 +70,15 @@ def print_object(data: dict) -> None:
     """One JSON object on stdout, in one line."""
     from twinmill.files import plain  # not for --help
 
-    print(json.dumps(plain(data), allow_nan=False), flush=True)
+    with naming(STDOUT_NAME):
+        print(json.dumps(plain(data), allow_nan=False), flush=True)
     _told_on[:] = [sys.stdout]
 
 
 def say(sentence: str, program: str = "twinmill") -> None:
     """A sentence on stderr, in one line whatever it quotes."""
-    print(f"{program}: {plain_line(sentence, MESSAGE_MAX)}", file=sys.stderr, flush=True)
+    with naming(STDERR_NAME):
+        print(f"{program}: {plain_line(sentence, MESSAGE_MAX)}", file=sys.stderr, flush=True)
 
 
 def deliver(data: dict, text: RenderableType | None, as_json: bool) -> None:

@@ -14,7 +14,7 @@ import typer
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl
-from twinmill_cli.output import AsJson, decide, print_object, say
+from twinmill_cli.output import AsJson, decide, print_object, say, telling
 from twinmill_cli.swarm_door import (
     BusPrefix,
     KeyThere,
@@ -24,6 +24,7 @@ from twinmill_cli.swarm_door import (
     check_clocks,
     join,
     key_if_there,
+    names,
     parse_robots,
     refuse_doubles,
     refuse_stopped,
@@ -38,6 +39,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import LINK_TIMEOUT_MS, RUN_PERIOD_S, Fleet
     from twinmill.robots.hold import Held
+    from twinmill.robots.tell import Answer
     from twinmill.terminal import PlainConsole
     from twinmill_cli.swarm_end import clocks, driving, finish
     from twinmill_cli.swarm_screen import status_table
@@ -124,7 +126,7 @@ def _start(
         if busy:
             say(f"{of_busy(busy)}; this start takes over.")
         if arm:
-            tell.arm(fleet, asked)
+            _let_start(fleet, asked)
         data = {
             "drove_before": [robot.robot_id for robot in busy if robot.drives],
             "link_timeout_s": timeout_ms / 1e3,
@@ -212,6 +214,12 @@ def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
         voice.clear()
 
 
+def _let_start(fleet: Fleet, asked: set[int]) -> list[Answer]:
+    """Arms robots, and shows on a terminal for whom that waits."""
+    with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
+        return tell.arm(fleet, asked)
+
+
 def _arm(
     *,
     robots: Robots = None,
@@ -232,7 +240,7 @@ def _arm(
         busy = tell.find_busy(fleet, asked)
         if busy:
             say(f"{of_busy(busy)}.")
-        given = tell.arm(fleet, asked)
+        given = _let_start(fleet, asked)
         return finish("arm", given, of_arm(given), {}, as_json=as_json)
 
 
@@ -303,8 +311,8 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
-    names = ", ".join(f"R{r.robot_id:02d}" for r in robots)
-    heard = Verdict(bool(robots), f"Heard: {names}." if robots else "No robot is heard.")
+    heard = f"Heard: {names(fleet.robots)}." if robots else "No robot is heard."
+    heard = Verdict(bool(robots), heard)
     odd = clocks(fleet, fleet.robots)
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}

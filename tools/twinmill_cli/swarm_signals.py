@@ -27,13 +27,18 @@ BECAME = {
 
 @contextmanager
 def counting_signals(numbers: Sequence[int] = ENDING) -> Iterator[list[int]]:
-    """Signals that ask for the end do nothing but stand in a list."""
+    """Signals that ask for the end do nothing but stand in a list.
+
+    Nor does a terminal (`stty tostop`) halt a program in the background that tells something: its
+    robots would drive on until they had lost it.
+    """
     asked: list[int] = []
-    before = [signal.signal(number, lambda n, _: asked.append(n)) for number in numbers]
+    before = {number: signal.signal(number, lambda n, _: asked.append(n)) for number in numbers}
+    before[signal.SIGTTOU] = signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     try:
         yield asked
     finally:
-        for number, handler in zip(numbers, before, strict=True):
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 

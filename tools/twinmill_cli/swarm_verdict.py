@@ -16,6 +16,8 @@ from twinmill.robots.tell import (
     DRIVING,
     LATE_S,
     NEVER_HEARD,
+    NO_KEY,
+    NO_SIGNATURE,
     STOP_LEAST_S,
     Answer,
     Start,
@@ -146,7 +148,7 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
         _joined(
             f"NOT ALL STAND: {'; '.join(told)}. {BY_HAND}",
             how.key_fault if unconfirmed else "",
-            f"{_names(silent)}: {NEVER_HEARD}." if silent else "",
+            *_reasons(unconfirmed, how),
             _besides(sure),
             how.lost,
             how.cut,
@@ -154,6 +156,19 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
             how.hint if silent or how.unheard else "",
         ),
     )
+
+
+def _reasons(given: list[Answer], how: Saying) -> list[str]:
+    """Sentences on why no stop was confirmed, as by robots that have another key."""
+    known = {"", NO_KEY if how.key_fault else ""}
+    sentences = []
+    for reason in dict.fromkeys(a.reason for a in given if a.reason not in known):
+        those = [a for a in given if a.reason == reason]
+        sentences.append(f"{_names(those)}: {reason}{'' if reason.endswith('?') else '.'}")
+    strange = [a for a in given if a.reason == NO_SIGNATURE and a.mode == "stopped"]
+    if strange:
+        sentences.append(f"{_names(strange)}: by its word, which nobody can check, it stands.")
+    return sentences
 
 
 def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdict:
@@ -188,15 +203,19 @@ def of_busy(busy: list[Robot]) -> str:
     by: dict[tuple[str, str], list[str]] = {}
     for robot in busy:
         who = {
-            None: "already, untethered",
-            True: "already, held by another operator",
-            False: "already, and no operator is heard who holds it",
+            None: "untethered",
+            True: "held by another operator",
+            False: "and no operator is heard who holds it",
         }[robot.is_held]
+        in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
         if not robot.drives:
-            who = "still, held by another operator who may be counting down to a start"
-        by.setdefault(("drive" if robot.drives else "stand", who), []).append(
-            f"R{robot.robot_id:02d}"
-        )
+            who = f"still{in_fault}, held by another operator who may be counting down to a start"
+        elif in_fault:
+            who = f"still{in_fault}, was started, and drives once that is over: {who}"
+        else:
+            who = f"already, {who}"
+        moves = robot.drives and not in_fault
+        by.setdefault(("drive" if moves else "stand", who), []).append(f"R{robot.robot_id:02d}")
     return "; ".join(
         f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
         for (verb, who), names in by.items()
@@ -340,7 +359,7 @@ def _odd_links(begun: Start) -> list[str]:
     ]
 
 
-def _alarms(given: list[Answer]) -> str:
+def _alarms(given: Sequence[Answer | Robot]) -> str:
     words = "; ".join(sorted({alarm for a in given for alarm in a.alarms}))
     return f" ({words})" if words else ""
 

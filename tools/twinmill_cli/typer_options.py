@@ -3,11 +3,14 @@
 
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
+
+OF_PYDANTIC = "Input should be "  # how its messages on a value begin
 
 _display_type = TyperOption.display_type_rich
 _argument_type = TyperArgument.display_type_rich
@@ -76,11 +79,21 @@ def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
     _without_pydantic(option)
     try:
         found = _process_value(option, ctx, value)
-    except typer.BadParameter:
-        _refuse_odd(option, ctx, list(map(_as_number, _each(value))))
+    except typer.BadParameter as error:
+        _refuse_odd(option, ctx, map(_as_number, _each(value)), value)
+        error.message = _quoting(error.message, value)
         raise
-    _refuse_odd(option, ctx, _each(found))
+    _refuse_odd(option, ctx, _each(found), value)
     return found
+
+
+def _quoting(message: str, value: Any) -> str:
+    """Pydantic's message, which does not tell what was given, with that before it."""
+    if not message.startswith(OF_PYDANTIC):
+        return message
+    given = ", ".join(map(str, _each(value))).strip() or "an empty text"
+    why, _, _ = message.removeprefix(OF_PYDANTIC).partition(", unable to parse")
+    return f"{given}: must be {why}; give another value."
 
 
 def _each(value: Any) -> list:
@@ -95,11 +108,14 @@ def _as_number(text: Any) -> Any:
         return text
 
 
-def _refuse_odd(option: TyperOption, ctx: typer.Context, values: list) -> None:
-    for number in values:
+def _refuse_odd(
+    option: TyperOption, ctx: typer.Context, numbers: Iterable[Any], value: Any
+) -> None:
+    """Raises typer.BadParameter for NaN and infinity, in the words that were given for it."""
+    for number, given in zip(numbers, _each(value), strict=False):
         odd = isinstance(number, float) and not math.isfinite(number)
         if odd and number != option.default:
-            raise typer.BadParameter(f"{number} is no finite number.", ctx=ctx, param=option)
+            raise typer.BadParameter(f"{given} is no finite number.", ctx=ctx, param=option)
 
 
 def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> list[str]:

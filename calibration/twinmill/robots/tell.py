@@ -27,6 +27,7 @@ CALL_OFF_S = 0.3
 OTHERS_S = 0.3  # in which who was not asked is heard: robots speak 10 times a second or more
 BEGUN_S = 0.5  # after the instant: all that start have said that they drive
 LATE_S = 2.0  # the same where nobody goes on watching; as late a start robots still obey
+ARM_S = 5.0  # in which a robot that is there has answered, whatever is lost
 AHEAD_S = 600.0  # robots obey no start that is further ahead by their clocks
 TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
@@ -206,7 +207,7 @@ def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
         )
 
 
-def arm(fleet: Fleet, robots: set[int], timeout_s: float = 5.0) -> list[Answer]:
+def arm(fleet: Fleet, robots: set[int], timeout_s: float = ARM_S) -> list[Answer]:
     """Lets robots that were stopped be started again."""
     command = make_command(SIGNED_VERBS.VERB_ARM)
     return tell(fleet, command, robots, until_s=time.monotonic() + timeout_s)
