@@ -15,8 +15,8 @@ from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Steps
 from twinmill.model.parameters import WHERE_OR_WHEN, key_of, newest_instance
 
-REACH_S = 0.5  # by which a moment is moved: half of what a step of the grid leaves open
-REACH = 0.25  # by which a place and its radius are, times the radius: a fourth of the grid's step
+CELL = 4  # reaches by which a place or a while is moved make a step of the grid, as ...
+REACH_S, REACH = 0.5, 0.25  # ... they are of a moment, and of a place and its radius, over this
 NEARER, NEAREST = 0.5, 0.2  # factor on the reach where no move is better, and the last
 MOVES = 8  # at most
 Whiten = Callable[[np.ndarray], np.ndarray]
@@ -72,8 +72,11 @@ def nearby(
     *,
     steps: Steps,
     whiten: Whiten,
-) -> np.ndarray:
+) -> tuple[np.ndarray, float]:
     """(P,) numbers of an effect with its place or while where it gains most, near some starts.
+
+    And the log of the share of a cell of the grid in which it gains that much: the posterior of a
+    place may be narrower than the grid (Laplace; MacKay 2003, Information Theory, ch. 28).
 
     Args:
         c: the effect.
@@ -105,15 +108,19 @@ def nearby(
     for at in starts[:, where]:
         share = 1.0
         for _ in range(MOVES):
-            reach = share * (REACH * at[-1] if c.parameters[where[0]].role == "place" else REACH_S)
-            tries = np.clip(at + reach * ways, low, high)
+            reach = REACH * at[-1] if c.parameters[where[0]].role == "place" else REACH_S
+            tries = np.clip(at + share * reach * ways, low, high)
             gains, weights = gains_at(tries)
             best = int(np.argmax(gains))
             if best == 0 and share < NEAREST:
                 break
             at, share = tries[best], share if best else NEARER * share
-        found.append((float(gains[best]), _start(c, weights[best], at, where)))
-    return max(found, key=lambda f: f[0])[1]
+        alone = np.abs(ways).sum(axis=1) == 1
+        falls = [gains[0] - gains[alone & (ways[:, k] != 0)].mean() for k in range(len(where))]
+        widths = share * np.sqrt(np.pi / np.maximum(falls, 1e-9)) / CELL
+        log_share = float(np.log(np.minimum(widths, 1)).sum())
+        found.append((float(gains[best]), _start(c, weights[best], at, where), log_share))
+    return max(found, key=lambda f: f[0] + f[2])[1:]
 
 
 def _gains(

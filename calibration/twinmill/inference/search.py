@@ -183,7 +183,10 @@ class Search:
         """
         fitter, start = self.view.fitter, starts[0]
         if c.masks is not None:
-            start = nearby(c, starts, told, linear, steps=fitter.steps, whiten=fitter.whiten)
+            start, log_share = nearby(
+                c, starts, told, linear, steps=fitter.steps, whiten=fitter.whiten
+            )
+            grid += log_share
         found = fitter.with_effect(h, c, start, grid)
         if c.masks is not None or c.fixed is not None:
             return found

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import tomlkit
+from scipy.special import logsumexp
 
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
@@ -110,14 +111,36 @@ def test_a_patch_whose_centre_was_never_driven_to_is_found(
     told, whiten = p.told(p.base), p.view(p.noise).fitter.whiten
     linear, columns = told.linear(whiten), p.columns(told, ("floor_patch",))
     starts = screened(linear, columns, whiten)["floor_patch"].starts
-    found = nearby(
-        columns["floor_patch"], starts, told, linear, steps=p.steps, whiten=whiten
-    )  # strength, x, y, radius
+    c = columns["floor_patch"]
+    found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=whiten)
+    assert log_share < -3  # a place is known to centimetres, a cell of the grid has decimetres
     away_m = np.hypot(*(p.steps.place - centre_m).T)
     assert away_m.min() > 0.3
     inside = np.hypot(*(p.steps.place - found[1:3]).T) < found[3]
     assert np.mean(inside == (away_m < radius_m)) > 0.97
     assert found[0] == pytest.approx(0.25, abs=0.03)
+
+
+def test_the_share_of_a_cell_is_that_of_the_evidence_over_it(
+    measure, tanh_robot, one_clock_base, own
+):
+    """Fits at 61 moments over the 2 s of a cell, averaged, against the Laplace approximation."""
+
+    class Slower(tanh_robot):
+        def hindered(self, motion):
+            return motion * (1 - 0.1 * (np.arange(len(motion)) * STEP_S > 20.3))[:, None]
+
+    p = problem_of([measure(Slower(), 13)], one_clock_base, always_of([own], one_clock_base))
+    fitter = p.view(p.noise).fitter
+    told, whiten = p.told(p.base), fitter.whiten
+    linear, c = told.linear(whiten), p.columns(told, ("abrupt_loss",))["abrupt_loss"]
+    starts = screened(linear, {c.name: c}, whiten)[c.name].starts
+    found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=whiten)
+    at_s = found[2] + np.linspace(-1, 1, 61)
+    each = [fitter.with_effect(told, c, np.r_[found[:2], t_s], 0.0) for t_s in at_s]
+    logs = np.array([h.log_evidence(h.linear(whiten)) for h in each])
+    averaged = logsumexp(logs) - np.log(len(logs)) - logs.max()
+    assert log_share == pytest.approx(averaged, abs=0.7)
 
 
 @pytest.mark.parametrize("begins_s", [(12.0,), (6.0, 24.0)], ids=["once", "again"])
