@@ -16,7 +16,7 @@ from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis, next_of_kind
 from twinmill.inference.moments import MOMENTS
 from twinmill.inference.problem import Problem, View
-from twinmill.inference.screening import gains_of_pairs, nearby, screened
+from twinmill.inference.screening import Screened, gains_of_pairs, nearby, screened
 from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import catalogue_name, key_of, newest_instance
 
@@ -124,7 +124,7 @@ class Search:
         told = self.problem.told(self.problem.base)
         linear = told.linear(self.view.fitter.whiten)
         alone = screened(linear, self.problem.columns(told), self.view.fitter.whiten)
-        best = max(alone, key=lambda n: alone[n].gain)
+        best = max(alone, key=lambda n: alone[n].gain, default="")
         gains = gains_of_pairs(linear, {n: own.white for n, own in alone.items() if n != best})
         known = {tuple(sorted(k)) for k in self.fitted}
         for pair in sorted(gains, key=lambda p: -gains[p])[:PAIRS]:
@@ -156,35 +156,26 @@ class Search:
             seen, more_of = each[name], tuple(sorted((*h.effects, next_of_kind(h.effects, name))))
             if seen.gain < WORTH or more_of in known:
                 continue
-            found = self._fitted(h, told, linear, columns[name], starts=seen.starts, grid=seen.grid)
+            found = self._fitted(h, (told, linear), columns[name], seen)
             self._keep(found)
             grown.append(found)
         return grown
 
     def _fitted(
-        self,
-        h: Hypothesis,
-        told: Hypothesis,
-        linear: Linear,
-        c: Candidate,
-        *,
-        starts: np.ndarray,
-        grid: float,
+        self, h: Hypothesis, told: tuple[Hypothesis, Linear], c: Candidate, seen: Screened
     ) -> Hypothesis:
         """From the linear start, and where the effect may be bent from another size, too.
 
         Args:
             h: without the effect.
-            told: the same with the base's numbers as known.
-            linear: its linear model.
+            told: the same with the base's numbers as known, and its linear model.
             c: the effect.
-            starts: (S, P) of its parameters.
-            grid: see `Fitter.with_effect`.
+            seen: what it would gain beside `told`.
         """
-        fitter, start = self.view.fitter, starts[0]
+        fitter, start, grid = self.view.fitter, seen.starts[0], seen.grid
         if c.masks is not None:
             start, log_share = nearby(
-                c, starts, told, linear, steps=fitter.steps, whiten=fitter.whiten
+                c, seen.starts, *told, steps=fitter.steps, whiten=fitter.whiten
             )
             grid += log_share
         found = fitter.with_effect(h, c, start, grid)
@@ -192,8 +183,8 @@ class Search:
             return found
         value = np.array([p.value for p in c.parameters])
         best = found.log_evidence(found.linear(fitter.whiten))
-        for other in [start, value] if len(value) > 1 else [self._best_size(told, linear, c)]:
-            again = fitter.with_effect(told, c, other, grid)
+        for other in [start, value] if len(value) > 1 else [self._best_size(*told, c)]:
+            again = fitter.with_effect(told[0], c, other, grid)
             then = again.log_evidence(again.linear(fitter.whiten))
             if then > best:
                 found, best = again, then
