@@ -39,7 +39,9 @@ class Candidate:
         name: of the effect.
         parameters: of its newest instance.
         columns: (k, W, 3) change of the errors by each size at its default strength, m and rad.
-        masks: (G, W) steps of each place or while; None where it acts everywhere.
+        masks: (G, W) steps of each place, or from each moment on; None where it acts everywhere.
+        ends: (G', 2) numbers of the masks at which each while begins and ends, where masks alone
+            are no whiles.
         at: (G, P) values that belong to these, or to limits; None where it has neither.
         fixed: (G, W, 3) change of the errors by limits, which have no size.
     """
@@ -48,6 +50,7 @@ class Candidate:
     parameters: list[Parameter]
     columns: np.ndarray
     masks: np.ndarray | None = None
+    ends: np.ndarray | None = None
     at: np.ndarray | None = None
     fixed: np.ndarray | None = None
 
@@ -109,10 +112,11 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
     roles = [p.role for p in parameters]
     if "limit" in roles:
         return _with_limits(name, parameters, model, steps)
-    masks, at, on = None, None, np.array([p.usual for p in parameters])
+    masks, ends, at = None, None, None
+    on = np.array([p.usual for p in parameters])
     where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN]
     if where:
-        masks, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
+        masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
         on[where] = _everywhere([parameters[k] for k in where], steps)
     sizes = [k for k, p in enumerate(parameters) if _is_size(p)]
     points = [on]
@@ -120,7 +124,7 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
         points.append(on.copy())
         points[-1][k] = parameters[k].value
     errors = steps.errors(model, [p.name for p in parameters], np.array(points))
-    return Candidate(name, parameters, errors[0] - errors[1:], masks, at)
+    return Candidate(name, parameters, errors[0] - errors[1:], masks, ends, at)
 
 
 def size_std(parameter: Parameter) -> float:
@@ -148,7 +152,7 @@ def _with_limits(
     )
     errors = steps.errors(model, [p.name for p in parameters], np.vstack([usual, at]))
     fixed = errors[0] - errors[1:]
-    return Candidate(name, parameters, fixed[:0], None, at, fixed)
+    return Candidate(name, parameters, fixed[:0], at=at, fixed=fixed)
 
 
 def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
@@ -158,8 +162,8 @@ def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
     return [0.0, where[-1].max][: len(where)]
 
 
-def _places(steps: Steps) -> tuple[np.ndarray, np.ndarray]:
-    """Masks (G, W) of circles on the floor, and (G, 3) their centres and radii in m.
+def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
+    """Masks (G, W) of circles on the floor, no ends, and (G, 3) their centres and radii in m.
 
     They overlap by half, and reach into the floor from outside, too.
     """
@@ -177,17 +181,16 @@ def _places(steps: Steps) -> tuple[np.ndarray, np.ndarray]:
     x, y = steps.place.T
     inside = np.hypot(x - at[:, :1], y - at[:, 1:2]) < at[:, 2:]
     used = inside.any(axis=1)
-    return inside[used].astype(float), at[used]
+    return inside[used].astype(float), None, at[used]
 
 
-def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Masks (G, W) of times from a moment on, or between two, and (G, count) these in s."""
+def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    """Masks (M, W) of times from a moment on, (G, 2) pairs of these, and (G, count) times in s."""
     t_s, begin_s = steps.t_s, steps.logs[0].measurement.track.command_t_s[0]
     grid_s = np.linspace(t_s[0], t_s[-1], MOMENTS + 2)[1:-1]
+    masks = (t_s >= grid_s[:, None]).astype(float)
     if count == 1:
-        return (t_s >= grid_s[:, None]).astype(float), (grid_s - begin_s)[:, None]
-    a, b = np.triu_indices(len(grid_s), 1)
-    long = grid_s[b] - grid_s[a] >= LEAST_S
-    a, b = grid_s[a[long]], grid_s[b[long]]
-    inside = (t_s >= a[:, None]) & (t_s < b[:, None])
-    return inside.astype(float), np.column_stack([a, b]) - begin_s
+        return masks, None, (grid_s - begin_s)[:, None]
+    ends = np.column_stack(np.triu_indices(len(grid_s), 1))
+    ends = ends[grid_s[ends[:, 1]] - grid_s[ends[:, 0]] >= LEAST_S]
+    return masks, ends, grid_s[ends] - begin_s

@@ -102,7 +102,7 @@ def nearby(
         errors = steps.errors(model, names, points.reshape(-1, len(names)))
         errors = errors.reshape(*points.shape[:2], *errors.shape[1:])
         white = PRIORS.size * whiten(errors[:, :1] - errors[:, 1:])
-        return _gains(white, linear, c.one_sided)
+        return _gains(*_products(white, linear), c.one_sided)
 
     found = []
     for at in starts[:, where]:
@@ -123,13 +123,31 @@ def nearby(
     return max(found, key=lambda f: f[0] + f[2])[1:]
 
 
-def _gains(
-    white: np.ndarray, linear: Linear, one_sided: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """(G,) gains in log evidence by (G, k, R) white columns, and (G, k) their best weights."""
+def _products(white: np.ndarray, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
+    """(G, k, k) Gram matrices of (G, k, R) white columns, and (G, k) products with what is left."""
     cross = white @ linear.basis.T
-    gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2) + np.eye(white.shape[1])
-    push = white @ (linear.y - linear.half @ linear.basis)
+    gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2)
+    return gram, white @ (linear.y - linear.half @ linear.basis)
+
+
+def _products_of_whiles(
+    white: np.ndarray, ends: np.ndarray, linear: Linear
+) -> tuple[np.ndarray, np.ndarray]:
+    """`_products` of the differences of (M, k, R) white columns at (G, 2) ends."""
+    count, sizes, _ = white.shape
+    flat, (a, b) = white.reshape(count * sizes, -1), ends.T
+    gram, push = linear.projected(flat, flat @ flat.T)
+    gram, push = gram.reshape(count, sizes, count, sizes), push.reshape(count, sizes)
+    across = gram[a, :, b]
+    both = gram[a, :, a] + gram[b, :, b] - across - across.swapaxes(1, 2)
+    return both, push[a] - push[b]
+
+
+def _gains(
+    gram: np.ndarray, push: np.ndarray, one_sided: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(G,) gains in log evidence, and (G, k) best weights, of columns with these products."""
+    gram = gram + np.eye(gram.shape[1])
     solved = np.linalg.solve(gram, push[..., None])[..., 0]
     gains = 0.5 * (push * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
     if one_sided.any():
@@ -142,7 +160,11 @@ def _gains(
 def _by_size(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
     masks = np.ones((1, c.columns.shape[1])) if c.masks is None else c.masks
     white = PRIORS.size * np.stack([whiten(masks[:, :, None] * own) for own in c.columns], axis=1)
-    gains, solved = _gains(white, linear, c.one_sided)
+    if c.ends is None:
+        gram, push = _products(white, linear)
+    else:
+        gram, push = _products_of_whiles(white, c.ends, linear)
+    gains, solved = _gains(gram, push, c.one_sided)
     order, total = np.argsort(-gains), float(logsumexp(gains) - np.log(len(gains)))
     best = order[0]
     if c.masks is None:
@@ -151,7 +173,8 @@ def _by_size(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
         where = [k for k in range(len(c.parameters)) if k not in c.sizes]
         other = [k for k in order if solved[k, 0] * solved[best, 0] < 0][:1]
         starts = [_start(c, solved[k], c.at[k], where) for k in (best, *other)]
-    return Screened(total, np.array(starts), total - float(gains[best]), white[best])
+    columns = white[best] if c.ends is None else np.subtract(*white[c.ends[best]])
+    return Screened(total, np.array(starts), total - float(gains[best]), columns)
 
 
 def _start(c: Candidate, weights: np.ndarray, at: np.ndarray, where: list[int]) -> np.ndarray:

@@ -25,7 +25,7 @@ from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise
 from twinmill.inference.posterior import beliefs
-from twinmill.inference.screening import gains_of_pairs
+from twinmill.inference.screening import _products, _products_of_whiles, gains_of_pairs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 from twinmill.inference.table import Entry, Table, swells_once
@@ -184,6 +184,15 @@ def test_what_two_effects_gain_together_is_the_evidence_of_their_columns():
         both = linear.with_columns(np.concatenate([white[a], white[b]]))
         assert gain == pytest.approx(both.log_evidence - linear.log_evidence)
     assert max(found, key=found.__getitem__) == ("a", "b")
+
+
+def test_products_of_whiles_are_those_of_their_columns():
+    random = np.random.default_rng(8)
+    white, base, y = (random.normal(size=s) for s in ((5, 2, 60), (3, 60), 60))
+    ends, linear = np.array([(0, 2), (1, 4), (3, 4)]), Linear.of(y, base)
+    whole = _products(white[ends[:, 0]] - white[ends[:, 1]], linear)
+    for found, wanted in zip(_products_of_whiles(white, ends, linear), whole, strict=True):
+        assert found == pytest.approx(wanted)
 
 
 OF_TIME = ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss")
