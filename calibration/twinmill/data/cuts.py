@@ -56,7 +56,8 @@ def longest_gap_s(robot: RobotLog, used: np.ndarray | None = None) -> float:
     """
     spacing_s = np.diff(robot.pose_t_s[robot.valid if used is None else used])
     usual_s = max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
-    return max(usual_s, min(LOSSY_GAP_S, 2 * float(np.quantile(spacing_s, 0.99))))
+    lossy_s = 2 * float(np.quantile(spacing_s, 0.99)) if len(spacing_s) else 0.0
+    return max(usual_s, min(LOSSY_GAP_S, lossy_s))
 
 
 @dataclass(frozen=True)
