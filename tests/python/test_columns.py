@@ -51,7 +51,7 @@ def test_a_new_name_may_have_another_unit(imported):
 
 def test_all_names_without_a_unit_are_asked_about_at_once(imported):
     poses = POSES.replace("x_m,y_m,theta_rad", "x,y,yaw")
-    with pytest.raises(LogError, match="columns 'x' .*, 'y' .*, 'yaw' .* have no unit") as told:
+    with pytest.raises(LogError, match=r"columns 'x' .*, 'y' .*, 'yaw' .* have no unit") as told:
         imported(poses)
     rename = {"x": "x_m", "y": "y_m", "yaw": "theta_rad"}
     assert str(rename) in str(told.value)

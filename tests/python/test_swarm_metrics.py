@@ -89,12 +89,12 @@ def test_positions_that_rest_and_go_on_are_judged_without_headings(write_log, me
     for t in np.arange(0, 15, 0.02):
         gone_m = 0.02 * (min(t, 5) + max(t - 10, 0))
         for i in range(2):
-            place_m = [gone_m, 0.5 * i, 0.0] + random.normal(0, [3e-4, 3e-4, 0])
+            x_m, y_m = random.normal((gone_m, 0.5 * i), 3e-4)
             pose = message(
                 "pose",
                 utime_us=1_700_000_000_000_000 + round(t * 1e6),
                 robot_id=i,
-                position_m=place_m.tolist(),
+                position_m=[x_m, y_m, 0.0],
                 orientation_wxyz=[math.nan] * 4,
             )
             events.append((f"R{i:02d}_POSE", pose))

@@ -177,9 +177,7 @@ def _excursions(
     return outlier
 
 
-def _links(
-    robot: RobotLog, index: np.ndarray, limits: Limits, gap_s: float
-) -> list[np.ndarray]:
+def _links(robot: RobotLog, index: np.ndarray, limits: Limits, gap_s: float) -> list[np.ndarray]:
     """Of each reach from 1 pose on to those within a gap: (K - reach,) bool, the way may go so.
 
     Poses are left out between a jump away and one back alone: a step that lasts is none of these.

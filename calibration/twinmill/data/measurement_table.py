@@ -78,7 +78,11 @@ def open_text(path: Path) -> Iterator[TextIO]:
             buffered = io.BufferedReader(bounded, BEGINNING_BYTES)
             beginning, encoding = buffered.peek()[:BEGINNING_BYTES], _encoding(buffered)
             other = other_file(beginning)
-            if not other and encoding.startswith("utf-8") and b"\0" in beginning.partition(b"\n")[0]:
+            if (
+                not other
+                and encoding.startswith("utf-8")
+                and b"\0" in beginning.partition(b"\n")[0]
+            ):
                 other = "a binary file", "export it as CSV from the program that wrote it"
             if other:
                 what, remedy = other

@@ -158,7 +158,7 @@ def _rivals(table: str, guess: Guess) -> LogError:
 
 
 def _unsure(table: str, guesses: list[Guess]) -> LogError:
-    """On the first of these; where it lacks but a unit, on all that lack no more, in one sentence."""
+    """On the first of these; where it lacks but a unit, on all that lack no more."""
     guess = guesses[0]
     if not guess.targets:
         return LogError(f"{table}: column '{guess.column}' {guess.why} of the file.")
@@ -181,7 +181,9 @@ def _unsure(table: str, guesses: list[Guess]) -> LogError:
     doubt = "no unit" if _lacks_unit(guess) else f"no name of ours, but may be {target}"
     more = " (or _mm, _deg, _ms, _pwm ...)" if _lacks_unit(guess) else ""
     said = ", ".join(f"'{g.column}' ({g.why})" for g in alike)
-    have = "columns {} have {}; say what they are" if alike[1:] else "column {} has {}; say what it is"
+    have = (
+        "columns {} have {}; say what they are" if alike[1:] else "column {} has {}; say what it is"
+    )
     return LogError(
         f"{table}: {have.format(said, doubt)} with "
         f"{option('rename', {g.column: _in_likely_unit(g) for g in alike})}{more}, or let "
