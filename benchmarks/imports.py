@@ -4,8 +4,8 @@
     git worktree add /tmp/before COMMIT
     .venv/bin/python benchmarks/imports.py --before /tmp/before --rows 5000000 --bag-mb 1000
 
-The inputs are made in a temporary folder and go with it. Both states use the native modules that
-are installed, so COMMIT must be none whose interface to them differs. Each import is a process of
+The inputs are made in a temporary folder and go with it. A state uses the native module that was
+built in its folder, or else the one that is installed. Each import is a process of
 its own; what is told is its processor time and the most memory that it had, of Python's start, too.
 """
 
@@ -123,7 +123,7 @@ def write_bag(folder: Path, megabytes: int) -> dict:
 
 def measured(tree: Path, words: dict) -> tuple[float, float]:
     """Processor time (s) and peak memory (MB) of an import by the library in a tree."""
-    path = os.pathsep.join(str(tree / part) for part in ("calibration", "tools"))
+    path = os.pathsep.join(str(tree / part) for part in ("calibration", "tools", "build/python"))
     done = subprocess.run(
         [sys.executable, "-c", RUN, json.dumps(words, default=str), str(tree.resolve())],
         env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},

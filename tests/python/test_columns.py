@@ -49,11 +49,21 @@ def test_a_new_name_may_have_another_unit(imported):
     np.testing.assert_allclose(robot.pose[:, 2], np.radians([0, 0.5, 1]))
 
 
+def test_all_names_without_a_unit_are_asked_about_at_once(imported):
+    poses = POSES.replace("x_m,y_m,theta_rad", "x,y,yaw")
+    with pytest.raises(LogError, match=r"columns 'x' .*, 'y' .*, 'yaw' .* have no unit") as told:
+        imported(poses)
+    rename = {"x": "x_m", "y": "y_m", "yaw": "theta_rad"}
+    assert str(rename) in str(told.value)
+    robot, _ = imported(poses, rename=rename)
+    np.testing.assert_array_equal(robot.pose, imported(POSES)[0].pose)
+
+
 @pytest.mark.parametrize(
     ("column", "usual", "looks"), [("theta_rad", "yaw", "radians"), ("x_m", "x", "m")]
 )
 def test_a_name_without_a_unit_is_asked_about(imported, column, usual, looks):
-    with pytest.raises(LogError, match=f"'{usual}' has no unit .*looks like {looks}"):
+    with pytest.raises(LogError, match=f"'{usual}' .*looks like {looks}.* no unit"):
         imported(POSES.replace(column, usual))
 
 
@@ -83,7 +93,7 @@ def test_places_in_messages_are_in_metres(imported, path):
 def test_velocities_of_the_room_are_asked_about_as_such(imported):
     rows = "t_s,robot_id,vx_world,vy_world\n0,4,0.1,0.2\n"
     with pytest.raises(
-        LogError, match=r"'vx_world' has no unit .*rename={'vx_world': 'vx_world_mps'}"
+        LogError, match=r"'vx_world' .* no unit; .*rename={'vx_world': 'vx_world_mps', "
     ):
         imported(commands=rows)
 
@@ -216,7 +226,7 @@ def test_commands_without_a_robot_are_of_the_only_one_that_has_poses(imported):
 
 
 def test_a_column_id_that_holds_names_is_asked_about(imported):
-    with pytest.raises(LogError, match=r"'id' may be robot_id \(holds names\)"):
+    with pytest.raises(LogError, match=r"'id' \(holds names\) .* may be robot_id"):
         imported(POSES.replace("robot_id", "id").replace(",4,", ",bot4,"))
 
 
@@ -409,7 +419,7 @@ def test_german_names_are_asked_about_and_kept(tmp_path):
     rows = [f"{k / 20:g};{k * 20};{k};{k * 2}" for k in range(60)]
     poses.write_text("Zeit;X;Y;Winkel\n" + "\n".join(rows).replace(".", ",") + "\n")
     commands.write_text("Zeit;VL;VR;HL;HR\n0;0,5;-1;0,25;1\n2;0;0;0;0\n")
-    with pytest.raises(LogError, match=r"'Zeit' has no unit .*explain_columns"):
+    with pytest.raises(LogError, match=r"'Zeit' .* no unit; .*explain_columns"):
         import_log(poses, commands, tmp_path / "o.lcmlog", options=ImportOptions(robot_id=4))
     mapping = tmp_path / "m.toml"
     files = ["import", "--poses", str(poses), "--commands", str(commands)]

@@ -190,6 +190,22 @@ def test_single_frames_whose_heading_is_turned_are_left_out(judged, cases, share
     assert any(f"{flipped} poses" in note for note in found[0].warnings)
 
 
+@pytest.mark.parametrize("share", [0.1, 0.2, 0.33])
+def test_frames_that_flicker_are_left_out_up_to_a_third_and_the_others_are_not(
+    judged, cases, tmp_path, share
+):
+    """Drawn at random, so that several come in a row; a log of a third of them is judged, too."""
+    table = np.loadtxt(cases / "tag_single_flips/poses_clean.csv", delimiter=",", skiprows=1)
+    turned = np.random.default_rng(7).random(len(table)) < share
+    table[turned, 4] += np.pi
+    header = "t_s,robot_id,x_m,y_m,theta_rad"
+    np.savetxt(tmp_path / "p.csv", table, delimiter=",", header=header, comments="", fmt="%.5f")
+    found, file = judged("tag_single_flips", tmp_path / "p")
+    left_out = found[0].track.segment < 0
+    assert left_out[turned].all() and left_out[~turned].mean() < 0.01
+    assert compare(found, file).score == pytest.approx(1, abs=0.2)
+
+
 @pytest.mark.parametrize(("poses", "until_s"), [("14_20", 20), ("from_20", 40)])
 def test_bodies_that_a_tracker_exchanged_are_given_back_and_told(judged, cases, poses, until_s):
     found, _ = judged("bodies_swapped", f"poses_{poses}")

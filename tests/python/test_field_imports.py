@@ -4,6 +4,7 @@
 The recordings' README files say what is right, calculated without Twinmill.
 """
 
+import pickle
 import shutil
 import subprocess
 import sys
@@ -161,3 +162,26 @@ def test_files_of_other_kinds_are_told_with_their_way_out(
     code, _, wrong = twinmill("import", option, path, *topics, "-o", tmp_path / "o.lcmlog")
     assert code == 1 and what in wrong and remedy in wrong and wrong.count("\n") == 1
     assert not (tmp_path / "o.lcmlog").exists()
+
+
+@pytest.mark.parametrize(
+    ("content", "what", "remedy"),
+    [
+        (pickle.dumps({"t_s": [0.0, 0.1]}), "a pickle of Python", "to_csv"),
+        (b"ULog\x01\x12\x35\x01" + bytes(64), "a log of PX4", "ulog2csv"),
+        (b"\x02\x50" + bytes(510), "a C3D file", "as CSV"),
+        (b"ABCD" + bytes(64), "a binary file", "as CSV"),
+    ],
+)
+def test_binary_files_are_told_by_their_first_bytes(tmp_path, twinmill, content, what, remedy):
+    """By the specifications of ULog and C3D; no line of text has a zero byte."""
+    path = tmp_path / "x.dat"
+    path.write_bytes(content)
+    code, _, wrong = twinmill("import", "--poses", path, "-o", tmp_path / "o.lcmlog")
+    assert code == 1 and what in wrong and remedy in wrong and wrong.count("\n") == 1
+
+
+def test_an_archive_of_numpy_is_no_archive_to_unpack(tmp_path, twinmill):
+    np.savez(tmp_path / "x.npz", x_m=np.zeros(3))
+    code, _, wrong = twinmill("import", "--poses", tmp_path / "x.npz", "-o", tmp_path / "o.lcmlog")
+    assert code == 1 and "an archive of NumPy" in wrong and "numpy.savetxt" in wrong

@@ -241,6 +241,18 @@ def test_rows_without_anything_are_lost_poses_and_no_commands(tmp_path):
     assert not any("empty" in w for w in said["warnings"])
 
 
+def test_a_quaternion_whose_columns_hold_nothing_is_a_heading_that_is_not_recorded(tmp_path):
+    """As PlotJuggler wrote them: names of its columns, and no values."""
+    poses, _, table = _merged("pose")
+    table[[f"{MERGED_POSE}/orientation/{axis}" for axis in "xyzw"]] = np.nan
+    path, out = tmp_path / "all.csv", tmp_path / "o.lcmlog"
+    table.to_csv(path, index=False, float_format="%.7f")
+    said = import_log(path, path, out, options=ImportOptions(robot_id=1, same_clock=True))
+    robot = read_log(out).robots[1]
+    assert robot.valid.all() and len(robot.valid) == len(poses) and not robot.has_heading
+    assert any("the heading is not recorded" in w for w in said["warnings"])
+
+
 @pytest.mark.parametrize("topic", ["/mocap", "/mocap/pose", "mocap.pose"])
 def test_a_topic_of_a_table_is_named_whole_or_without_its_end(tmp_path, topic):
     poses, _, table = _merged("command")

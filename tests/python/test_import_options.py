@@ -5,6 +5,7 @@ The sources and the options are two tables; each pair of them is tried, so that 
 new option cannot forget one. So is every remedy that the checks print.
 """
 
+import ast
 import dataclasses
 import re
 import shlex
@@ -20,6 +21,7 @@ from twinmill.data.importers.series import with_z_up
 from twinmill.data.log import read_log
 from twinmill_cli import import_log as command
 from twinmill_cli.main import COMMANDS, LazyCommand, app
+from twinmill_cli.spelling import typed
 
 sys.path.insert(0, str(Path(__file__).parent))
 from import_sources import OF_DUTIES, SOURCES, Drive, drive
@@ -98,6 +100,7 @@ MISTAKES = {
         "--heading-offset-deg",
     ),
     "positions are in mm": (changed(place_m=RIGHT.place_m * 1000), "--rename x_m=x_mm"),
+    "positions are in cm": (changed(place_m=RIGHT.place_m * 100), "--rename x_m=x_cm"),
     "speeds are in mm/s": (
         changed(told=RIGHT.told * [1000, 1000, 1]),
         "--rename vx_mps=vx_mmps",
@@ -108,6 +111,10 @@ MISTAKES = {
     ),
     "velocities are the room's": (_in_room(), "--rename vx_mps=vx_world_mps"),
     "the poses come late": (changed(pose_t_s=RIGHT.pose_t_s + 3.0), "--pose-shift-s"),
+    "the poses come late and the heading is turned": (
+        changed(pose_t_s=RIGHT.pose_t_s + 3.0, heading_rad=RIGHT.heading_rad - np.pi / 2),
+        "--heading-offset-deg",
+    ),
 }
 
 
@@ -217,6 +224,32 @@ def options_of_the_command() -> set[str]:
 
 def test_every_option_of_the_command_is_asked_of_every_source():
     assert options_of_the_command() == set(ASKED)
+
+
+def test_every_option_that_a_sentence_on_logs_names_is_asked_of_every_source():
+    """Or is a file of the import, or of another command; as the sources of the library print it."""
+    calls = [
+        call
+        for path in sorted(Path(importing.__file__).parents[1].rglob("*.py"))
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call) and getattr(call.func, "id", "") in ("option", "options")
+    ]
+    first = [call.args[0] for call in calls]
+    named = {
+        part.value
+        for given in first
+        for part in (given.keys if isinstance(given, ast.Dict) else [given])
+        if isinstance(part, ast.Constant)
+    }
+    named = {typed({name: None}, None) for name in named}
+    assert len(named) > 20
+    assert named <= set(ASKED) | FILES | {
+        "--family",
+        "--lcm-url",
+        "--local",
+        "--multicast",
+        "--server",
+    }
 
 
 @pytest.mark.parametrize("source", EVERY)

@@ -421,6 +421,17 @@ def test_a_clock_that_began_at_zero_is_refused_with_the_remedy(tmp_path):
     np.testing.assert_allclose(robots[1].pose_t_s, TIMES_S, atol=2e-6)
 
 
+def test_what_came_before_a_simulated_clock_is_left_out_and_that_is_said(tmp_path):
+    """A recorder with use_sim_time takes time 0 for what it hears before the first /clock."""
+    topic, kind, definition, rows = _twists()
+    early = [(0.0 if k < 4 else t_s, payload) for k, (t_s, payload) in enumerate(rows)]
+    bag = _written(tmp_path / "sim.mcap", _poses(), (topic, kind, definition, early))
+    robots, said = _import(bag, robot_id=1)
+    assert "/cmd_vel: 4 messages received at time 0" in said
+    np.testing.assert_allclose(robots[1].command_t_s, TIMES_S[4:], atol=2e-6)
+    np.testing.assert_allclose(robots[1].pose_t_s, TIMES_S, atol=2e-6)
+
+
 def test_a_frame_of_tf_is_placed_in_the_root_of_its_tree(tmp_path):
     """From map to odom: 1 m along x, a quarter turn to the left; so x in odom is y in map."""
     rows = [(START_S - 1, _transforms(START_S - 1, ("map", "odom", 1, 0, math.pi / 2)))]

@@ -44,9 +44,14 @@ def metrics_of(series) -> dict[str, float]:
     return dict(zip(native.METRICS, series.mean.tolist(), strict=True))
 
 
+@pytest.mark.parametrize("heading", ["recorded", "not recorded"])
 @pytest.mark.parametrize("omega_radps", [0.5, -0.8])
-def test_robots_on_a_circle_are_a_mill_about_its_middle(write_log, message, omega_radps):
-    series = swarm_metrics(read_log(write_log(*ring(message, 6, 0.6, omega_radps))), 1.1, 0.1)
+def test_robots_on_a_circle_are_a_mill_about_its_middle(write_log, message, omega_radps, heading):
+    events = ring(message, 6, 0.6, omega_radps)
+    if heading == "not recorded":  # robots that drive ahead look along their paths
+        for _, pose in events:
+            pose.orientation_wxyz = [math.nan] * 4
+    series = swarm_metrics(read_log(write_log(*events)), 1.1, 0.1)
     found = metrics_of(series)
     assert series.final == "milling"
     assert found["circliness"] == pytest.approx(0, abs=2e-3)
@@ -76,6 +81,26 @@ def test_standing_robots_are_as_far_apart_as_they_are(write_log, message):
     found = metrics_of(swarm_metrics(read_log(write_log(*events)), 1.0, 0.1))
     assert found["diffusion"] == pytest.approx(2 * math.sqrt(3), rel=1e-3)
     assert found["groups"] == 3
+
+
+def test_positions_that_rest_and_go_on_are_judged_without_headings(write_log, message):
+    """Both stand in the middle third, where noise of 0.3 mm tells no way."""
+    random, events = np.random.default_rng(2), []
+    for t in np.arange(0, 15, 0.02):
+        gone_m = 0.02 * (min(t, 5) + max(t - 10, 0))
+        for i in range(2):
+            x_m, y_m = random.normal((gone_m, 0.5 * i), 3e-4)
+            pose = message(
+                "pose",
+                utime_us=1_700_000_000_000_000 + round(t * 1e6),
+                robot_id=i,
+                position_m=[x_m, y_m, 0.0],
+                orientation_wxyz=[math.nan] * 4,
+            )
+            events.append((f"R{i:02d}_POSE", pose))
+    series = swarm_metrics(read_log(write_log(*events)), 1.1, 0.1)
+    assert np.abs(series.pose[..., 2]).max() < 0.3  # they always go along x
+    assert metrics_of(series)["scatter_m2"] == pytest.approx(0.25**2, rel=0.01)
 
 
 def test_the_robot_with_another_behaviour_is_odd(write_log, message):

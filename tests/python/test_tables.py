@@ -205,6 +205,9 @@ def test_units_in_brackets_are_known(imported):
     [
         ({"v_mps": 0.2, "omega_degps": 90}, "twist", [0.2, 0, math.pi / 2, 0]),
         ({"v_mmps": 200, "w_radps": -1}, "twist", [0.2, 0, -1, 0]),
+        ({"speed_kmh": 3.6, "w_radps": -1}, "twist", [1, 0, -1, 0]),
+        ({"Speed (km/h)": 7.2, "w_radps": -1}, "twist", [2, 0, -1, 0]),
+        ({"v_mph": 3600 / 5280 / 0.3048, "w_radps": -1}, "twist", [1, 0, -1, 0]),
         ({"left_pwm": 255, "right_pwm": -51}, "duty", [1, -0.2, 1, -0.2]),
         ({"left_pct": 12.5, "right_pct": 58.25}, "duty", [0.125, 0.5825, 0.125, 0.5825]),
         ({"left_rpm": 60, "right_radps": 3}, "wheel_speed", [2 * math.pi, 3, 2 * math.pi, 3]),

@@ -30,12 +30,12 @@ auto Span(const T &array)
 }
 
 // Hands a vector's memory to numpy.
-inline Array ToNumpy(std::vector<double> &&values, std::initializer_list<size_t> shape)
+template <class T>
+nb::ndarray<nb::numpy, T> ToNumpy(std::vector<T> &&values, std::initializer_list<size_t> shape)
 {
-    auto *owned = new std::vector<double>(std::move(values));
-    nb::capsule owner(owned,
-                      [](void *p) noexcept { delete static_cast<std::vector<double> *>(p); });
-    return Array(owned->data(), shape, owner);
+    auto *owned = new std::vector<T>(std::move(values));
+    nb::capsule owner(owned, [](void *p) noexcept { delete static_cast<std::vector<T> *>(p); });
+    return {owned->data(), shape, owner};
 }
 
 // The same of an array that was written as a whole: a vector would be cleared before.

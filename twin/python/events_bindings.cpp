@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The events in the bytes of an LCM log (LCM 1.5, lcm/eventlog.c).
-#include <nanobind/stl/vector.h>
-
 #include <cstdint>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "arrays.h"
 
@@ -30,8 +30,28 @@ struct Event
 struct Channel
 {
     std::string name;
-    std::vector<int64_t> stamps_us;
-    nb::list payloads;
+    std::vector<int64_t> stamps_us, ends;  // ends of the payloads, one behind the other
+    std::vector<size_t> starts;            // of the payloads in the log
+
+    void Add(const Event &event)
+    {
+        stamps_us.push_back(event.stamp_us);
+        ends.push_back((ends.empty() ? 0 : ends.back()) +
+                       static_cast<int64_t>(event.end - event.start));
+        starts.push_back(event.start);
+    }
+    // All payloads: objects of their own would take twice the room.
+    nb::bytes Joined(std::string_view data) const
+    {
+        auto joined = nb::steal<nb::bytes>(PyBytes_FromStringAndSize(nullptr, ends.back()));
+        char *to = PyBytes_AsString(joined.ptr());
+        for (size_t i = 0; i < starts.size(); ++i)
+        {
+            const auto begin = static_cast<size_t>(i == 0 ? 0 : ends[i - 1]);
+            std::memcpy(to + begin, data.data() + starts[i], static_cast<size_t>(ends[i]) - begin);
+        }
+        return joined;
+    }
 };
 
 int64_t BigEndian(std::string_view bytes)
@@ -86,16 +106,20 @@ nb::tuple EventsOf(nb::bytes log)
             data.substr(position + kHeader, event->start - position - kHeader);
         const auto [at, is_new] = known.try_emplace(name, channels.size());
         if (is_new)
-            channels.push_back({std::string(name), {}, {}});
-        Channel &channel = channels[at->second];
-        channel.stamps_us.push_back(event->stamp_us);
-        channel.payloads.append(nb::bytes(data.data() + event->start, event->end - event->start));
+            channels.push_back(
+                {.name = std::string(name), .stamps_us = {}, .ends = {}, .starts = {}});
+        channels[at->second].Add(*event);
         position = event->end;
     }
     nb::list found;
-    for (const Channel &channel : channels)
+    for (Channel &channel : channels)
+    {
+        const size_t count = channel.starts.size();
+        const nb::bytes joined = channel.Joined(data);
         found.append(nb::make_tuple(nb::bytes(channel.name.data(), channel.name.size()),
-                                    channel.stamps_us, channel.payloads));
+                                    ToNumpy(std::move(channel.stamps_us), {count}), joined,
+                                    ToNumpy(std::move(channel.ends), {count})));
+    }
     return nb::make_tuple(found, gaps);
 }
 
@@ -103,11 +127,10 @@ nb::tuple EventsOf(nb::bytes log)
 
 void BindEvents(nb::module_ &m)
 {
-    m.def(
-        "events_of", &EventsOf, "log"_a,
-        "Of the bytes of an LCM log: channels in the order in which they appear, each as its "
-        "name, stamps in us and payloads; and (from, to, whether an event came before) of what is "
-        "no event, to -1 if it goes on to the end.");
+    m.def("events_of", &EventsOf, "log"_a,
+          "Of the bytes of an LCM log: channels in the order in which they appear, each as its "
+          "name, stamps in us, payloads one behind the other and where each ends; and (from, to, "
+          "whether an event came before) of what is no event, to -1 if it goes on to the end.");
 }
 
 }  // namespace twin

@@ -44,11 +44,20 @@ def find_segments(
     return _segments(robot, index, begins, notes)
 
 
-def longest_gap_s(robot: RobotLog) -> float:
-    """Longest time between usable poses over which the track goes on."""
-    spacing_s = np.diff(robot.pose_t_s[robot.valid])
+def longest_gap_s(robot: RobotLog, used: np.ndarray | None = None) -> float:
+    """Longest time between poses over which the track goes on.
+
+    A capture that loses frames all the time may lose several in a row, and so do poses that are
+    left out one at a time all the time.
+
+    Args:
+        robot: its log.
+        used: (N,) bool; None: all that are valid.
+    """
+    spacing_s = np.diff(robot.pose_t_s[robot.valid if used is None else used])
     usual_s = max(GAP_S, GAP_PERIODS * float(np.median(np.diff(robot.pose_t_s))))
-    return max(usual_s, min(LOSSY_GAP_S, 2 * float(np.quantile(spacing_s, 0.99))))
+    lossy_s = 2 * float(np.quantile(spacing_s, 0.99)) if len(spacing_s) else 0.0
+    return max(usual_s, min(LOSSY_GAP_S, lossy_s))
 
 
 @dataclass(frozen=True)
@@ -147,10 +156,19 @@ def _short_way(angle_rad: np.ndarray) -> np.ndarray:
 def _excursions(
     robot: RobotLog, usable: np.ndarray, limits: Limits, notes: list[str]
 ) -> np.ndarray:
-    """(N,) bool: poses off the way that those around them go, as when markers are mixed up."""
-    outlier = np.zeros(len(usable), bool)
-    index = np.flatnonzero(usable)
-    outlier[np.setdiff1d(index, index[_longest_way(_links(robot, index, limits))])] = True
+    """(N,) bool: poses off the way that those around them go, as when markers are mixed up.
+
+    Where so many are that the track goes on over longer gaps, it is looked for over these, too.
+    """
+    index, outlier = np.flatnonzero(usable), np.zeros(len(usable), bool)
+    gap_s, left_s = 0.0, longest_gap_s(robot)
+    while left_s > gap_s:
+        gap_s = left_s
+        outlier[:] = False
+        outlier[np.setdiff1d(index, index[_longest_way(_links(robot, index, limits, gap_s))])] = (
+            True
+        )
+        left_s = longest_gap_s(robot, usable & ~outlier)
     if outlier.any():
         notes.append(
             f"{counted(np.count_nonzero(outlier), 'pose')} from {robot.pose_t_s[outlier][0]:.3f} s "
@@ -159,14 +177,13 @@ def _excursions(
     return outlier
 
 
-def _links(robot: RobotLog, index: np.ndarray, limits: Limits) -> list[np.ndarray]:
+def _links(robot: RobotLog, index: np.ndarray, limits: Limits, gap_s: float) -> list[np.ndarray]:
     """Of each reach from 1 pose on to those within a gap: (K - reach,) bool, the way may go so.
 
     Poses are left out between a jump away and one back alone: a step that lasts is none of these.
     Over a gap in time a robot may go anywhere.
     """
     t_s, pose, links = robot.pose_t_s[index], robot.pose[index], []
-    gap_s = longest_gap_s(robot)
     for reach in range(1, len(index)):
         dt_s = t_s[reach:] - t_s[:-reach]
         far, within = limits.far(dt_s, pose[reach:] - pose[:-reach]), dt_s <= gap_s
@@ -246,11 +263,12 @@ def _cuts(
 
     Of poses that the tracker turned, (N,) bool, all was said.
     """
-    index = np.flatnonzero(usable & ~turned)
+    used = usable & ~turned
+    index = np.flatnonzero(used)
     t = robot.pose_t_s[index]
     moves, turns = _jumps(robot, index, limits)
     jump = moves | turns
-    gap = np.diff(t) > longest_gap_s(robot)
+    gap = np.diff(t) > longest_gap_s(robot, used)
     lost = gap & (np.diff(index) > 1)
     keep = np.ones(len(index), bool)
     for k in np.flatnonzero(jump | gap):

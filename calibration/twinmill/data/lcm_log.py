@@ -8,7 +8,8 @@ and does not say where the file breaks.
 import errno
 import os
 import re
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterator, MutableSequence, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
@@ -40,6 +41,28 @@ class LogError(ValueError):
     """A measurement cannot be used; the message is one sentence: what, value, why, what to do."""
 
 
+class Payloads(Sequence[bytes]):
+    """Payloads one behind the other: as many objects would take twice the room."""
+
+    def __init__(self, joined: bytes, ends: np.ndarray) -> None:
+        """Args: ends (K,) int, of each in `joined`."""
+        self._joined, self._ends = joined, ends
+
+    def __len__(self) -> int:
+        return len(self._ends)
+
+    def __getitem__(self, k):  # type: ignore[no-untyped-def]  # of Sequence, of int and slice
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        k = range(len(self))[k]
+        return self._joined[self._ends[k - 1] if k else 0 : self._ends[k]]
+
+    def of_size(self, size: int) -> bytes:
+        """Those of one size, one behind the other."""
+        alike = np.diff(self._ends, prepend=0) == size
+        return self._joined if alike.all() else b"".join(p for p in self if len(p) == size)
+
+
 @dataclass
 class Events:
     """Events in file order.
@@ -50,8 +73,8 @@ class Events:
         warnings: what was wrong with the container.
     """
 
-    by_channel: dict[str, list[bytes]] = field(default_factory=dict)
-    stamps_us: dict[str, list[int]] = field(default_factory=dict)
+    by_channel: dict[str, Sequence[bytes]] = field(default_factory=dict)
+    stamps_us: dict[str, MutableSequence[int]] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
 
@@ -77,10 +100,11 @@ def split_events(data: bytes, name: str) -> Events:
             events.warnings.append(
                 f"{name}: bytes {position} to {following} are no event; skipped."
             )
-    for channel_bytes, stamps_us, payloads in channels:
-        channel = channel_bytes.decode("utf-8", "replace")
-        events.by_channel.setdefault(channel, []).extend(payloads)
-        events.stamps_us.setdefault(channel, []).extend(stamps_us)
+    for channel_bytes, stamps_us, joined, ends in channels:
+        channel, payloads = channel_bytes.decode("utf-8", "replace"), Payloads(joined, ends)
+        before = events.by_channel.get(channel)  # of another name that is no text
+        events.by_channel[channel] = [*before, *payloads] if before else payloads
+        events.stamps_us.setdefault(channel, array("q")).extend(array("q", stamps_us.tobytes()))
     if not events.by_channel:
         raise LogError(
             f"{name}: holds no complete LCM event in {len(data)} bytes, so it is no LCM "
@@ -105,7 +129,7 @@ def layout_of(message: type) -> np.dtype:
 
 
 def decode(
-    payloads: list[bytes], message: type, channel: str, warnings: list[str] | None = None
+    payloads: Sequence[bytes], message: type, channel: str, warnings: list[str] | None = None
 ) -> np.ndarray:
     """Messages of one fixed-size type as a structured array, fields as in the .lcm file.
 
@@ -119,18 +143,19 @@ def decode(
         LogError: if more payloads are of another type.
     """
     layout, fingerprint = layout_of(message), message._get_packed_fingerprint()
-    whole = payloads
-    if set(map(len, payloads)) - {layout.itemsize}:
-        whole = [p for p in payloads if len(p) == layout.itemsize]
-    messages = np.frombuffer(b"".join(whole), layout)
+    size = layout.itemsize
+    whole = (
+        payloads.of_size(size)
+        if isinstance(payloads, Payloads)
+        else b"".join(p for p in payloads if len(p) == size)
+    )
+    messages = np.frombuffer(whole, layout)
     known = messages["hash"] == np.frombuffer(fingerprint, layout["hash"])
     if not known.all():
         messages = messages[known]
     if len(messages) < len(payloads):
         if warnings is None or not few_broken(len(payloads) - len(messages), len(payloads)):
-            (strange, *_) = (
-                p for p in payloads if len(p) != layout.itemsize or p[:8] != fingerprint
-            )
+            (strange, *_) = (p for p in payloads if len(p) != size or p[:8] != fingerprint)
             raise LogError(
                 f"{channel}: a message is not of type turbopi.{message.__name__} (fingerprint "
                 f"{strange[:8].hex()}, expected {fingerprint.hex()}): the log was made with other "

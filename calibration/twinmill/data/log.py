@@ -5,7 +5,7 @@ import hashlib
 import re
 import tomllib
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -222,8 +222,8 @@ def read_bytes(path: Path) -> bytes:
 
 
 def _robot_channels(
-    by_channel: dict[str, list[bytes]], prefix: str, warnings: list[str]
-) -> dict[int, dict[str, list[bytes]]]:
+    by_channel: dict[str, Sequence[bytes]], prefix: str, warnings: list[str]
+) -> dict[int, dict[str, Sequence[bytes]]]:
     """Payloads by robot and kind of channel; robots with neither commands nor poses left out."""
     found = _match_channels(by_channel, prefix)
     if not found and not prefix:
@@ -252,9 +252,9 @@ def _channel_pattern(prefix: str) -> re.Pattern[str]:
 
 
 def _match_channels(
-    by_channel: dict[str, list[bytes]], prefix: str
-) -> dict[int, dict[str, list[bytes]]]:
-    found: dict[int, dict[str, list[bytes]]] = {}
+    by_channel: dict[str, Sequence[bytes]], prefix: str
+) -> dict[int, dict[str, Sequence[bytes]]]:
+    found: dict[int, dict[str, Sequence[bytes]]] = {}
     for name, payloads in by_channel.items():
         if match := _channel_pattern(prefix).fullmatch(name):
             found.setdefault(int(match[1]), {})[match[2]] = payloads
@@ -263,7 +263,7 @@ def _match_channels(
 
 def _decode_robot(
     robot_id: int,
-    kinds: dict[str, list[bytes]],
+    kinds: dict[str, Sequence[bytes]],
     warnings: list[str],
 ) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Commands and poses of a robot, in order of time; None where there are none."""
@@ -393,7 +393,7 @@ def _in_order(messages: np.ndarray, channel: str, robot_id: int, warnings: list[
     return messages[order[last]]
 
 
-def _last_run(payloads: list[bytes], robot_id: int, warnings: list[str]) -> turbopi.run_t:
+def _last_run(payloads: Sequence[bytes], robot_id: int, warnings: list[str]) -> turbopi.run_t:
     """Last readable message in which the robot describes itself; empty if there is none."""
     if not payloads:
         return turbopi.run_t()
@@ -464,7 +464,7 @@ def _command_series(
 
 
 def _detection_series(
-    payloads: list[bytes] | None, t0_us: int, robot_id: int, warnings: list[str]
+    payloads: Sequence[bytes] | None, t0_us: int, robot_id: int, warnings: list[str]
 ) -> dict[str, Any]:
     """The fields of RobotLog on pictures."""
     if not payloads:

@@ -42,7 +42,10 @@ DAYS = ("date", "day", "datum", "fecha")  # names of columns that hold no time o
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 LOST = ("", "nan", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost one
 FLAGS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
-TIMES = ("t", "time", "timestamp", "stamp", "secs", "frame_time", "__time")  # as people name it
+TIMES = (  # as people name it
+    *("t", "time", "timestamp", "stamp", "secs", "frame_time", "__time", "elapsed"),
+    "elapsed_time",
+)
 OF_PANDAS = "Unnamed: 0"  # what pandas calls such a first column, the rows' index
 UNNAMED = "column_{}"  # what columns are called in a file that does not name them
 BEGINNING_BYTES = 65536  # tell the encoding
@@ -73,10 +76,18 @@ def open_text(path: Path) -> Iterator[TextIO]:
             binary = gzip.GzipFile(fileobj=buffered) if is_packed else buffered
             bounded = BoundedText(path, binary, path.stat().st_size if is_packed else None)
             buffered = io.BufferedReader(bounded, BEGINNING_BYTES)
-            if other := other_file(buffered.peek()[:BEGINNING_BYTES]):
+            beginning, encoding = buffered.peek()[:BEGINNING_BYTES], _encoding(buffered)
+            other = other_file(beginning)
+            if (
+                not other
+                and encoding.startswith("utf-8")
+                and b"\0" in beginning.partition(b"\n")[0]
+            ):
+                other = "a binary file", "export it as CSV from the program that wrote it"
+            if other:
                 what, remedy = other
                 raise LogError(f"{path}: is {what}, not a table of text; {remedy}.")
-            yield io.TextIOWrapper(buffered, _encoding(buffered), newline="")
+            yield io.TextIOWrapper(buffered, encoding, newline="")
     except (OSError, EOFError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise LogError(

@@ -10,6 +10,7 @@ LOOKED_AT = 65536  # bytes
 RAW = "get the file itself, as by the button for raw contents or a download"
 TO_CSV = "save it as CSV"
 OF_PANDAS = "write its table as CSV, as with pandas: to_csv; or give frames to tm.Log.from_frames"
+OF_NUMPY = "write it as CSV: numpy.savetxt with delimiter and header"
 LCM_LOG = "an LCM log"
 OF_BAG = "import it as a bag"
 # What it begins with, what it is, and what to do. From the formats' own specifications.
@@ -30,7 +31,8 @@ BEGINNINGS = (
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file", OF_PANDAS),
     (b"PAR1", "a Parquet file", OF_PANDAS),
     (b"ARROW1", "a Feather file", OF_PANDAS),
-    (b"\x93NUMPY", "a NumPy array", "write it as CSV: numpy.savetxt with delimiter and header"),
+    (b"\x93NUMPY", "a NumPy array", OF_NUMPY),
+    (b"ULog\x01\x12\x35", "a log of PX4", "write its topics as CSV: ulog2csv"),
     (b"%PDF-", "a PDF document", "give the table that it was made of"),
     (b"\x89PNG\r\n", "a picture", "give the numbers that it was made of"),
     (b"7z\xbc\xaf\x27\x1c", "an archive", "unpack it"),
@@ -39,6 +41,8 @@ BEGINNINGS = (
     (b"\x28\xb5\x2f\xfd", "a file packed by zstd", "unpack it: zstd -d"),
 )
 ZIP, GZIP = b"PK\x03\x04", b"\x1f\x8b"
+PICKLE = re.compile(rb"\x80[\x02-\x05]")  # protocol of Python's pickle
+C3D = re.compile(rb"[\x02-\x08]\x50")  # in which block its parameters begin, and its key
 KEY = re.compile(rb"[ \t-]*[A-Za-z_][\w/]*:([ \t].*)?")
 HTML = re.compile(rb"\s*(<!doctype html|<html)", re.IGNORECASE)
 JSON = re.compile(rb'\s*(\{\s*["}]|\[\s*[\[{"\d-])')
@@ -56,6 +60,10 @@ def other_file(beginning: bytes) -> tuple[str, str] | None:
             return what, remedy
     if beginning.startswith(ZIP):
         return _zipped(beginning)
+    if PICKLE.match(beginning):
+        return "a pickle of Python", OF_PANDAS
+    if C3D.match(beginning):
+        return "a C3D file", "export the rigid bodies as CSV from the program that captured them"
     if HTML.match(beginning):
         return "a web page", RAW
     if JSON.match(beginning):
@@ -74,6 +82,8 @@ def _zipped(beginning: bytes) -> tuple[str, str]:
         return "a spreadsheet of OpenDocument", TO_CSV
     if b"xl/" in beginning or b"[Content_Types].xml" in beginning[:100]:
         return "an Excel file", TO_CSV
+    if b".npy" in beginning[:100]:
+        return "an archive of NumPy", OF_NUMPY
     return "a ZIP archive", "unpack it"
 
 

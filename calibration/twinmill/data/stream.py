@@ -24,9 +24,10 @@ class Batch(Events):
     @classmethod
     def of(cls, messages: list[Message]) -> "Batch":
         """Messages (time in us, channel, payload) by channel, their order kept."""
-        batch = cls()
+        payloads: dict[str, list[bytes]] = {}
+        batch = cls(by_channel=payloads)
         for stamp_us, channel, payload in messages:
-            batch.by_channel.setdefault(channel, []).append(payload)
+            payloads.setdefault(channel, []).append(payload)
             batch.stamps_us.setdefault(channel, []).append(stamp_us)
         return batch
 

@@ -173,7 +173,7 @@ def command_at(t_s: np.ndarray, command_t_s: np.ndarray, command: np.ndarray) ->
     Zero before the first.
     """
     k = np.searchsorted(command_t_s, t_s, side="right") - 1
-    return np.where((k >= 0)[:, None], command[np.maximum(k, 0)], 0.0)
+    return np.where((k >= 0)[:, None], command[np.maximum(k, 0)], 0)
 
 
 def _trackable(robot: RobotLog, lost_s: np.ndarray, notes: list[str]) -> np.ndarray:
@@ -373,22 +373,22 @@ def _way_rad(
     half = max(1, round(0.25 / float(np.median(np.diff(robot.pose_t_s)))))
     middle = np.arange(half, len(pose) - half)
     whole = (segment[middle - half] >= 0) & (segment[middle - half] == segment[middle + half])
-    middle = middle[whole]
-    first, last = middle - half, middle + half
-    forward = np.column_stack(
+    middle, ahead = middle[whole], np.sign(command[:, None]).astype(np.int8)
+    signs = np.array(
         [
-            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, command[:, None])
+            command_at(robot.pose_t_s[middle] + shift, robot.command_t_s, ahead)
             for shift in (-0.5, -0.25, 0.0, 0.25, 0.5)
         ]
-    )
-    steady = (forward != 0).all(axis=1) & (np.ptp(np.sign(forward), axis=1) == 0)
-    bend = np.median(_bend_rad(pose, first, middle, last)[steady]) if steady.any() else 0.0
-    if bend > most_bend_rad:
-        return 0.0
+    )[:, :, 0]
+    steady = (signs[0] != 0) & (signs == signs[0]).all(axis=0)
     if np.count_nonzero(steady) < half:
         return 0.0
-    step = (pose[last, :2] - pose[first, :2])[steady] * np.sign(forward[steady, :1])
-    turn = _one_turn(step[:, 0] + 1j * step[:, 1], pose[middle[steady], 2])
+    middle, sign = middle[steady], signs[0, steady]
+    first, last = middle - half, middle + half
+    if np.median(_bend_rad(pose, first, middle, last)) > most_bend_rad:
+        return 0.0
+    step = (pose[last, :2] - pose[first, :2]) * sign[:, None]
+    turn = _one_turn(step[:, 0] + 1j * step[:, 1], pose[middle, 2])
     astray_rad = float(np.angle(turn))
     return astray_rad if abs(astray_rad) > ASTRAY_RAD else 0.0
 

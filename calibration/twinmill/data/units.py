@@ -9,10 +9,14 @@ UNITS = {  # unit in a name: that of ours, and the factor
     **{unit: (unit, 1.0) for unit in OURS},
     "mm": ("m", 1e-3),
     "cm": ("m", 1e-2),
+    "km": ("m", 1e3),
+    "ft": ("m", 0.3048),  # international, by definition, as the mile of 5280
     "px": ("m", math.nan),  # no table says how wide a pixel is
     "deg": ("rad", math.pi / 180),
     "mmps": ("mps", 1e-3),
     "cmps": ("mps", 1e-2),
+    **dict.fromkeys(("kmh", "kmph", "kph"), ("mps", 1 / 3.6)),
+    "mph": ("mps", 5280 * 0.3048 / 3600),
     "degps": ("radps", math.pi / 180),
     "rpm": ("radps", math.pi / 30),
     "rps": ("radps", 2 * math.pi),
@@ -29,7 +33,7 @@ SYMBOLS = {  # as people write them in brackets, beside those above
     **dict.fromkeys(("radians", "radian"), "rad"),
     **dict.fromkeys(("meters", "metres"), "m"),
     **dict.fromkeys(("\u00b0/s", "deg/s"), "degps"),
-    **{"%": "pct", "m/s": "mps", "cm/s": "cmps", "mm/s": "mmps", "rad/s": "radps"},
+    **{"%": "pct", "m/s": "mps", "cm/s": "cmps", "mm/s": "mmps", "km/h": "kmh", "rad/s": "radps"},
 }
 LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
 SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller

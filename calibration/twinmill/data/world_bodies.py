@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bodies of a twin's world in a log: obstacles, walls, goals, evaders."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +46,7 @@ class WorldBody:
         return np.vstack([end + arc, start - arc])
 
 
-def world_bodies(payloads: list[bytes], t0_utime_us: int) -> list[WorldBody]:
+def world_bodies(payloads: Sequence[bytes], t0_utime_us: int) -> list[WorldBody]:
     """Bodies by name, in the order in which the log names them first.
 
     Args:

@@ -4,6 +4,7 @@
 import hashlib
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,7 +96,12 @@ def read_recording(path: Path, data: bytes | None = None) -> Recording:
 
 
 def _decoded(
-    kind: type, payloads: list[bytes], channel: str, *, stamps_us: list[int], warnings: list[str]
+    kind: type,
+    payloads: Sequence[bytes],
+    channel: str,
+    *,
+    stamps_us: Sequence[int],
+    warnings: list[str],
 ) -> Channel:
     """The channel without a few messages that are broken, on which there is then a sentence."""
     messages, kept_us, failed = [], [], []

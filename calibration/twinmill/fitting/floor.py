@@ -344,11 +344,16 @@ def _usual(missed: np.ndarray, way: np.ndarray) -> np.ndarray:
 def too_poor(data: Trajectory) -> str:
     """Why a log can give no floor; empty if it can."""
     whole = np.count_nonzero(np.isfinite(data.measured[:, -1, 0]))
-    few = len(data.windows.starts) < FLOOR_SETTINGS.fewest_windows
-    if few or whole < FLOOR_SETTINGS.fewest_long:
+    if len(data.windows.starts) < FLOOR_SETTINGS.fewest_windows:
         return (
             f"{data.label}: {len(data.windows.starts) * 0.25:.0f} s of unbroken poses are too "
             "short to tell the noise from the motion; record half a minute or more"
+        )
+    if whole < FLOOR_SETTINGS.fewest_long:
+        return (
+            f"{data.label}: its poses break so often that they are whole over the longest horizon "
+            f"at {whole} times, too few to tell the noise from the motion; look at where and why "
+            "they break"
         )
     if not np.diff(data.measurement.track.command, axis=0).any():
         return (

@@ -18,6 +18,7 @@ STEP_S = 0.05
 SMOOTH = 9  # steps of the window in which velocities are fitted
 LONGEST_GAP_S = 0.3  # without a valid pose
 WINDOW_S = 10.0  # of the class
+SHOWN = 5  # standard errors of a velocity from which on it tells which way the robot goes
 STILL_RADPS = 0.03  # below this a measured turn is noise: the robot goes straight
 
 
@@ -145,24 +146,47 @@ def _times(robots: dict[int, RobotLog]) -> np.ndarray:
 
 
 def resample(robot: RobotLog, t_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(T, 3) poses and (T, 3) body velocities; NaN in gaps."""
+    """(T, 3) poses and (T, 3) body velocities; NaN in gaps.
+
+    Of a robot whose positions alone were recorded the way of its path stands for its heading.
+    """
     known_t_s, known = robot.pose_t_s[robot.valid], robot.pose[robot.valid]
     pose = np.column_stack([np.interp(t_s, known_t_s, known[:, k]) for k in range(3)])
+    if not robot.has_heading:
+        pose[:, 2] = _way_rad(pose[:, :2])
     velocity = body_velocity(pose)
     after = np.clip(np.searchsorted(known_t_s, t_s), 1, len(known_t_s) - 1)
     pose[known_t_s[after] - known_t_s[after - 1] > LONGEST_GAP_S] = np.nan
     return pose, velocity
 
 
+def _way_rad(place_m: np.ndarray) -> np.ndarray:
+    """(T,) direction of a path (T, 2) STEP_S apart; between times that tell it, in a line."""
+    rate = _rate(place_m)
+    offsets = np.arange(SMOOTH) - SMOOTH // 2
+    noise_m = np.median(np.abs(np.diff(place_m, n=2, axis=0))) / 0.6745 / np.sqrt(6)
+    error_mps = noise_m / STEP_S / np.sqrt(np.sum(offsets**2))  # of a slope by least squares
+    told = np.flatnonzero(np.hypot(*rate.T) > SHOWN * error_mps)
+    if not len(told):
+        return np.zeros(len(place_m))
+    way_rad = np.unwrap(np.arctan2(rate[told, 1], rate[told, 0]))
+    return np.interp(np.arange(len(place_m)), told, way_rad)
+
+
 def body_velocity(pose: np.ndarray) -> np.ndarray:
     """(T, ..., 3) forward, left, turn in m/s and rad/s, of poses STEP_S apart, angles unwrapped."""
-    from scipy.signal import savgol_filter  # most commands judge no swarm
-
-    rate = savgol_filter(pose, SMOOTH, 2, deriv=1, delta=STEP_S, axis=0)
+    rate = _rate(pose)
     c, s = np.cos(pose[..., 2]), np.sin(pose[..., 2])
     omega = np.where(np.abs(rate[..., 2]) < STILL_RADPS, 0.0, rate[..., 2])
     ahead, left = c * rate[..., 0] + s * rate[..., 1], c * rate[..., 1] - s * rate[..., 0]
     return np.stack([ahead, left, omega], axis=-1)
+
+
+def _rate(values: np.ndarray) -> np.ndarray:
+    """Derivative over time of values STEP_S apart, by parabolas."""
+    from scipy.signal import savgol_filter  # most commands judge no swarm
+
+    return savgol_filter(values, SMOOTH, 2, deriv=1, delta=STEP_S, axis=0)
 
 
 def _moving_mean(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:

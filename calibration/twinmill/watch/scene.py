@@ -74,7 +74,7 @@ class Shown:
         """Of all twins, or of all robots."""
         return _rgb(COLORS[self.prefix])
 
-    def poses(self, t_s: np.ndarray, payloads: list[bytes]) -> None:
+    def poses(self, t_s: np.ndarray, payloads: Sequence[bytes]) -> None:
         """Moves the robot; lost poses are left out."""
         pose = decode(payloads, turbopi.pose_t, f"{self.label}_POSE")
         known = (pose["valid"] != 0) & np.isfinite(pose["position_m"]).all(axis=1)
@@ -99,7 +99,7 @@ class Shown:
             line = rr.LineStrips3D([[p for _, p in self._path]], colors=self.color, radii=THIN)
             self._log(f"{GROUPS[self.prefix]}/paths/{self.name}", now_s, line)
 
-    def telemetry(self, t_s: np.ndarray, payloads: list[bytes]) -> None:
+    def telemetry(self, t_s: np.ndarray, payloads: Sequence[bytes]) -> None:
         """Draws the view once there is a bit, colours it, and marks when the bit changes."""
         said = decode(payloads, turbopi.telemetry_t, f"{self.label}_TELEMETRY")
         recorded = (said["frame_utime_us"] > 0) | (said["detected"] != 0)  # else no camera was

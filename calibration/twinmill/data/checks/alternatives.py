@@ -6,7 +6,7 @@ left to one factor per channel. Each mistake gives another direction. All are fi
 stretch of the log and judged on the others.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import permutations, product
@@ -184,30 +184,57 @@ class Search:
         self,
         motion: Motion,
         wheels: np.ndarray,
-        felt: dict[float, Felt] | None = None,
         lates_s: np.ndarray = LATES_S,
+        *,
+        lags_s: Sequence[float] = LAGS_S,
+        commands: Motion | None = None,
     ) -> None:
-        """Args: wheels (3, 4): velocity of the body by command. felt: of another robot."""
+        """What was felt at a lag is made when it is asked for: of a long log it is large.
+
+        Args:
+            motion: of one robot.
+            wheels: (3, 4) velocity of the body by command.
+            lates_s: shifts.
+            lags_s: lags.
+            commands: of which these are; those of another robot, or its own.
+        """
         self.motion, self.wheels = motion, wheels
-        self.lates_s = lates_s
+        self.lates_s, self.lags_s = lates_s, lags_s
+        self.commands = commands or motion
         forward, turn = np.abs(wheels[0]).max(), np.abs(wheels[2]).max()
         is_twist = np.array_equal(wheels[:2], np.eye(2, 4))
         self.lever_m = TWIST_LEVER_M if is_twist or not turn else forward / turn
         self.lever_m = float(np.clip(self.lever_m, *LEVERS_M))
         blocks = int(motion.block.max()) + 1
         self.fold = np.arange(blocks) % 2
-        self.felt = felt or {lag_s: motion.felt(lag_s) for lag_s in LAGS_S}
         self.starts = np.searchsorted(motion.block, np.arange(blocks))
         self._own_key: list[tuple[float, float]] = []
         self._told: dict[Callable, object] = {}
         self._sums_by_shift: dict[float, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
-    @classmethod
-    def of_lag(
-        cls, motion: Motion, wheels: np.ndarray, lag_s: float, lates_s: np.ndarray
+    def of(
+        self,
+        motion: Motion | None = None,
+        lates_s: np.ndarray | None = None,
+        lags_s: Sequence[float] | None = None,
     ) -> "Search":
-        """At one lag alone; of many lags, one after the other, as each is large."""
-        return cls(motion, wheels, {lag_s: motion.felt(lag_s)}, lates_s)
+        """The same commands beside another motion, or at other shifts and lags."""
+        return Search(
+            motion or self.motion,
+            self.wheels,
+            self.lates_s if lates_s is None else lates_s,
+            lags_s=lags_s or self.lags_s,
+            commands=self.commands,
+        )
+
+    def felt(self, lag_s: float) -> Felt:
+        """Commands at a lag."""
+        return self.commands.felt(lag_s)
+
+    def told(self, lag_s: float) -> Felt:
+        """(G, SHAPES, 3) velocities of the body that they ask for, the columns as they are."""
+        begin_s, shapes = self.felt(lag_s)
+        return begin_s, shapes @ self.weighted(self.wheels).T
 
     def once(self, tell: Callable[["Search"], Told]) -> Told:
         """What `tell` says of this search; several ask, and it takes long."""
@@ -237,7 +264,8 @@ class Search:
         speeds = [self.speeds(self.motion.body_mps(*signs), signs[0]) for signs in POSE_SIGNS]
         beside = np.hstack(speeds)  # (K, 3 of each)
         explained: list[dict] = [{} for _ in POSE_SIGNS]
-        for lag_s, (begin_s, shapes) in self.felt.items():
+        for lag_s in self.lags_s:
+            begin_s, shapes = self.felt(lag_s)
             for late_s in self.lates_s:
                 rows = self.motion.at((begin_s, shapes[:, 1]), late_s)
                 gram, moment = rows.T @ rows, rows.T @ beside
@@ -253,7 +281,7 @@ class Search:
     def own(self) -> Explained:
         """The columns as they are, at the lag and the shift where they explain most of all."""
         found: list[Explained] = []
-        for lag_s in self.felt:
+        for lag_s in self.lags_s:
             left, gain = self._judged(*self.by_shift(lag_s))
             k = int(left.sum(axis=1).argmin())
             late_s = float(self.lates_s[k])
@@ -284,21 +312,21 @@ class Search:
             (S, B, SHAPES, 3) told times itself and times measured, and (B,) measured squares.
         """
         if lag_s not in self._sums_by_shift:
-            self._sums_by_shift[lag_s] = self._summed_by_shift(lag_s)
+            self._sums_by_shift[lag_s] = self.summed_by_shift(lag_s)
         return self._sums_by_shift[lag_s]
 
-    def _summed_by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def summed_by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sums as of `by_shift`, of lags that are looked at once."""
         return *self._summed(lag_s, self.lates_s), self._total
 
     def _summed(self, lag_s: float, lates_s: np.ndarray, rate: float = 0.0) -> np.ndarray:
         """(2, S, B, SHAPES, 3) the same at other shifts, and at a rate of the clocks."""
-        motion, (begin_s, shapes) = self.motion, self.felt[lag_s]
-        told = shapes @ self.weighted(self.wheels).T
+        begin_s, told = self.told(lag_s)
         sums = native.sums_by_shift(
             told.reshape(len(told), -1),
-            motion.places(begin_s, rate=rate),
+            self.motion.places(begin_s, rate=rate),
             lates_s / GRID_S,
-            self.speeds(motion.body_mps(), 1),
+            self.speeds(self.motion.body_mps(), 1),
             self.starts,
         )
         return sums.reshape(*sums.shape[:3], *told.shape[1:])
@@ -310,9 +338,8 @@ class Search:
 
     def beside(self, own: Explained) -> tuple[np.ndarray, np.ndarray]:
         """(K, 3) measured and (K, SHAPES, 3) told velocities, of the columns as they are."""
-        begin_s, shapes = self.felt[own.lag_s]
-        told = begin_s, shapes @ self.weighted(self.wheels).T
-        return self.speeds(self.motion.body_mps(), 1), self.motion.at(told, own.late_s)
+        told = self.motion.at(self.told(own.lag_s), own.late_s)
+        return self.speeds(self.motion.body_mps(), 1), told
 
     def jump(self, own: Explained, fewest: int) -> Jump:
         """The two shifts that explain most, with a jump between two stretches.
@@ -323,7 +350,7 @@ class Search:
         """
         counts = np.arange(fewest, len(self.starts) - fewest + 1)
         found: list[Jump] = []
-        for lag_s in self.felt:
+        for lag_s in self.lags_s:
             sums = self.by_shift(lag_s)
             before = _left_by_first(sums, self.fold, counts)
             power, along, total = sums
@@ -378,7 +405,7 @@ class Search:
         """At other shifts, had the mistake that `e` tells of been put right."""
         a, (mixing,) = e.alternative, self.mixing([e.alternative])
         motion = self.motion.mended(a.heading_sign, a.mirrored, e.turned_rad)
-        return Search(motion, mixing, self.felt, lates_s)
+        return Search(motion, mixing, lates_s, lags_s=self.lags_s, commands=self.commands)
 
     def keys(self, sign: int, mirrored: bool) -> list[tuple[float, float]]:
         """Lags and shifts that are tried where the poses have such signs."""
@@ -429,7 +456,7 @@ class Search:
         least = np.full(len(group), np.inf)
         places: list = [None] * len(group)
         for key in keys:
-            rows = self.motion.at(self.felt[key[0]], key[1])
+            rows = self.motion.at(self.felt(key[0]), key[1])
             gram = self._by_block(rows, rows)
             angle = self._angle(rows, body) if turned else 0.0
             speeds = self.speeds(body * np.exp(-1j * angle), sign)

@@ -36,7 +36,7 @@ def at_axle(search: Search, alternatives: list[Alternative]) -> Search:
         (row for row in found if row[0] < alike), key=lambda row: (row[2].steps, row[0])
     )
     motion = search.motion.at_axle(led_m, simplest.heading_sign, simplest.mirrored)
-    axle = Search(motion, search.wheels, search.felt, search.lates_s)
+    axle = search.of(motion)
     keys = search.keys(simplest.heading_sign, simplest.mirrored)
     (seen,), (turned_about,) = (s.best([simplest], keys) for s in (search, axle))
     return axle if far_better(turned_about, seen) else search
@@ -68,7 +68,7 @@ def _at(
         key: lag and shift.
     """
     (sign, mirrored, turned), (lag_s, late_s) = pose, key
-    begin_s, shapes = search.felt[lag_s]
+    begin_s, shapes = search.felt(lag_s)
     rows = search.motion.at((begin_s, shapes[:, 1]), late_s)
     speeds = search.speeds(search.motion.body_mps(sign, mirrored), sign)
     turn = search.motion.turn_radps

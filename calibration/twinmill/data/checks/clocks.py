@@ -37,7 +37,7 @@ def stepped(
     late = search.once(lateness_of)
     if late and _is_no_clock(checked, late) and _left_moved(search, late) < best.left:
         return _of_lateness(checked, search, own, late)
-    far = Search(search.motion, search.wheels, search.felt, FAR_S)
+    far = search.of(lates_s=FAR_S)
     jump = far.jump(own, CHECKS.fewest_blocks // 2)
     better = far_better(jump.explained, own) and jump.explained.left < best.left
     if abs(jump.by_s) < CHECKS.least_jump_s or not better:
@@ -68,7 +68,7 @@ def shift_s(search: Search, coarse_s: float) -> float:
 def _by_lag(search: Search, lates_s: np.ndarray) -> Iterator[tuple[float, Search]]:
     """The same search at other shifts, of each lag alone."""
     for lag_s in ANY_LAG_S:
-        yield lag_s, Search.of_lag(search.motion, search.wheels, lag_s, lates_s)
+        yield lag_s, search.of(lates_s=lates_s, lags_s=(lag_s,))
 
 
 def _is_shifted(search: Search, late_s: float) -> bool:
@@ -85,7 +85,7 @@ def _is_shifted(search: Search, late_s: float) -> bool:
 
 def _refined(search: Search, own: Explained, jump: Jump) -> Jump:
     """The same step on a finer grid of shifts."""
-    fine = Search(search.motion, search.wheels, search.felt, _about(jump))
+    fine = search.of(lates_s=_about(jump))
     return fine.jump(own, CHECKS.fewest_blocks // 2)
 
 
@@ -231,7 +231,7 @@ def _left_moved(search: Search, late: Lateness) -> float:
     """Share of the motion that commands leave that are moved by their lateness."""
     motion = search.motion
     moved = replace(motion, t_s=motion.t_s - late.at(motion.t_s))
-    return Search(moved, search.wheels, search.felt, search.lates_s).own().left
+    return search.of(moved).own().left
 
 
 def _of_two_clocks(checked: CheckedTrack, search: Search, own: Explained) -> list[InputFinding]:
@@ -275,7 +275,7 @@ def _is_step(search: Search, own: Explained, jump: Jump) -> bool:
     steady = min(own.left, _drifted(search, own, 0.0).left)
     if jump.explained.left > CHECKS.step_leaves * steady:
         return False
-    fine = Search(search.motion, search.wheels, search.felt, _about(jump))
+    fine = search.of(lates_s=_about(jump))
     return abs(jump.by_s) > CHECKS.step_seen * fine.jump_std_s(jump)
 
 
@@ -330,7 +330,7 @@ def _drifted(search: Search, own: Explained, rate: float) -> Explained:
     """A drift as fine as a step is, at the lag that suits it; without a rate, the best of none."""
     rate = np.nan_to_num(rate)
     found = []
-    for lag_s in search.felt:
+    for lag_s in search.lags_s:
         shifted = replace(own, lag_s=lag_s, late_s=own.late_s + own.lag_s - lag_s)
         found.append(search.at_rate(shifted, rate, FINE_S))
     return min(found, key=lambda e: e.left)

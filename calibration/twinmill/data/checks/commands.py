@@ -236,7 +236,7 @@ def _shifted(
     if own.left < CHECKS.poor and not at_end:
         return None
     every = [OWN, *_alternatives(checked)]
-    far = at_axle(Search(search.motion, search.wheels, search.felt, FAR_S), every)
+    far = at_axle(search.of(lates_s=FAR_S), every)
     found = far.best(every)
     alike = alike_left([e.left for e in found])
     simplest = min(
@@ -456,5 +456,4 @@ def _explained(
     lates_s: list[float],
 ) -> Explained:
     """How well the commands of one explain the poses of another."""
-    commands, motion = of_commands[1], of_poses[1].motion
-    return Search(motion, commands.wheels, commands.felt, np.array(lates_s)).own()
+    return of_commands[1].of(of_poses[1].motion, np.array(lates_s)).own()

@@ -7,7 +7,6 @@ change leave as little, or the shift goes by stretch as it likes, as where a lag
 command. Shares of the speed are free in each stretch, so that a battery that sags is no lateness.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -133,7 +132,7 @@ def lateness_of(whole: Search) -> Lateness | None:
     """
     motion = whole.motion.in_stretches(STRETCH_S)
     for lags_s in (FEW_LAGS_S, LAGS_S):
-        left = _normal(*_left_by_stretch(motion, whole.wheels, lags_s))
+        left = _normal(*_left_by_stretch(whole.of(motion, SHIFTS_S, lags_s)))
         by_shift = left[left.min(axis=1).sum(axis=1).argmin()]
         found = _best(by_shift)
         if found is None:
@@ -166,24 +165,20 @@ def _best(left: np.ndarray) -> tuple[_Path, Shape] | None:
     return drift, "drift" if gained > CHECKS.shape_sure else "changes"
 
 
-def _left_by_stretch(
-    motion: Motion, wheels: np.ndarray, lags_s: Sequence[float]
-) -> tuple[np.ndarray, np.ndarray]:
+def _left_by_stretch(search: Search) -> tuple[np.ndarray, np.ndarray]:
     """(L, S, B) squares that lags and shifts leave, by the best bend; (B,) those of the motion.
 
     Lag by lag, as what is summed for one is large.
     """
-    at_lags = [_left_at(motion, wheels, lag_s) for lag_s in lags_s]
+    at_lags = [_left_at(search, lag_s) for lag_s in search.lags_s]
     by_bend = list(zip(*(left for left, _ in at_lags), strict=True))
     least = [min(left.min(axis=0).sum() for left in of_lags) for of_lags in by_bend]
     return np.array(by_bend[int(np.argmin(least))]), at_lags[0][1]
 
 
-def _left_at(
-    motion: Motion, wheels: np.ndarray, lag_s: float
-) -> tuple[list[np.ndarray], np.ndarray]:
+def _left_at(search: Search, lag_s: float) -> tuple[list[np.ndarray], np.ndarray]:
     """(S, B) squares that shifts leave at one lag, by each bend; (B,) those of the motion."""
-    power, along, total = Search.of_lag(motion, wheels, lag_s, SHIFTS_S).by_shift(lag_s)
+    power, along, total = search.summed_by_shift(lag_s)
     found = []
     for bend in range(SHAPES):
         p, m = power[:, :, bend], along[:, :, bend]

@@ -20,6 +20,7 @@ MOST = 3000  # times: more tell no mistake better
 LAGS_S = (0.02, 0.06, 0.15, 0.35)
 EARLY_S, LATE_S, STEP_S = -0.6, 1.2, 0.06  # poses against commands: clock, delay
 BLOCK_S = 3.0
+KEPT_BYTES = 4_000_000  # four lags of a log of 200 s
 SHAPES = 3  # of a command: its root, itself, its square, all with its sign
 
 Felt = tuple[float, np.ndarray]  # begin of the grid, s; (G, SHAPES, 4)
@@ -140,6 +141,19 @@ class Motion:
 
     def felt(self, lag_s: float) -> Felt:
         """Commands through a first-order lag, averaged over the window."""
+        made = self._kept.get(lag_s)
+        if made is None:
+            made = self._felt(lag_s)
+            if (1 + len(self._kept)) * made.nbytes < KEPT_BYTES:
+                self._kept[lag_s] = made
+        return float(self.grid_s[0]), made
+
+    @cached_property
+    def _kept(self) -> dict[float, np.ndarray]:
+        """What was felt at lags that were asked for, of a log that is not long."""
+        return {}
+
+    def _felt(self, lag_s: float) -> np.ndarray:
         keep = np.exp(-GRID_S / lag_s)
         found = np.zeros_like(self.shapes)
         for at in np.ndindex(found.shape[1:]):  # one at a time, as a log may be long
@@ -147,7 +161,7 @@ class Motion:
             if told.any():
                 lagged = filtered([1 - keep], [1, -keep], told)
                 found[:, *at] = _averaged(lagged, self._window)
-        return float(self.grid_s[0]), found
+        return found
 
     def at(self, felt: Felt, late_s: float) -> np.ndarray:
         """(K, ...) of what was felt `late_s` before each pose."""

@@ -19,7 +19,7 @@ from twinmill.arguments import option
 from twinmill.data.importers.ros_messages import STAND_IN
 from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.log import LogError
-from twinmill.data.measurement_table import TIMES, Table, is_number
+from twinmill.data.measurement_table import LOST, TIMES, Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
 
 
@@ -364,6 +364,8 @@ def _guess(table: Table, column: str, known: frozenset[str], new: str | None) ->
     if usual and usual[0] == ("robot_id",) and not all(map(is_number, table.cells(column))):
         return Guess(column, usual[0], 1.0, "holds names", False)
     values = _numbers(table, column)
+    if usual and known.issuperset(usual[0]) and _is_empty(table, column):
+        return Guess(column, usual[0], 1.0, "holds no value", True)
     if not (usual and known.issuperset(usual[0]) and len(values)):
         span = f" ({_plain(values)[1]})" if len(values) else ""
         return Guess(column, (), 1.0, f"not known: left out{span}", True)
@@ -500,6 +502,10 @@ def _renamed(table: str, column: str, new: str, factor: float) -> tuple[float, s
     if new_unit == new_ours:
         return old_factor, f"{table}: {column} is in {old_unit} by its name: converted to {new}."
     return factor, f"{table}: {column} is read in {new_unit}, whatever its name says."
+
+
+def _is_empty(table: Table, column: str) -> bool:
+    return bool(table.rows) and all(cell.lower() in LOST for cell in table.cells(column))
 
 
 def _numbers(table: Table, column: str) -> np.ndarray:

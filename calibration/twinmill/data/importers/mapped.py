@@ -108,8 +108,8 @@ def read_mapped(
         for guess in guesses:
             if guess.rival:
                 raise _rivals(table.name, guess)
-            if not guess.sure and guess.column:
-                raise _unsure(table.name, guess)
+        if unsure := [guess for guess in guesses if not guess.sure and guess.column]:
+            raise _unsure(table.name, unsure)
         notes = [guess.note for guess in guesses if guess.note]
         table, mapping = replace(table, notes=table.notes + notes), mapping_of(guesses)
     gone = [s.column for s in mapping.values() if s.column and s.column not in table.header]
@@ -157,7 +157,9 @@ def _rivals(table: str, guess: Guess) -> LogError:
     )
 
 
-def _unsure(table: str, guess: Guess) -> LogError:
+def _unsure(table: str, guesses: list[Guess]) -> LogError:
+    """On the first of these; where it lacks but a unit, on all that lack no more."""
+    guess = guesses[0]
     if not guess.targets:
         return LogError(f"{table}: column '{guess.column}' {guess.why} of the file.")
     target = guess.targets[0]
@@ -175,16 +177,30 @@ def _unsure(table: str, guess: Guess) -> LogError:
             "down "
             f"all columns, check factor and zero there, and give that to {option('mapping')}."
         )
-    stem, ours = split_unit(target)
+    alike = [g for g in guesses if _lacks_unit(g)] if _lacks_unit(guess) else [guess]
+    doubt = "no unit" if _lacks_unit(guess) else f"no name of ours, but may be {target}"
+    more = " (or _mm, _deg, _ms, _pwm ...)" if _lacks_unit(guess) else ""
+    said = ", ".join(f"'{g.column}' ({g.why})" for g in alike)
+    have = (
+        "columns {} have {}; say what they are" if alike[1:] else "column {} has {}; say what it is"
+    )
+    return LogError(
+        f"{table}: {have.format(said, doubt)} with "
+        f"{option('rename', {g.column: _in_likely_unit(g) for g in alike})}{more}, or let "
+        f"{option('explain_columns')} write down all columns and give that to {option('mapping')}."
+    )
+
+
+def _lacks_unit(guess: Guess) -> bool:
+    """Whether all but the unit of a column is known."""
+    known = guess.targets and not math.isnan(guess.factor) and not guess.zero
+    return bool(known and split_unit(guess.targets[0])[1])
+
+
+def _in_likely_unit(guess: Guess) -> str:
+    """Our name of a column, in the unit that it looks like."""
+    stem, ours = split_unit(guess.targets[0])
     if len(guess.targets) > 1:  # both wheels of a side
         stem = "left" if guess.targets == LEFT else "right"
     unit = next((u for u, known in UNITS.items() if known == (ours, guess.factor)), ours)
-    new = f"{stem}_{unit}" if unit else target
-    doubt = "has no unit" if ours else f"may be {target}"
-    more = " (or _mm, _deg, _ms, _pwm ...)" if ours else ""
-    return LogError(
-        f"{table}: column '{guess.column}' {doubt} ({guess.why}); say what it is with "
-        f"{option('rename', {guess.column: new})}{more}, or let {option('explain_columns')} "
-        "write down all "
-        f"columns and give that to {option('mapping')}."
-    )
+    return f"{stem}_{unit}" if unit else guess.targets[0]

@@ -740,9 +740,10 @@ def _stamps(
     )
     stamped = header > 0
     everything = np.full(len(header), True)
+    heard, before = _heard(topic, received)
     if not stamped.any():
         note = f"{topic}: has no header stamps; the times of receipt are taken."
-        return received, everything, [note]
+        return received, heard, [note, *before]
     late_ms = float(np.median((received - header)[stamped])) * 1e-6
     taken = "times of receipt" if receive else "header stamps"
     notes = [
@@ -750,7 +751,7 @@ def _stamps(
         "header stamps (median)."
     ]
     if receive:
-        return received, everything, notes
+        return received, heard, [*notes, *before]
     kept = everything
     if not stamped.all() and header[stamped].min() > CLOCK_FROM_ZERO_S * 1e9:
         bare = f"{topic}: {counted(np.count_nonzero(~stamped), 'message')} without a stamp"
@@ -774,6 +775,18 @@ def _stamps(
             "sorted."
         )
     return header, kept, notes
+
+
+def _heard(topic: str, received: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """(N,) bool, times of receipt that are some; a remark on those before a simulated clock began.
+
+    A recorder with `use_sim_time` takes 0 for what it hears before the first /clock.
+    """
+    heard = received > 0
+    if heard.all() or not heard.any():
+        return np.full(len(received), True), []
+    early = counted(np.count_nonzero(~heard), "message")
+    return heard, [f"{topic}: {early} received at time 0, before the clock began; left out."]
 
 
 def _poses(robot_id: int, given: _Rows, options: BagOptions) -> PoseSeries:
