@@ -53,15 +53,15 @@ class Course:
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of three channels.
+    """Noise of the channels of steps, C of them: of a robot in the plane forward, left, turn.
 
     Attributes:
-        sensor: (3,) of a pose, m, m, rad.
-        drive, gain: (3,) displacement per step by the disturbance, m, m, rad: always, and at the
+        sensor: (C,) of a pose, m, m, rad.
+        drive, gain: (C,) displacement per step by the disturbance, m, m, rad: always, and at the
             usual pace in proportion to it.
-        memory_s: (3,) of the disturbance.
+        memory_s: (C,) of the disturbance.
         course: the steps.
-        weight: (3, W) of each step's error; None for ones.
+        weight: (C, W) of each step's error; None for ones.
     """
 
     sensor: np.ndarray
@@ -72,7 +72,7 @@ class Noise:
     weight: np.ndarray | None = None
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
-        """(..., 3 W) white errors or columns of (..., W, 3), channel after channel."""
+        """(..., C W) white errors or columns of (..., W, C), channel after channel."""
         *many, count, channels = rows.shape
         out = self._filter.white(np.moveaxis(rows, -1, -2).reshape(*many, channels * count))
         if self.weight is not None:
@@ -80,7 +80,7 @@ class Noise:
         return out
 
     def log_sizes(self, observed: np.ndarray) -> np.ndarray:
-        """(3 W,) log standard deviations of what is whitened: what the likelihood is divided by."""
+        """(C W,) log standard deviations of what is whitened: what the likelihood is divided by."""
         found = self._filter.log_sizes
         if self.weight is not None:
             found = found - np.log(self.weight).ravel()
@@ -92,7 +92,7 @@ class Noise:
 
     @property
     def logs(self) -> np.ndarray:
-        """(4, 3) logarithms of sensor, drive, gain and memory of each channel."""
+        """(4, C) logarithms of sensor, drive, gain and memory of each channel."""
         return np.log([self.sensor, self.drive, self.gain, self.memory_s])
 
     @cached_property
@@ -162,12 +162,12 @@ def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise) -> Noise:
     """The noise with the largest evidence of a linear model, channel by channel.
 
     Args:
-        errors: (W, 3) of the base, m and rad.
-        columns: (K, W, 3) of what is free, each with a standard normal prior.
+        errors: (W, C) of the base.
+        columns: (K, W, C) of what is free, each with a standard normal prior.
         begin: where to begin, with a weak prior of one unit of the logarithms about it.
     """
     logs = begin.logs
-    for c in range(3):
+    for c in range(errors.shape[1]):
         if np.any(errors[:, c]):
             used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
             own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], begin.course))
@@ -205,7 +205,7 @@ def _fit_channel(both: np.ndarray, start: np.ndarray, course: Course) -> np.ndar
 
 
 def weights_of(left: np.ndarray) -> np.ndarray:
-    """(3, W) weights of residuals (3, W), those of Student's t for what is far off."""
+    """(C, W) weights of residuals (C, W), those of Student's t for what is far off."""
     size = np.sqrt(np.median(left**2, axis=1) / 0.455)  # 0.455: median of a squared normal variate
     size = np.where(size > 0, size, 1.0)[:, None]
     return np.minimum(1.0, HEAVY / np.maximum(np.abs(left) / size, 1e-9)) / np.maximum(size, 1.0)

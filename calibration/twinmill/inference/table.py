@@ -9,12 +9,12 @@ import numpy as np
 from scipy.special import logsumexp
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, FORMS, OF_FORM, SIZES, STEP, forms_of
+from twinmill.inference.discrepancy import CHANCE, FORMS, OF_FORM, SIZES, STEP
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
-from twinmill.inference.problem import Problem, View
+from twinmill.inference.problem import Kinds, Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
 from twinmill.model.parameters import effect_names
 
@@ -59,6 +59,7 @@ class Table:
         excess: squares that the base leaves over those of noise.
         candidates: effects that compete.
         words: dependences that compete.
+        kinds: of effects.
     """
 
     entries: list[Entry]
@@ -66,6 +67,7 @@ class Table:
     excess: float
     candidates: tuple[str, ...]
     words: tuple[str, ...]
+    kinds: Kinds
 
 
 def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -118,6 +120,7 @@ def table_of(search: Search) -> Table:
         max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
         tuple(p.names),
         search.words,
+        p.kinds,
     )
 
 
@@ -263,7 +266,7 @@ class _Comparison:
         """With what the formula of one effect misses at its likeliest size; none if it is exact."""
         linear, best = self._linear(beside), (0.0, beside)
         for change in self.changes:
-            for columns in forms_of(change, self.problem.motion):
+            for columns in self.problem.forms(change):
                 white = self.view.fitter.whiten(columns)
                 gains, _ = gains_by_size(*linear.projected(white, white @ white.T), SIZES)
                 chance = np.log(OF_FORM / FORMS)
@@ -432,4 +435,4 @@ def _changes(p: Problem, h: Hypothesis) -> np.ndarray:
         model = h.model.copy()
         model.remove_effect(effect_names(model).index(h.instance(name)))
         found.append(p.steps.errors(model)[0] - p.steps.errors(h.model)[0])
-    return np.array(found).reshape(-1, len(p.steps), 3)
+    return np.array(found).reshape(-1, len(p.steps), len(p.steps.observed))

@@ -17,7 +17,7 @@ from twinmill.data.measurement import load_measurements
 from twinmill.fitting.fit import fit
 from twinmill.inference.infer import infer, infer_robots
 from twinmill.inference.kept import kept, with_kept
-from twinmill.inference.problem import problem_of
+from twinmill.inference.planar import problem_of
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile
 

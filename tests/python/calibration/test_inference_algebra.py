@@ -24,6 +24,7 @@ from twinmill.inference.discrepancy import (
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise
+from twinmill.inference.planar import planar_kinds
 from twinmill.inference.posterior import beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
@@ -177,7 +178,7 @@ OF_OTHERS = ("wheel_gain", "dead_zone", "motor_lag", "marker_offset", "floor_pat
 
 def table(entries):
     """Of ten effects, four of which act with time."""
-    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"))
+    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"), planar_kinds())
 
 
 def entry(effects, words, log_evidence, mimicked=None):
