@@ -8,7 +8,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.track import Track
-from twinmill.inference.candidate import Candidate, is_size
+from twinmill.inference.candidate import Candidate, with_limits, with_sizes
 from twinmill.inference.steps import Steps
 from twinmill.model.parameters import (
     LAG,
@@ -24,7 +24,6 @@ from twinmill.model.parameters import (
     newest_instance,
 )
 
-LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual limit: each a fifth more than the last
 SIDE = 9  # places along each side of the floor
 RADII = (0.12, 0.2, 0.35)  # of a place, times the floor's side
 LEAST_RADIUS_M = 0.15  # a robot's length
@@ -76,38 +75,13 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
     parameters = effect_parameters(model, newest_instance(model, name), fresh=True)
     roles = [p.role for p in parameters]
     if "limit" in roles:
-        return _with_limits(name, parameters, model, steps)
+        return with_limits(name, parameters, model, steps)
     masks, at, on = None, None, np.array([p.usual for p in parameters])
     where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN]
     if where:
         masks, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
         on[where] = _everywhere([parameters[k] for k in where], steps)
-    sizes = [k for k, p in enumerate(parameters) if is_size(p)]
-    points = [on]
-    for k in sizes:
-        points.append(on.copy())
-        points[-1][k] = parameters[k].value
-    errors = steps.errors(model, [p.name for p in parameters], np.array(points))
-    return Candidate(name, parameters, errors[0] - errors[1:], masks, at)
-
-
-def _with_limits(
-    name: str, parameters: list[Parameter], model: native.Model, steps: Steps
-) -> Candidate:
-    """An effect whose limits act or not: no column is linear in them."""
-    usual, value = (np.array([getattr(p, k) for p in parameters]) for k in ("usual", "value"))
-    low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
-    limit = np.array([p.role == "limit" for p in parameters])
-    others = (1.0,) if limit.all() else (0.0, 1.0)
-    at = np.array(
-        [
-            np.where(limit, np.clip(factor * value, low, high), usual + other * (value - usual))
-            for factor, other in product(LIMITS, others)
-        ]
-    )
-    errors = steps.errors(model, [p.name for p in parameters], np.vstack([usual, at]))
-    fixed = errors[0] - errors[1:]
-    return Candidate(name, parameters, fixed[:0], None, at, fixed)
+    return with_sizes(name, parameters, model, steps, on=on, masks=masks, at=at)
 
 
 def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:

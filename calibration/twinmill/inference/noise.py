@@ -37,11 +37,14 @@ class Course:
         step_s: length of a step.
         stretches: slices of steps that follow each other without a gap.
         pace: (W,) how fast the robot moves, over its usual displacement in a step.
+        seen: (C, W) False for steps of a channel that say nothing, whose errors are 0; None where
+            all say something.
     """
 
     step_s: float
     stretches: Sequence[slice]
     pace: np.ndarray = field(repr=False)
+    seen: np.ndarray | None = field(default=None, repr=False)
 
     @cached_property
     def follows(self) -> np.ndarray:
@@ -49,6 +52,10 @@ class Course:
         found = np.ones(len(self.pace))
         found[[part.start for part in self.stretches]] = 0
         return found
+
+    def of(self, channel: int) -> "Course":
+        """The course of one channel."""
+        return self if self.seen is None else replace(self, seen=self.seen[[channel]])
 
 
 @dataclass(frozen=True)
@@ -107,18 +114,23 @@ class Filter:
     Attributes:
         kept: (R,) share of the disturbance that is left from the step before.
         low: (3, R) bands of the Cholesky factor of the covariance of what AR leaves.
+        seen: (R,) 0 for rows that say nothing.
     """
 
     kept: np.ndarray
     low: np.ndarray
+    seen: np.ndarray | None = None
 
     @classmethod
     def of(cls, logs: np.ndarray, course: Course) -> "Filter":
         """Of (4, C) logarithms of sensor, drive, gain, memory in s of C channels."""
         sensor2, drive2, gain2 = np.exp(2 * logs[:3])[:, :, None]
         a = np.exp(-course.step_s / np.clip(np.exp(logs[3]), *MEMORY_S))[:, None]
-        one, two = course.follows, course.follows.copy()
-        two[1:] *= one[:-1]
+        one = course.follows
+        if course.seen is not None:
+            one = one * course.seen * np.roll(course.seen, 1, axis=-1)
+        two = one.copy()
+        two[..., 1:] *= one[..., :-1]
         # shares of the pose before a step, and of the one before that, in what AR leaves
         before, last = -(1 + a * one), a * one
         push2 = (drive2 + gain2 * course.pace**2) * (1 - last**2)
@@ -126,7 +138,8 @@ class Filter:
         band[0] = push2 + sensor2 * (1 + before**2 + last**2)
         band[1, :, :-1] = sensor2 * ((before + last * np.roll(before, 1, axis=1)) * one)[:, 1:]
         band[2, :, :-2] = sensor2 * (last * two)[:, 2:]
-        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True))
+        seen = None if course.seen is None else course.seen.ravel()
+        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True), seen)
 
     def white(self, rows: np.ndarray) -> np.ndarray:
         """(..., R) of (..., R)."""
@@ -140,7 +153,8 @@ class Filter:
     @property
     def log_sizes(self) -> np.ndarray:
         """(R,) log standard deviation of each row, given those before."""
-        return np.log(self.low[0])
+        logs = np.log(self.low[0])
+        return logs if self.seen is None else logs * self.seen
 
 
 def first_noise(course: Course, recorded: dict[str, float]) -> Noise:
@@ -170,9 +184,10 @@ def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise) -> Noise:
     for c in range(errors.shape[1]):
         if np.any(errors[:, c]):
             used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
-            own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], begin.course))
+            course = begin.course.of(c)
+            own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], course))
             both = np.concatenate([errors[None, :, c], own])
-            logs[:, c] = _fit_channel(both, logs[:, c], begin.course)
+            logs[:, c] = _fit_channel(both, logs[:, c], course)
     sensor, drive, gain, memory = np.exp(logs)
     return replace(
         begin, sensor=sensor, drive=drive, gain=gain, memory_s=np.clip(memory, *MEMORY_S)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What depends on where a joint is, and forces that always act."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from twinmill.joints.effects.effect import (
+    ACTUATORS,
+    SHARE,
+    Effect,
+    JointEffect,
+    Number,
+    number,
+)
+from twinmill.joints.mjcf import Edit
+from twinmill.joints.plant import Action, Plant
+
+
+class ForceOffset(JointEffect):
+    """A force that always acts: an amplifier's offset, a cable's pull."""
+
+    kind = "force_offset"
+    summary = "A constant force acts on the joint."
+    equation = "force += offset"
+    source = "Janot, Gautier, Brunot 2019, EMPS benchmark: offset of the amplifier"
+    told_by = ("position",)
+    written = True
+
+    @property
+    def parameters(self) -> list[Number]:
+        """The force."""
+        return [Number("offset", self.unit, SHARE * self.load, -100 * self.load, 100 * self.load)]
+
+    def act(self, action: Action, values: Mapping[str, float]) -> None:
+        """A force."""
+        action.force[:, self.at] += values["offset"]
+
+    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
+        """A bias of the joint's first actuator, which becomes a general one."""
+        mjcf = self.plant.mjcf
+        own = np.flatnonzero(mjcf.moves == self.at)
+        if not len(own):
+            return ()
+        a = int(own[0])
+        gear = float(mjcf.model.actuator_gear[a, 0])
+        bias = mjcf.model.actuator_biasprm[a, :3].copy()
+        bias[0] += values["offset"] / gear
+        gain = mjcf.model.actuator_gainprm[a, 0]
+        return general(mjcf.actuators[a], gain, bias)
+
+
+class EncoderOffset(JointEffect):
+    """A joint whose zero is elsewhere than the encoder's."""
+
+    kind = "encoder_offset"
+    summary = "The encoder's zero is not the model's."
+    equation = "measured position = position + offset"
+    source = "Khalil and Dombre 2002, ch. 11: geometric calibration"
+    told_by = ("position",)
+    written = True
+
+    @property
+    def parameters(self) -> list[Number]:
+        """The offset."""
+        reach = float(self.plant.usual.reach[self.at])
+        unit = self.plant.mjcf.units[self.at]
+        return [Number("offset", unit, SHARE * reach / 2, -reach, reach)]
+
+    def act(self, action: Action, values: Mapping[str, float]) -> None:
+        """States are where the joint is."""
+        action.q[:, self.at] -= values["offset"]
+
+    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
+        """The joint's ref: the position that is called as the encoder says it."""
+        own = float(self.plant.mjcf.model.qpos0[self.at])
+        return [Edit(("joint",), self.place, "ref", number(own + values["offset"]))]
+
+
+class Stiffness(JointEffect):
+    """A spring at the joint: hoses, cables."""
+
+    kind = "joint_stiffness"
+    summary = "A spring pulls the joint towards the model's springref."
+    equation = "force -= stiffness * (q - springref)"
+    source = "MuJoCo, joint/stiffness"
+    told_by = ("position",)
+    written = True
+
+    @property
+    def parameters(self) -> list[Number]:
+        """The stiffness that is added."""
+        own = float(self.plant.mjcf.model.jnt_stiffness[self.at])
+        usual = 2 * self.load / float(self.plant.usual.reach[self.at])
+        unit = "N m/rad" if self.unit == "N m" else "N/m"
+        return [Number("stiffness", unit, SHARE * usual, -own, 100 * usual)]
+
+    def act(self, action: Action, values: Mapping[str, float]) -> None:
+        """In MuJoCo's own number."""
+        action.model.jnt_stiffness[self.at] += values["stiffness"]
+
+    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
+        """The joint's stiffness."""
+        own = float(self.plant.mjcf.model.jnt_stiffness[self.at])
+        total = max(own + values["stiffness"], 0.0)
+        return [Edit(("joint",), self.place, "stiffness", number(total))]
+
+
+class Tilt(Effect):
+    """A base that does not stand level."""
+
+    kind = "gravity_tilt"
+    summary = "The robot's base is tilted against gravity."
+    equation = "gravity += g * (about_y, -about_x, 0) for small angles, gravity along z"
+    source = "MuJoCo, option/gravity"
+    told_by = ("position",)
+    written = True
+
+    @classmethod
+    def all_of(cls, plant: Plant) -> list[Effect]:
+        """One, where there is gravity along z."""
+        x, y, z = plant.mjcf.model.opt.gravity
+        return [cls(plant, 0, "")] if z and not (x or y) else []
+
+    @property
+    def parameters(self) -> list[Number]:
+        """Two small angles."""
+        return [Number(key, "rad", SHARE / 2, -0.5, 0.5) for key in ("about_x", "about_y")]
+
+    def act(self, action: Action, values: Mapping[str, float]) -> None:
+        """In MuJoCo's own numbers."""
+        g = float(action.model.opt.gravity[2])
+        action.model.opt.gravity[:2] += g * values["about_y"], -g * values["about_x"]
+
+    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
+        """The option's gravity."""
+        g = float(self.plant.mjcf.model.opt.gravity[2])
+        pulled = (g * values["about_y"], -g * values["about_x"], g)
+        return [Edit(("option",), "", "gravity", " ".join(map(number, pulled)))]
+
+
+def general(name: str, gain: float, bias: Sequence[float]) -> list[Edit]:
+    """An actuator as one whose force is gain * command + bias[0] + bias[1] q + bias[2] v."""
+    told = {
+        "gaintype": "fixed",
+        "gainprm": number(gain),
+        "biastype": "affine",
+        "biasprm": " ".join(map(number, bias)),
+    }
+    return [Edit(ACTUATORS, name, attribute, value) for attribute, value in told.items()]
