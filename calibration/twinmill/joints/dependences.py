@@ -50,10 +50,11 @@ def momentum(plant: Plant, d: int, force: np.ndarray) -> np.ndarray:
     return out
 
 
-def of_friction(plant: Plant) -> np.ndarray:
-    """(K, W, J) what the base's equation of friction may miss, for a relative error of one.
+def of_base(plant: Plant) -> np.ndarray:
+    """(K, W, J) what the base's equations may miss, for a relative error of one.
 
-    A curve over the speed of each joint, times the friction that the base has there.
+    Friction as a curve over the speed of each joint, and the actuators' force as one over that
+    force; without their sizes, which are numbers of the base.
     """
     model, v, parts = plant.mjcf.model, plant.series.v, []
     for d in range(v.shape[1]):
@@ -61,9 +62,12 @@ def of_friction(plant: Plant) -> np.ndarray:
         friction = model.dof_frictionloss[d] + speed * (
             model.dof_damping[d] + speed * model.dof_dampingpoly[d, 0]
         )
-        if friction.any():
-            curve = hats(speed, float(speed.max()), NODES)
-            parts.append(momentum(plant, d, plant.usual.sign(v, d) * friction * curve))
+        torque = plant.usual.torque[:, d]
+        for by, force in ((speed, plant.usual.sign(v, d) * friction), (np.abs(torque), torque)):
+            if force.any():
+                curve = hats(by, float(by.max()), NODES)
+                curve = curve - ((curve @ force**2) / np.sum(force**2))[:, None]
+                parts.append(momentum(plant, d, force * curve))
     return np.concatenate([np.zeros((0, len(plant.series.block), v.shape[1])), *parts])
 
 

@@ -23,6 +23,10 @@ from twinmill.model.parameters import effect_names, instance_of, key_of
 CLOCK = "clock.offset_s"  # by which positions are stamped later than commands
 STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 INPUT = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+NEUTRAL = {CLOCK: 0.0}  # numbers of the base that are no factors
+SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
+CLOCK_NUDGE_S = 1e-3
+KEPT = 200  # predictions that are kept, since searches ask for them again
 NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether it gives way
 
 
@@ -126,10 +130,10 @@ class JointModel:
         """Changes one number."""
         self._numbers[name] = value
 
-    def own(self, instance: str, other: Mapping[str, float]) -> dict[str, float]:
-        """Numbers of an effect by key, those of another mapping in their place."""
-        every = {**self._numbers, **other}
-        return {key_of(n): v for n, v in every.items() if instance_of(n) == instance}
+    def own(self, instance: str, other: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Numbers of an effect, those of another mapping in their place."""
+        every = {**self._numbers, **(other or {})}
+        return {n: v for n, v in every.items() if instance_of(n) == instance}
 
 
 @dataclass(frozen=True)
@@ -166,9 +170,7 @@ class Plant:
         count = self.mjcf.model.nv
         state[:, 1 : 1 + count], state[:, 1 + count : 1 + 2 * count] = action.q, action.v
         given = np.concatenate([action.commands(), action.force], axis=1)[:, None]
-        after, _ = rollout.rollout(
-            action.model, data, state, given, control_spec=INPUT, nstep=1
-        )
+        after, _ = rollout.rollout(action.model, data, state, given, control_spec=INPUT, nstep=1)
         gained = after[:, 0, 1 + count : 1 + 2 * count] - action.v
         return gained / float(action.model.opt.timestep)
 
@@ -176,6 +178,10 @@ class Plant:
         """(W, J) momentum of each joint that is measured, less that of these accelerations."""
         error = self.series.changes - self.series.weights @ accelerations
         return np.einsum("wij,wj->wi", self.inertia, error)
+
+    def momentum_of(self, force: np.ndarray) -> np.ndarray:
+        """(W, J) that forces (n, J) add, where friction lets the joints slide."""
+        return (self.series.weights @ (force * self.usual.gives)) * self.usual.slides
 
     @cached_property
     def inertia(self) -> np.ndarray:
@@ -233,6 +239,9 @@ class Plant:
 class Steps:
     """Errors of a log's steps, as `twinmill.inference` asks for them; see its protocol.
 
+    What is linear in a number (all of the base's, most effects) is predicted by MuJoCo once, and
+    forces are added as such: MuJoCo runs again for delays, lags, limits, gains, inertias and zeros.
+
     Attributes:
         plant: MuJoCo at the states of the log.
         block: (W,) number of the block of time.
@@ -243,6 +252,8 @@ class Steps:
         self.plant = plant
         self.block = plant.series.block
         self.observed = np.ones(plant.series.q.shape[1], bool)
+        self._columns: dict[str, np.ndarray] = {}
+        self._known: dict[tuple[Any, ...], np.ndarray] = {}
 
     def __len__(self) -> int:
         return len(self.block)
@@ -257,13 +268,55 @@ class Steps:
         )
 
     def _errors(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
-        action = self.plant.begin(self.plant.usual)
-        action.late_s += other.get(CLOCK, model.get(CLOCK))
-        for name, value in model.own("base", other).items():
-            model.catalogue[name].act(action, {"value": value})
+        found, exact, forces = 0.0, [], self.plant.begin(self.plant.usual)
+        for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
+            if instance_of(name) in ("base", "clock"):
+                found = found + (value - NEUTRAL.get(name, 1.0)) * self._column(model, name)
         for instance in effect_names(model):  # type: ignore[arg-type]
             kind = instance.split("#")[0]
-            model.catalogue[kind].act(action, model.own(instance, other))
+            own, effect = model.own(instance, other), model.catalogue[kind]
+            if effect.changes == "force":
+                effect.act(forces, {key_of(n): v for n, v in own.items()})
+            elif effect.changes == "linear":
+                for n, value in own.items():
+                    found = found + value * self._column(model, f"{kind}.{key_of(n)}")
+            else:
+                exact.append((kind, tuple((key_of(n), v) for n, v in own.items())))
+        found = found + self._exactly(model.catalogue, tuple(exact))
+        if forces.force.any():
+            found = found - self.plant.momentum_of(forces.force)
+        return np.asarray(found)
+
+    def _exactly(self, catalogue: Mapping[str, Any], effects: tuple[Any, ...]) -> np.ndarray:
+        """(W, J) errors of the base with some effects."""
+        if effects not in self._known:
+            if len(self._known) >= KEPT:
+                self._known.pop(next(iter(self._known)))
+            action = self.plant.begin(self.plant.usual)
+            for kind, own in effects:
+                catalogue[kind].act(action, dict(own))
+            self._known[effects] = self._run(action)
+        return self._known[effects]
+
+    def _column(self, model: JointModel, name: str) -> np.ndarray:
+        """(W, J) change of the errors by a number, over the number."""
+        if name not in self._columns:
+            action, nudge = self.plant.begin(self.plant.usual), CLOCK_NUDGE_S
+            if name == CLOCK:
+                action.late_s += nudge
+            elif instance_of(name) == "base":
+                nudge = SMALL
+                model.catalogue[name].act(action, {"value": 1 + nudge})
+            else:
+                card = model.catalogue[instance_of(name)]
+                (nudge,) = [SMALL * p.value for p in card.parameters if p.key == key_of(name)]
+                none = {p.key: 0.0 for p in card.parameters}
+                card.act(action, {**none, key_of(name): nudge})
+            change = self._run(action) - self._exactly(model.catalogue, ())
+            self._columns[name] = change / nudge
+        return self._columns[name]
+
+    def _run(self, action: Action) -> np.ndarray:
         return self.plant.momenta(self.plant.accelerations(action)) * self.plant.usual.slides
 
 

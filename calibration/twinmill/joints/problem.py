@@ -59,8 +59,8 @@ class JointProblem(Problem):
 def problem_of(plant: Plant) -> JointProblem:
     """Prepares a log of a robot."""
     effects = effects_of(plant)
-    base = base_numbers(plant)
-    names = [CLOCK, *(f"base.{key}" for key in base)]
+    base = {f"base.{key}": factor for key, factor in base_numbers(plant).items()}
+    names = [CLOCK, *base]
     model = JointModel({**effects, **base}, {n: 0.0 if n == CLOCK else 1.0 for n in names})
     steps, prior = Steps(plant), _prior(names, plant)
     noise = _begin_noise(steps, model)
@@ -80,11 +80,11 @@ def problem_of(plant: Plant) -> JointProblem:
 def _prior(names: list[str], plant: Plant) -> Prior:
     """Numbers of the base are as its file has them, give or take what drifts; or a data sheet's.
 
-    The equation of its friction is as inexact as that of any effect.
+    Its equations of friction and actuators are as inexact as those of effects.
     """
     period_s, clock = plant.series.log.period_s, np.array([n == CLOCK for n in names])
     std = np.where(clock, period_s, PRIORS.gain_drift)
-    columns = PRIORS.form * dependences.of_friction(plant)
+    columns = PRIORS.form * dependences.of_base(plant)
     more = len(columns)
     return Prior(
         names,

@@ -30,6 +30,7 @@ class Gain(ActuatorEffect):
     source = "MuJoCo, actuator gainprm and biasprm"
     told_by = ("command",)
     written = True
+    changes = "exact"
 
     @property
     def parameters(self) -> list[Number]:
@@ -125,6 +126,7 @@ class CommandDelay(ActuatorEffect):
     source = "MuJoCo, actuator delay; Hwangbo et al. 2019, Sci. Robot. 4: latency of actuators"
     told_by = ("past",)
     written = True
+    changes = "exact"
 
     @property
     def parameters(self) -> list[Number]:
@@ -155,6 +157,7 @@ class CommandLag(ActuatorEffect):
     source = "MuJoCo, actuator dyntype filterexact"
     told_by = ("past",)
     written = True
+    changes = "exact"
 
     @property
     def parameters(self) -> list[Number]:
@@ -190,6 +193,7 @@ class CommandDeadZone(ActuatorEffect):
     source = "Tao and Kokotovic 1994, IEEE Trans. Autom. Control 39: dead zones"
     told_by = ("command",)
     written = False
+    changes = "exact"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:
@@ -216,6 +220,7 @@ class CommandPlay(ActuatorEffect):
     source = "Nordin and Gutman 2002, Automatica 38: backlash"
     told_by = ("past", "position")
     written = False
+    changes = "exact"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:
@@ -243,6 +248,7 @@ class Saturation(ActuatorEffect):
     source = "MuJoCo, actuator forcerange"
     told_by = ("command",)
     written = True
+    changes = "exact"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:
@@ -277,6 +283,7 @@ class SupplyDrift(ActuatorEffect):
     source = "Maxon 2023, Motor data and operating ranges: torque constant and voltage"
     told_by = ("time",)
     written = False
+    changes = "force"
 
     @property
     def parameters(self) -> list[Number]:

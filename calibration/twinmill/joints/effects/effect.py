@@ -53,6 +53,7 @@ class Effect(ABC):
     source: ClassVar[str]
     told_by: ClassVar[tuple[str, ...]]  # dependences for which it may be mistaken
     written: ClassVar[bool]  # in an MJCF, so that stock MuJoCo has it
+    changes: ClassVar[str] = "linear"  # or "force" (adds one, or several), or "exact" (all else)
 
     @classmethod
     @abstractmethod

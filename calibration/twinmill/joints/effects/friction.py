@@ -46,6 +46,7 @@ class CoulombByDirection(JointEffect):
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30, sec. 3"
     told_by = ("speed", "position")
     written = False
+    changes = "force"
 
     @property
     def parameters(self) -> list[Number]:
@@ -95,6 +96,7 @@ class ViscousByDirection(JointEffect):
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30, sec. 3"
     told_by = ("speed",)
     written = False
+    changes = "force"
 
     @property
     def parameters(self) -> list[Number]:
@@ -147,6 +149,7 @@ class Stribeck(JointEffect):
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30, eq. 3"
     told_by = ("speed",)
     written = False
+    changes = "force"
 
     @property
     def parameters(self) -> list[Number]:
@@ -174,6 +177,7 @@ class LoadFriction(JointEffect):
     source = "Hamon, Gautier, Garrec 2010, IROS: dry friction models with load dependence"
     told_by = ("command", "speed")
     written = False
+    changes = "force"
 
     @property
     def parameters(self) -> list[Number]:

@@ -19,6 +19,7 @@ class Armature(JointEffect):
     source = "MuJoCo, joint/armature; Featherstone 2008, ch. 9.6"
     told_by = ("past",)
     written = True
+    changes = "exact"
 
     @property
     def parameters(self) -> list[Number]:
@@ -48,6 +49,7 @@ class LinkMass(JointEffect):
     source = "MuJoCo, body/inertial; Featherstone 2008, ch. 2.13"
     told_by = ("position", "past")
     written = True
+    changes = "exact"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:

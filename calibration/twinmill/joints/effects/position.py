@@ -26,6 +26,7 @@ class ForceOffset(JointEffect):
     source = "Janot, Gautier, Brunot 2019, EMPS benchmark: offset of the amplifier"
     told_by = ("position",)
     written = True
+    changes = "force"
 
     @property
     def parameters(self) -> list[Number]:
@@ -59,6 +60,7 @@ class EncoderOffset(JointEffect):
     source = "Khalil and Dombre 2002, ch. 11: geometric calibration"
     told_by = ("position",)
     written = True
+    changes = "exact"
 
     @property
     def parameters(self) -> list[Number]:
