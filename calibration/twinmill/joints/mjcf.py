@@ -3,7 +3,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,7 @@ DYNAMICS = {
 ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 TAG = re.compile(r"<!--.*?-->|<([A-Za-z]\w*)((?:\s+[\w:.-]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*)\s*/?>",
                  re.DOTALL)  # fmt: skip
-AXES = 3
+INERTIAL = "inertial."
 
 
 @dataclass(frozen=True)
@@ -180,11 +180,25 @@ def _edited(text: str, edit: Edit, path: Path) -> str:
         tag = found[0]
         if edit.name and _attribute(tag, "name") != edit.name:
             continue
+        if edit.attribute.startswith(INERTIAL):
+            return text[: found.end()] + _with_inertial(text[found.end() :], edit)
         return text[: found.start()] + _with(tag, edit) + text[found.end() :]
     raise ModelError(
         f"{path}: has no <{edit.tags[0]}> '{edit.name}' in its own text (a file that it includes "
         "may); write the model into one file with mj_saveLastXML."
     )
+
+
+def _with_inertial(after: str, edit: Edit) -> str:
+    """The text after a body's tag, with an attribute of the body's own inertial element set."""
+    own = replace(edit, attribute=edit.attribute.removeprefix(INERTIAL))
+    for found in TAG.finditer(after):
+        if found[1] == "inertial":
+            tag = re.sub(r"\sfullinertia\s*=\s*(\"[^\"]*\"|'[^']*')", "", found[0])
+            return after[: found.start()] + _with(tag, own) + after[found.end() :]
+        if found[1] == "body":
+            break
+    return f'\n<inertial {own.attribute}="{own.value}"/>' + after
 
 
 def _attribute(tag: str, name: str) -> str | None:

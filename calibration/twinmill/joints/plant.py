@@ -25,8 +25,10 @@ STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 INPUT = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 NEUTRAL = {CLOCK: 0.0}  # numbers of the base that are no factors
 SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
+SLOW = 0.02  # of a joint's usual speed, below which its direction is soft
 CLOCK_NUDGE_S = 1e-3
 KEPT = 200  # predictions that are kept, since searches ask for them again
+HELD = 0.98  # share of a push that a joint takes, below which friction holds it
 NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether it gives way
 
 
@@ -75,8 +77,8 @@ class Usual:
         speed, reach: (J,) root mean square velocity, and range of positions.
         command: (U,) root mean square command, about a servo's position.
         gives: (n, J) momentum that a joint takes from a small force: 0 where friction holds it.
-        slides: (W, J) 1 for steps in which friction never holds a joint; 0 for others, which say
-            nothing: friction is anything up to its limit there.
+        slides: (W, J) 1 for steps in which a joint neither turns back nor is held by friction; 0
+            for others, which say nothing: friction is anything up to its limit there.
     """
 
     torque: np.ndarray
@@ -88,8 +90,8 @@ class Usual:
     slides: np.ndarray
 
     def sign(self, v: np.ndarray, d: int) -> np.ndarray:
-        """(n,) direction of a joint's motion, soft at a fiftieth of its usual speed."""
-        return np.tanh(v[:, d] / (0.02 * self.speed[d]))
+        """(n,) direction of a joint's motion, soft near standstill."""
+        return np.tanh(v[:, d] / (SLOW * self.speed[d]))
 
 
 class JointModel:
@@ -218,7 +220,7 @@ class Plant:
             np.maximum(np.ptp(s.q, axis=0), 1e-9),
             np.maximum(np.sqrt((lead**2).mean(axis=0)), 1e-9),
             gives := self._gives(load),
-            (abs(s.weights) @ (gives < 1 / 2) == 0).astype(float),
+            (abs(s.weights) @ ((gives < HELD) | _turns(s.v)) == 0).astype(float),
         )
 
     def _gives(self, load: np.ndarray) -> np.ndarray:
@@ -318,6 +320,13 @@ class Steps:
 
     def _run(self, action: Action) -> np.ndarray:
         return self.plant.momenta(self.plant.accelerations(action)) * self.plant.usual.slides
+
+
+def _turns(v: np.ndarray) -> np.ndarray:
+    """(n, J) True of states between which and a neighbour a velocity changes its sign."""
+    change = np.diff(np.sign(v), axis=0) != 0
+    none = np.zeros((1, v.shape[1]), bool)
+    return np.asarray(np.concatenate([change, none]) | np.concatenate([none, change]))
 
 
 def _lagged(u: np.ndarray, lag_s: float, step_s: float) -> np.ndarray:

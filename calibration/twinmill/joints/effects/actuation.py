@@ -1,20 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What becomes of a command: gains, delays, lags, dead zones, play, limits, a supply that falls."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from twinmill.joints.effects.effect import (
-    ACTUATORS,
     SHARE,
     ActuatorEffect,
     Effect,
     Number,
-    number,
 )
-from twinmill.joints.effects.position import general
-from twinmill.joints.mjcf import Edit
 from twinmill.joints.plant import Action, Plant
 
 LATE_S = 0.01  # default of a delay or a lag: some periods of a control loop
@@ -41,12 +37,6 @@ class Gain(ActuatorEffect):
         """In MuJoCo's own numbers."""
         action.model.actuator_gainprm[self.at] *= 1 + values["more"]
         action.model.actuator_biasprm[self.at] *= 1 + values["more"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The actuator's gains."""
-        model, more = self.plant.mjcf.model, 1 + values["more"]
-        gain, bias = model.actuator_gainprm[self.at, 0], model.actuator_biasprm[self.at, :3]
-        return general(self.place, gain * more, bias * more)
 
 
 class ServoStiffness(ActuatorEffect):
@@ -75,13 +65,6 @@ class ServoStiffness(ActuatorEffect):
         action.model.actuator_gainprm[self.at, 0] *= 1 + values["more"]
         action.model.actuator_biasprm[self.at, 1] *= 1 + values["more"]
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The actuator's gains."""
-        model, more = self.plant.mjcf.model, 1 + values["more"]
-        bias = model.actuator_biasprm[self.at, :3].copy()
-        bias[1] *= more
-        return general(self.place, model.actuator_gainprm[self.at, 0] * more, bias)
-
 
 class ServoDamping(ActuatorEffect):
     """The gain of a servo on speed."""
@@ -109,13 +92,6 @@ class ServoDamping(ActuatorEffect):
         """In MuJoCo's own number."""
         action.model.actuator_biasprm[self.at, 2] -= values["more"]
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The actuator's gains."""
-        model = self.plant.mjcf.model
-        bias = model.actuator_biasprm[self.at, :3].copy()
-        bias[2] -= values["more"]
-        return general(self.place, model.actuator_gainprm[self.at, 0], bias)
-
 
 class CommandDelay(ActuatorEffect):
     """Commands that act later."""
@@ -138,15 +114,6 @@ class CommandDelay(ActuatorEffect):
         """On the command."""
         action.late_s[self.at] += values["delay_s"]
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The actuator's delay, and as many samples in its buffer as fit into it."""
-        total = max(float(self.plant.mjcf.delay_s[self.at]) + values["delay_s"], 0.0)
-        samples = int(np.ceil(total / float(self.plant.mjcf.model.opt.timestep))) + 1
-        return [
-            Edit(ACTUATORS, self.place, "delay", number(total)),
-            Edit(ACTUATORS, self.place, "nsample", str(samples)),
-        ]
-
 
 class CommandLag(ActuatorEffect):
     """Commands that are followed with a first-order lag."""
@@ -168,20 +135,6 @@ class CommandLag(ActuatorEffect):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """On the command."""
         action.lag_s[self.at] += values["lag_s"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The actuator's own dynamics."""
-        total = float(self.plant.mjcf.lag_s[self.at]) + values["lag_s"]
-        own = general(
-            self.place,
-            self.plant.mjcf.model.actuator_gainprm[self.at, 0],
-            self.plant.mjcf.model.actuator_biasprm[self.at, :3],
-        )
-        return [
-            *own,
-            Edit(ACTUATORS, self.place, "dyntype", "filterexact"),
-            Edit(ACTUATORS, self.place, "dynprm", number(total)),
-        ]
 
 
 class CommandDeadZone(ActuatorEffect):
@@ -268,11 +221,6 @@ class Saturation(ActuatorEffect):
         action.model.actuator_forcelimited[self.at] = 1
         action.model.actuator_forcerange[self.at] = -values["limit"], values["limit"]
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The actuator's forcerange."""
-        limit = number(values["limit"])
-        return [Edit(ACTUATORS, self.place, "forcerange", f"-{limit} {limit}")]
-
 
 class SupplyDrift(ActuatorEffect):
     """A supply that falls, or a motor that warms up, over a log."""
@@ -296,6 +244,10 @@ class SupplyDrift(ActuatorEffect):
         share = (t_s - t_s[0]) / max(np.ptp(t_s), 1e-9)
         own = self.plant.usual.torque[:, self.joint]
         action.force[:, self.joint] -= values["loss"] * share * own
+
+    def hook(self, values: Mapping[str, float]) -> str:
+        """The same force."""
+        return f"-{values['loss']:.6g} * f * min(t / {np.ptp(self.plant.series.t_s):.6g}, 1.0)"
 
 
 def _play(u: np.ndarray, width: float) -> np.ndarray:

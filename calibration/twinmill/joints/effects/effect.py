@@ -2,12 +2,11 @@
 """What all effects have: a card, what they change in MuJoCo, and how an MJCF holds it."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from twinmill.joints.mjcf import Edit
-from twinmill.joints.plant import Action, Plant
+from twinmill.joints.plant import SLOW, Action, Plant
 
 SHARE = 0.1  # default strength of what adds to a force or scales a number: a tenth
 
@@ -69,9 +68,16 @@ class Effect(ABC):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """Changes what is put into MuJoCo."""
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """Attributes of the MJCF that hold it; none where `written` is false."""
-        return ()
+    def write(self, action: Action, values: Mapping[str, float]) -> None:
+        """Changes MuJoCo's own numbers, as an MJCF can hold them; where `written`."""
+        self.act(action, values)
+
+    def hook(self, values: Mapping[str, float]) -> str:
+        """Force on the joint as a Python expression of v, f (its actuators' force) and t.
+
+        Empty where an MJCF holds the effect, or where it is no force.
+        """
+        return ""
 
     @property
     def name(self) -> str:
@@ -108,6 +114,11 @@ class JointEffect(Effect):
         return float(self.plant.usual.speed[self.at])
 
     @property
+    def sign(self) -> str:
+        """Direction of motion in Python, soft as in `Usual.sign`."""
+        return f"np.tanh(v / {SLOW * self.speed:.6g})"
+
+    @property
     def unit(self) -> str:
         """Of a force on the joint."""
         return "N m" if self.plant.mjcf.units[self.at] == "rad" else "N"
@@ -142,15 +153,6 @@ class ActuatorEffect(Effect):
         return bool(self.plant.mjcf.servo[self.at])
 
 
-ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder",
-             "adhesion", "dcmotor", "muscle")  # fmt: skip
-
-
 def plain(name: str) -> str:
     """A place's name without the marks that names of numbers are taken apart at."""
     return name.replace(".", "_").replace("#", "_").replace("@", "_")
-
-
-def number(value: float) -> str:
-    """A number as an MJCF has it."""
-    return f"{value:.6g}"

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Friction of a joint: constant, with speed, by direction, with load, and near standstill."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from twinmill.joints.effects.effect import SHARE, JointEffect, Number, number
-from twinmill.joints.mjcf import Edit
+from twinmill.joints.effects.effect import SHARE, JointEffect, Number
 from twinmill.joints.plant import Action
 
 
@@ -29,12 +28,6 @@ class Coulomb(JointEffect):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
         action.model.dof_frictionloss[self.at] += values["friction"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The joint's frictionloss."""
-        own = float(self.plant.mjcf.model.dof_frictionloss[self.at])
-        total = max(own + values["friction"], 0.0)
-        return [Edit(("joint",), self.place, "frictionloss", number(total))]
 
 
 class CoulombByDirection(JointEffect):
@@ -59,6 +52,10 @@ class CoulombByDirection(JointEffect):
         sign = self.plant.usual.sign(action.v, self.at)
         action.force[:, self.at] -= values["half_difference"] * np.abs(sign)
 
+    def hook(self, values: Mapping[str, float]) -> str:
+        """The same force."""
+        return f"-{values['half_difference']:.6g} * abs({self.sign})"
+
 
 class Viscous(JointEffect):
     """Friction in proportion to speed."""
@@ -79,12 +76,6 @@ class Viscous(JointEffect):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
         action.model.dof_damping[self.at] += values["damping"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The joint's damping."""
-        own = float(self.plant.mjcf.model.dof_damping[self.at])
-        total = max(own + values["damping"], 0.0)
-        return [Edit(("joint",), self.place, "damping", number(total))]
 
 
 class ViscousByDirection(JointEffect):
@@ -109,6 +100,10 @@ class ViscousByDirection(JointEffect):
         """A force in proportion to how fast the joint moves, either way."""
         action.force[:, self.at] -= values["half_difference"] * np.abs(action.v[:, self.at])
 
+    def hook(self, values: Mapping[str, float]) -> str:
+        """The same force."""
+        return f"-{values['half_difference']:.6g} * abs(v)"
+
 
 class Drag(JointEffect):
     """Friction with the square of speed."""
@@ -130,14 +125,6 @@ class Drag(JointEffect):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
         action.model.dof_dampingpoly[self.at, 0] += values["drag"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The joint's damping, second number."""
-        model = self.plant.mjcf.model
-        poly = model.dof_dampingpoly[self.at].copy()
-        poly[0] = max(poly[0] + values["drag"], 0.0)
-        every = [float(model.dof_damping[self.at]), *poly]
-        return [Edit(("joint",), self.place, "damping", " ".join(map(number, every)))]
 
 
 class Stribeck(JointEffect):
@@ -167,6 +154,10 @@ class Stribeck(JointEffect):
         sign = self.plant.usual.sign(action.v, self.at)
         action.force[:, self.at] -= values["extra"] * near * sign
 
+    def hook(self, values: Mapping[str, float]) -> str:
+        """The same force."""
+        return f"-{values['extra']:.6g} * np.exp(-((v / {values['speed']:.6g}) ** 2)) * {self.sign}"
+
 
 class LoadFriction(JointEffect):
     """Friction in proportion to the force that the gear passes on."""
@@ -189,3 +180,7 @@ class LoadFriction(JointEffect):
         load = np.abs(self.plant.usual.torque[:, self.at])
         sign = self.plant.usual.sign(action.v, self.at)
         action.force[:, self.at] -= values["share"] * load * sign
+
+    def hook(self, values: Mapping[str, float]) -> str:
+        """The same force."""
+        return f"-{values['share']:.6g} * abs(f) * {self.sign}"

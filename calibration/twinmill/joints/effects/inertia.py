@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inertia of rotors and links."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from twinmill.joints.effects.effect import SHARE, Effect, JointEffect, Number, number
-from twinmill.joints.mjcf import Edit
+from twinmill.joints.effects.effect import SHARE, Effect, JointEffect, Number
 from twinmill.joints.plant import Action, Plant
-
-GROWN = ("mass", "diaginertia")
 
 
 class Armature(JointEffect):
@@ -32,12 +29,6 @@ class Armature(JointEffect):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
         action.model.dof_armature[self.at] += values["armature"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The joint's armature."""
-        own = float(self.plant.mjcf.model.dof_armature[self.at])
-        total = max(own + values["armature"], 0.0)
-        return [Edit(("joint",), self.place, "armature", number(total))]
 
 
 class LinkMass(JointEffect):
@@ -71,16 +62,3 @@ class LinkMass(JointEffect):
         """In MuJoCo's own numbers."""
         action.model.body_mass[self._body] *= 1 + values["more"]
         action.model.body_inertia[self._body] *= 1 + values["more"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The body's inertial element, in the place of what its geoms would give."""
-        model, b, grown = self.plant.mjcf.model, self._body, 1 + values["more"]
-        return [
-            Edit(("body",), self.place, f"inertial.{attribute}", " ".join(map(number, own)))
-            for attribute, own in (
-                ("pos", model.body_ipos[b]),
-                ("quat", model.body_iquat[b]),
-                ("mass", [model.body_mass[b] * grown]),
-                ("diaginertia", model.body_inertia[b] * grown),
-            )
-        ]

@@ -1,19 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """What depends on where a joint is, and forces that always act."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from twinmill.joints.effects.effect import (
-    ACTUATORS,
     SHARE,
     Effect,
     JointEffect,
     Number,
-    number,
 )
-from twinmill.joints.mjcf import Edit
 from twinmill.joints.plant import Action, Plant
 
 
@@ -37,18 +34,12 @@ class ForceOffset(JointEffect):
         """A force."""
         action.force[:, self.at] += values["offset"]
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """A bias of the joint's first actuator, which becomes a general one."""
-        mjcf = self.plant.mjcf
-        own = np.flatnonzero(mjcf.moves == self.at)
-        if not len(own):
-            return ()
-        a = int(own[0])
-        gear = float(mjcf.model.actuator_gear[a, 0])
-        bias = mjcf.model.actuator_biasprm[a, :3].copy()
-        bias[0] += values["offset"] / gear
-        gain = mjcf.model.actuator_gainprm[a, 0]
-        return general(mjcf.actuators[a], gain, bias)
+    def write(self, action: Action, values: Mapping[str, float]) -> None:
+        """A bias of the joint's first actuator; of a joint without one MJCF cannot hold it."""
+        own = np.flatnonzero(self.plant.mjcf.moves == self.at)
+        for a in own[:1]:
+            gear = float(action.model.actuator_gear[a, 0])
+            action.model.actuator_biasprm[a, 0] += values["offset"] / gear
 
 
 class EncoderOffset(JointEffect):
@@ -70,13 +61,15 @@ class EncoderOffset(JointEffect):
         return [Number("offset", unit, SHARE * reach / 2, -reach, reach)]
 
     def act(self, action: Action, values: Mapping[str, float]) -> None:
-        """States are where the joint is."""
+        """States are where the joint is; a servo holds what the encoder says."""
         action.q[:, self.at] -= values["offset"]
+        own = (self.plant.mjcf.moves == self.at) & self.plant.mjcf.servo
+        for a in np.flatnonzero(own):
+            action.shapes.append((int(a), lambda u: u - values["offset"]))
 
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The joint's ref: the position that is called as the encoder says it."""
-        own = float(self.plant.mjcf.model.qpos0[self.at])
-        return [Edit(("joint",), self.place, "ref", number(own + values["offset"]))]
+    def write(self, action: Action, values: Mapping[str, float]) -> None:
+        """The joint's ref: its position in the pose of the file."""
+        action.model.qpos0[self.at] += values["offset"]
 
 
 class Stiffness(JointEffect):
@@ -100,12 +93,6 @@ class Stiffness(JointEffect):
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
         action.model.jnt_stiffness[self.at] += values["stiffness"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The joint's stiffness."""
-        own = float(self.plant.mjcf.model.jnt_stiffness[self.at])
-        total = max(own + values["stiffness"], 0.0)
-        return [Edit(("joint",), self.place, "stiffness", number(total))]
 
 
 class Tilt(Effect):
@@ -133,20 +120,3 @@ class Tilt(Effect):
         """In MuJoCo's own numbers."""
         g = float(action.model.opt.gravity[2])
         action.model.opt.gravity[:2] += g * values["about_y"], -g * values["about_x"]
-
-    def edits(self, values: Mapping[str, float]) -> Sequence[Edit]:
-        """The option's gravity."""
-        g = float(self.plant.mjcf.model.opt.gravity[2])
-        pulled = (g * values["about_y"], -g * values["about_x"], g)
-        return [Edit(("option",), "", "gravity", " ".join(map(number, pulled)))]
-
-
-def general(name: str, gain: float, bias: Sequence[float]) -> list[Edit]:
-    """An actuator as one whose force is gain * command + bias[0] + bias[1] q + bias[2] v."""
-    told = {
-        "gaintype": "fixed",
-        "gainprm": number(gain),
-        "biastype": "affine",
-        "biasprm": " ".join(map(number, bias)),
-    }
-    return [Edit(ACTUATORS, name, attribute, value) for attribute, value in told.items()]

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The MJCF with what was found: single attributes of its text, and a hook for what it cannot hold.
+
+The hook is a Python file beside the model that needs MuJoCo and numpy alone.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from twinmill.inference.answer import Named
+from twinmill.joints.diagnose import JointDiagnosis, diagnose_joints
+from twinmill.joints.effects.effect import Effect
+from twinmill.joints.log import JointLog
+from twinmill.joints.mjcf import INERTIAL, Edit, Mjcf
+from twinmill.joints.plant import Action
+from twinmill.model.model_file import ModelError
+
+DIGITS = 6
+SAME = 1e-6  # relative: less is the rounding of text
+ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder")
+HOOK = '''# SPDX-License-Identifier: Apache-2.0
+"""Forces that {model} lacks and MJCF cannot hold: call install() before the first mj_step."""
+
+import mujoco
+import numpy as np
+
+
+def add_forces(model, data):
+    """Adds them to the passive forces of a step."""
+    t = data.time
+{lines}
+
+
+def install():
+    """Lets MuJoCo call them in each step."""
+    mujoco.set_mjcb_passive(add_forces)
+'''
+LINE = """    i = model.joint({joint!r}).dofadr[0]
+    v, f = data.qvel[i], data.qfrc_actuator[i]
+    data.qfrc_passive[i] += {force}  # {effect}"""
+
+
+@dataclass(frozen=True)
+class JointExplanation:
+    """An MJCF with what was found.
+
+    Attributes:
+        diagnosis: of the log.
+        text: of the new MJCF.
+        hook: Python text for what MJCF cannot hold; empty where it holds all.
+        added: effects that are in the one or the other.
+        left_out: effects that are sure, and in neither: they are no force.
+    """
+
+    diagnosis: JointDiagnosis
+    text: str
+    hook: str
+    added: tuple[Named, ...]
+    left_out: tuple[Named, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Fields of `twinmill explain --json` of an MJCF."""
+        effects = self.diagnosis.problem.effects
+        return {
+            **self.diagnosis.to_json(),
+            "added": [
+                {"effect": n.effect, "in": "mjcf" if effects[n.effect].written else "hook"}
+                for n in self.added
+            ],
+            "left_out": [n.effect for n in self.left_out],
+        }
+
+
+def explain_joints(
+    log: JointLog | Path | str,
+    model: Mjcf | Path | str,
+    progress: Callable[[str], None] = lambda _: None,
+) -> JointExplanation:
+    """Diagnoses, and adds what is missing with a probability of 90 % or more.
+
+    Of a group that cannot be told apart the likeliest is added.
+
+    Args:
+        log: arrays, or a file of them.
+        model: opened, or its path.
+        progress: told in words what is being done.
+
+    Raises:
+        LogError: the log does not fit the model, or cannot be read.
+        ModelError: the model cannot be loaded or is not judged, or its text is in several files.
+    """
+    found = diagnose_joints(log, model, progress)
+    effects = found.problem.effects
+    sure = [n for n in found.answer.findings if n.certainty != "doubtful"]
+    written = [n for n in sure if effects[n.effect].written]
+    hooked = [n for n in sure if not effects[n.effect].written and _hook(n, effects)]
+    text = _written(found.mjcf, written, found)
+    added = tuple(n for n in sure if n in written or n in hooked)
+    return JointExplanation(
+        found,
+        text,
+        _hooks(found.mjcf, hooked, effects),
+        added,
+        tuple(n for n in sure if n not in added),
+    )
+
+
+def _values(named: Named) -> dict[str, float]:
+    return {key: value for key, (value, _) in named.numbers.items()}
+
+
+def _hook(named: Named, effects: Mapping[str, Effect]) -> str:
+    return effects[named.effect].hook(_values(named))
+
+
+def _hooks(mjcf: Mjcf, found: list[Named], effects: Mapping[str, Effect]) -> str:
+    if not found:
+        return ""
+    lines = [
+        LINE.format(
+            joint=mjcf.joints[effects[n.effect].joint], force=_hook(n, effects), effect=n.effect
+        )
+        for n in found
+    ]
+    return HOOK.format(model=mjcf.path.name, lines="\n".join(lines))
+
+
+def _written(mjcf: Mjcf, found: list[Named], diagnosis: JointDiagnosis) -> str:
+    """The text with what was found in MuJoCo's own numbers.
+
+    Raises:
+        ModelError: MuJoCo does not read back what was written.
+    """
+    action = diagnosis.problem.plant.begin(diagnosis.problem.plant.usual)
+    for named in found:
+        diagnosis.problem.effects[named.effect].write(action, _values(named))
+    text = mjcf.edited(edits(mjcf, action))
+    try:
+        mujoco.MjSpec.from_string(text, assets=_beside(mjcf.path))
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise ModelError(f"{mjcf.path}: cannot hold what was found ({said}).") from error
+    return text
+
+
+def _beside(path: Path) -> dict[str, bytes]:
+    """Files of the model's folder, which it may name."""
+    return {
+        str(f.relative_to(path.parent)): f.read_bytes()
+        for f in path.parent.rglob("*")
+        if f.is_file() and f.suffix.lower() in (".stl", ".obj", ".msh", ".png", ".xml")
+    }
+
+
+def edits(mjcf: Mjcf, action: Action) -> list[Edit]:
+    """Attributes in which changed numbers of MuJoCo differ from a file's."""
+    old, new, found = mjcf.model, action.model, []
+    for d, name in enumerate(mjcf.joints):
+        for attribute, of in JOINT.items():
+            if not _same(of(old, d), of(new, d)):
+                found.append(Edit(("joint",), name, attribute, _text(of(new, d))))
+    for d, name in enumerate(mjcf.bodies):
+        b = int(old.jnt_bodyid[d])
+        if not _same([old.body_mass[b]], [new.body_mass[b]]) and b not in old.jnt_bodyid[:d]:
+            found += [
+                Edit(("body",), name, f"{INERTIAL}{attribute}", _text(value))
+                for attribute, value in (
+                    ("pos", new.body_ipos[b]),
+                    ("quat", new.body_iquat[b]),
+                    ("mass", [new.body_mass[b]]),
+                    ("diaginertia", new.body_inertia[b]),
+                )
+            ]
+    for a, name in enumerate(mjcf.actuators):
+        found += [Edit(ACTUATORS, name, key, value) for key, value in _actuator(mjcf, action, a)]
+    if not _same(old.opt.gravity, new.opt.gravity):
+        found.append(Edit(("option",), "", "gravity", _text(new.opt.gravity)))
+    return found
+
+
+JOINT: dict[str, Callable[[Any, int], Any]] = {
+    "frictionloss": lambda m, d: [m.dof_frictionloss[d]],
+    "damping": lambda m, d: [m.dof_damping[d], *m.dof_dampingpoly[d]],
+    "armature": lambda m, d: [m.dof_armature[d]],
+    "stiffness": lambda m, d: [m.jnt_stiffness[d]],
+    "ref": lambda m, d: [m.qpos0[d]],
+}
+
+
+def _actuator(mjcf: Mjcf, action: Action, a: int) -> list[tuple[str, str]]:
+    """Attributes of an actuator that changed, which then becomes a general one."""
+    old, new, told = mjcf.model, action.model, []
+    late_s, lag_s = float(action.late_s[a]), float(action.lag_s[a])
+    force = (old.actuator_gainprm[a, :3], old.actuator_biasprm[a, :3])
+    now = (new.actuator_gainprm[a, :3], new.actuator_biasprm[a, :3])
+    slow = not _same([mjcf.lag_s[a]], [lag_s])
+    if slow or not _same(np.concatenate(force), np.concatenate(now)):
+        told += [("gaintype", "fixed"), ("gainprm", _text(now[0][:1]))]
+        told += [("biastype", "affine"), ("biasprm", _text(now[1]))]
+    if slow:
+        told += [("dyntype", "filterexact"), ("dynprm", _text([lag_s]))]
+    if not _same([mjcf.delay_s[a]], [late_s]):
+        samples = int(np.ceil(late_s / float(old.opt.timestep))) + 1
+        told += [("delay", _text([late_s])), ("nsample", str(samples))]
+    if new.actuator_forcelimited[a] and not old.actuator_forcelimited[a]:
+        told.append(("forcerange", _text(new.actuator_forcerange[a])))
+    return told
+
+
+def _same(one: Any, other: Any) -> bool:
+    return bool(np.allclose(one, other, rtol=SAME, atol=0))
+
+
+def _text(values: Any) -> str:
+    """Numbers as an MJCF has them, zeros at the end left out; none below 0 in the first."""
+    numbers = [float(f"{v:.{DIGITS}g}") for v in values]
+    while len(numbers) > 1 and numbers[-1] == 0:
+        numbers.pop()
+    return " ".join(f"{v:.{DIGITS}g}" for v in numbers)
