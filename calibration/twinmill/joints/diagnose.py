@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an MJCF lacks, from a log: the answer, with the effects' cards."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ import numpy as np
 
 from twinmill.data.lcm_log import LogError
 from twinmill.inference.answer import Answer, answer
-from twinmill.inference.search import Search
+from twinmill.inference.search import Evidence, Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
 from twinmill.joints.log import JointLog, read_joint_log
@@ -29,11 +29,13 @@ class JointDiagnosis:
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
         problem: that was solved.
+        fitted: sets of effects that were fitted.
         warnings: what is odd about the log, in sentences.
     """
 
     answer: Answer
     problem: JointProblem
+    fitted: Mapping[tuple[str, ...], Evidence]
     warnings: tuple[str, ...]
 
     @property
@@ -80,8 +82,8 @@ def diagnose_joints(
     plant, warnings = plant_of(log, mjcf)
     progress("what the model predicts")
     problem = problem_of(plant)
-    found = answer(table_of(Search(problem, progress).run()))
-    return JointDiagnosis(found, problem, warnings)
+    search = Search(problem, progress).run()
+    return JointDiagnosis(answer(table_of(search)), problem, search.fitted, warnings)
 
 
 def plant_of(log: JointLog | Path | str, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:

@@ -5,7 +5,7 @@ The hook is a Python file beside the model that needs MuJoCo and numpy alone.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from twinmill.joints.plant import Action
 from twinmill.model.model_file import ModelError
 
 DIGITS = 6
+TOLD = 0.5  # of the prior's width, below which a log tells a number of the base
 SAME = 1e-6  # relative: less is the rounding of text
 ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder")
 HOOK = '''# SPDX-License-Identifier: Apache-2.0
@@ -41,7 +42,7 @@ def install():
     mujoco.set_mjcb_passive(add_forces)
 '''
 LINE = """    i = model.joint({joint!r}).dofadr[0]
-    v, f = data.qvel[i], data.qfrc_actuator[i]
+    q, v, f = data.qpos[i], data.qvel[i], data.qfrc_actuator[i]
     data.qfrc_passive[i] += {force}  # {effect}"""
 
 
@@ -97,9 +98,10 @@ def explain_joints(
     found = diagnose_joints(log, model, progress)
     effects = found.problem.effects
     sure = [n for n in found.answer.findings if n.certainty != "doubtful"]
+    sure, base = _together(sure, found)
     written = [n for n in sure if effects[n.effect].written]
     hooked = [n for n in sure if not effects[n.effect].written and _hook(n, effects)]
-    text = _written(found.mjcf, written, found)
+    text = _written(found.mjcf, written, base, found)
     added = tuple(n for n in sure if n in written or n in hooked)
     return JointExplanation(
         found,
@@ -108,6 +110,26 @@ def explain_joints(
         added,
         tuple(n for n in sure if n not in added),
     )
+
+
+def _together(sure: list[Named], found: JointDiagnosis) -> tuple[list[Named], dict[str, float]]:
+    """Effects with their numbers as of the fit of just these, and factors of the base beside them.
+
+    Factors that the log tells no better than the file are left out.
+    """
+    every = {tuple(sorted(names)): e for names, e in found.fitted.items()}
+    own = every.get(tuple(sorted(n.effect for n in sure)))
+    if own is None:
+        return sure, {}
+    h = own.hypothesis
+    told = np.sqrt(np.diag(h.posterior(own.linear)[1])) < TOLD * np.sqrt(np.diag(h.cov))
+    value = dict(zip(h.labels, h.value.tolist(), strict=True))
+    base = {n: value[n] for n, t in zip(h.labels, told, strict=True) if t and n.startswith("base.")}
+    numbers = [
+        {key: (value[f"{n.effect}.{key}"], std) for key, (_, std) in n.numbers.items()}
+        for n in sure
+    ]
+    return [replace(n, numbers=own) for n, own in zip(sure, numbers, strict=True)], base
 
 
 def _values(named: Named) -> dict[str, float]:
@@ -130,13 +152,17 @@ def _hooks(mjcf: Mjcf, found: list[Named], effects: Mapping[str, Effect]) -> str
     return HOOK.format(model=mjcf.path.name, lines="\n".join(lines))
 
 
-def _written(mjcf: Mjcf, found: list[Named], diagnosis: JointDiagnosis) -> str:
+def _written(
+    mjcf: Mjcf, found: list[Named], base: Mapping[str, float], diagnosis: JointDiagnosis
+) -> str:
     """The text with what was found in MuJoCo's own numbers.
 
     Raises:
         ModelError: MuJoCo does not read back what was written.
     """
     action = diagnosis.problem.plant.begin(diagnosis.problem.plant.usual)
+    for name, factor in base.items():
+        diagnosis.problem.catalogue[name].act(action, {"value": factor})
     for named in found:
         diagnosis.problem.effects[named.effect].write(action, _values(named))
     text = mjcf.edited(edits(mjcf, action))
@@ -196,12 +222,13 @@ def _actuator(mjcf: Mjcf, action: Action, a: int) -> list[tuple[str, str]]:
     """Attributes of an actuator that changed, which then becomes a general one."""
     old, new, told = mjcf.model, action.model, []
     late_s, lag_s = float(action.late_s[a]), float(action.lag_s[a])
-    force = (old.actuator_gainprm[a, :3], old.actuator_biasprm[a, :3])
-    now = (new.actuator_gainprm[a, :3], new.actuator_biasprm[a, :3])
+    gain, bias = new.actuator_gainprm[a, 0], new.actuator_biasprm[a, :3]
+    as_before = old.actuator_gainprm[a, 0], old.actuator_biasprm[a, :3]
     slow = not _same([mjcf.lag_s[a]], [lag_s])
-    if slow or not _same(np.concatenate(force), np.concatenate(now)):
-        told += [("gaintype", "fixed"), ("gainprm", _text(now[0][:1]))]
-        told += [("biastype", "affine"), ("biasprm", _text(now[1]))]
+    if slow or not _same(as_before[1][0], bias[0]):
+        told += [("general", _text([gain])), ("biastype", "affine"), ("biasprm", _text(bias))]
+    elif not _same([as_before[0], *as_before[1]], [gain, *bias]):
+        told += [("gain", _text([gain, -bias[2]]) if bias.any() else _text([gain]))]
     if slow:
         told += [("dyntype", "filterexact"), ("dynprm", _text([lag_s]))]
     if not _same([mjcf.delay_s[a]], [late_s]):

@@ -22,7 +22,7 @@ DYNAMICS = {
 ON_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 TAG = re.compile(r"<!--.*?-->|<([A-Za-z]\w*)((?:\s+[\w:.-]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*)\s*/?>",
                  re.DOTALL)  # fmt: skip
-INERTIAL = "inertial."
+INERTIAL, GAIN, GENERAL = "inertial.", "gain", "general"  # what needs more than an attribute
 
 
 @dataclass(frozen=True)
@@ -182,11 +182,43 @@ def _edited(text: str, edit: Edit, path: Path) -> str:
             continue
         if edit.attribute.startswith(INERTIAL):
             return text[: found.end()] + _with_inertial(text[found.end() :], edit)
-        return text[: found.start()] + _with(tag, edit) + text[found.end() :]
+        new = _with_gain(tag, edit) if edit.attribute in (GAIN, GENERAL) else _with(tag, edit)
+        return text[: found.start()] + new + text[found.end() :]
     raise ModelError(
         f"{path}: has no <{edit.tags[0]}> '{edit.name}' in its own text (a file that it includes "
         "may); write the model into one file with mj_saveLastXML."
     )
+
+
+def _with_gain(tag: str, edit: Edit) -> str:
+    """An actuator's tag with another gain, in the words of its kind, or as a general one.
+
+    A motor's gain is in its gear, a servo's is kp, and kv behind it.
+    """
+    kind, name = re.match(r"<(\w+)", tag)[1], edit.name  # type: ignore[index]
+    values = edit.value.split()
+    if edit.attribute == GAIN and kind == "motor":
+        gear = (_attribute(tag, "gear") or "1").split()
+        scaled = f"{float(gear[0]) * float(values[0]):.6g}"
+        return _with(tag, Edit((kind,), name, "gear", " ".join([scaled, *gear[1:]])))
+    if edit.attribute == GAIN and kind == "position":
+        tag = _without(tag, "dampratio")
+        for key, value in zip(("kp", "kv"), values, strict=False):
+            tag = _with(tag, Edit((kind,), name, key, value))
+        return tag
+    tag = f"<general{tag.removeprefix(f'<{kind}')}"
+    for key in ("kp", "kv", "dampratio", "timeconst", "inheritrange"):
+        tag = _without(tag, key)
+    told = {"gaintype": "fixed", "gainprm": values[0]}
+    if edit.attribute == GAIN and len(values) > 1:
+        told |= {"biastype": "affine", "biasprm": f"0 -{values[0]} -{values[1]}"}
+    for key, value in told.items():
+        tag = _with(tag, Edit((kind,), name, key, value))
+    return tag
+
+
+def _without(tag: str, attribute: str) -> str:
+    return re.sub(rf"\s{attribute}\s*=\s*(\"[^\"]*\"|'[^']*')", "", tag)
 
 
 def _with_inertial(after: str, edit: Edit) -> str:
@@ -194,7 +226,7 @@ def _with_inertial(after: str, edit: Edit) -> str:
     own = replace(edit, attribute=edit.attribute.removeprefix(INERTIAL))
     for found in TAG.finditer(after):
         if found[1] == "inertial":
-            tag = re.sub(r"\sfullinertia\s*=\s*(\"[^\"]*\"|'[^']*')", "", found[0])
+            tag = _without(found[0], "fullinertia")
             return after[: found.start()] + _with(tag, own) + after[found.end() :]
         if found[1] == "body":
             break

@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -31,11 +32,13 @@ class JointProblem(Problem):
         steps: of the log.
         plant: MuJoCo at its states.
         effects: the catalogue, by name.
+        catalogue: effects, and factors of the base as `base.KEY`.
     """
 
     steps: Steps
     plant: Plant
     effects: Mapping[str, Effect]
+    catalogue: Mapping[str, Any]
 
     def candidate(self, name: str, model: JointModel) -> Candidate:
         """What an effect of the catalogue would change beside a model."""
@@ -61,14 +64,27 @@ def problem_of(plant: Plant) -> JointProblem:
     effects = effects_of(plant)
     base = {f"base.{key}": factor for key, factor in base_numbers(plant).items()}
     names = [CLOCK, *base]
-    model = JointModel({**effects, **base}, {n: 0.0 if n == CLOCK else 1.0 for n in names})
+    catalogue = {**effects, **base}
+    model = JointModel(catalogue, {n: 0.0 if n == CLOCK else 1.0 for n in names})
     steps, prior = Steps(plant), _prior(names, plant)
     noise = _begin_noise(steps, model)
     fitted = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     kinds = Kinds({name: effect.words() for name, effect in effects.items()})
     found = dependences.kernels(plant)
     p = JointProblem(
-        steps, prior, fitted, found, [*effects], None, noise, noise, {}, kinds, plant, effects
+        steps,
+        prior,
+        fitted,
+        found,
+        [*effects],
+        None,
+        noise,
+        noise,
+        {},
+        kinds,
+        plant,
+        effects,
+        catalogue,
     )
     for _ in range(ROUNDS):
         noise = flexible_noise(p)

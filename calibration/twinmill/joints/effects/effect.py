@@ -73,7 +73,7 @@ class Effect(ABC):
         self.act(action, values)
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """Force on the joint as a Python expression of v, f (its actuators' force) and t.
+        """Force on the joint as a Python expression of q, v, t, and f, its actuators' force.
 
         Empty where an MJCF holds the effect, or where it is no force.
         """

@@ -184,3 +184,37 @@ class LoadFriction(JointEffect):
     def hook(self, values: Mapping[str, float]) -> str:
         """The same force."""
         return f"-{values['share']:.6g} * abs(f) * {self.sign}"
+
+
+class FrictionByPosition(JointEffect):
+    """Friction that grows along the way of the joint: a guide that is not straight, a preload."""
+
+    kind = "friction_by_position"
+    summary = "Constant friction grows from one end of the joint's way to the other."
+    equation = "force -= slope * (q - middle) * sign(v)"
+    source = "Altintas et al. 2011, CIRP Annals 60: friction of feed drives along the way"
+    told_by = ("position",)
+    written = False
+    changes = "force"
+
+    @property
+    def parameters(self) -> list[Number]:
+        """The slope."""
+        usual = 2 * self.load / float(self.plant.usual.reach[self.at])
+        unit = "N m/rad" if self.unit == "N m" else "N/m"
+        return [Number("slope", unit, SHARE * usual, -100 * usual, 100 * usual)]
+
+    @property
+    def _middle(self) -> float:
+        q = self.plant.series.q[:, self.at]
+        return float((q.min() + q.max()) / 2)
+
+    def act(self, action: Action, values: Mapping[str, float]) -> None:
+        """A friction with the way."""
+        away = action.q[:, self.at] - self._middle
+        sign = self.plant.usual.sign(action.v, self.at)
+        action.force[:, self.at] -= values["slope"] * away * sign
+
+    def hook(self, values: Mapping[str, float]) -> str:
+        """The same force."""
+        return f"-{values['slope']:.6g} * (q - {self._middle:.6g}) * {self.sign}"
