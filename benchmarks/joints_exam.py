@@ -76,12 +76,14 @@ class Case:
         change: of the XML.
         push: sets forces or commands before each step.
         outside: it is nothing that the catalogue has.
+        also: what is right beside these, as more friction one way is more on average, too.
     """
 
     names: tuple[frozenset[str], ...] = ()
     change: Callable[[str], str] = str
     push: Push | None = None
     outside: bool = False
+    also: frozenset[str] = frozenset()
     shift: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
 
@@ -232,6 +234,7 @@ def cases(robot: str) -> dict[str, Case]:
         ),
     }[robot]
     vbd = any_of(f"viscous_friction_by_direction@{j1}")
+    more = any_of(f"viscous_friction@{j1}", f"servo_damping@{a1}")
     offset = any_of(f"force_offset@{j2}", f"coulomb_friction_by_direction@{j2}")
     found = {
         "nothing": Case(),
@@ -245,7 +248,7 @@ def cases(robot: str) -> dict[str, Case]:
         "gain": Case((any_of(f"actuator_gain@{a2}"),), weaker),
         "delay": Case((any_of(f"command_delay@{a1}"),), change=delayed(a1)),
         "offset": Case((offset,), push=constant(1, 0.25)),
-        "one way": Case((vbd,), push=one_way(0, 0.5)),
+        "one way": Case((vbd,), push=one_way(0, 0.5), also=more),
         "load": Case((any_of(f"load_friction@{j1}"),), push=of_load(0, 0.12)),
         "sticky": Case((any_of(f"stribeck_friction@{j2}"),), push=sticky(1, 0.3, 0.15)),
         "drag": Case((any_of(f"drag@{j2}"),), push=quadratic(1, 0.08)),
@@ -259,7 +262,9 @@ def cases(robot: str) -> dict[str, Case]:
             chain(attribute("joint", j2, "frictionloss", plus=0.15),
                   delayed(a1)),
         ),
-        "one way and gain": Case((vbd, any_of(f"actuator_gain@{a2}")), weaker, one_way(0, 0.5)),
+        "one way and gain": Case(
+            (vbd, any_of(f"actuator_gain@{a2}")), weaker, one_way(0, 0.5), also=more
+        ),
         "cogging": Case(push=cogging(0, 0.35, 9), outside=True),
         "hum": Case(push=hum(1, 0.3, 2.7), outside=True),
     }  # fmt: skip
@@ -323,7 +328,7 @@ def judged(case: Case, found) -> dict[str, bool]:
     names = [f.effect for f in found.findings]
     groups = [{f.effect, *f.group} for f in found.findings]
     sure = [f.effect for f in found.findings if f.certainty == "sure"]
-    right = set().union(*case.names) if case.names else set()
+    right = case.also.union(*case.names)
     first = bool(groups) and any(groups[0] & own for own in case.names)
     whole = all(any(g & own for g in groups) for own in case.names) and bool(case.names)
     return {

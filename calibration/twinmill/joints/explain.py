@@ -21,6 +21,7 @@ from twinmill.joints.plant import Action
 from twinmill.model.model_file import ModelError
 
 DIGITS = 6
+LIKELY = 0.5  # probability from which a model with an effect is the better bet
 TOLD = 0.5  # of the prior's width, below which a log tells a number of the base
 SAME = 1e-6  # relative: less is the rounding of text
 ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder")
@@ -55,7 +56,7 @@ class JointExplanation:
         text: of the new MJCF.
         hook: Python text for what MJCF cannot hold; empty where it holds all.
         added: effects that are in the one or the other.
-        left_out: effects that are sure, and in neither: they are no force.
+        left_out: effects that are likely, and in neither: they are no force.
     """
 
     diagnosis: JointDiagnosis
@@ -82,7 +83,7 @@ def explain_joints(
     model: Mjcf | Path | str,
     progress: Callable[[str], None] = lambda _: None,
 ) -> JointExplanation:
-    """Diagnoses, and adds what is missing with a probability of 90 % or more.
+    """Diagnoses, and adds each effect that is likelier missing than not, the base fitted beside it.
 
     Of a group that cannot be told apart the likeliest is added.
 
@@ -97,7 +98,7 @@ def explain_joints(
     """
     found = diagnose_joints(log, model, progress)
     effects = found.problem.effects
-    sure = [n for n in found.answer.findings if n.certainty != "doubtful"]
+    sure = [n for n in found.answer.findings if max(n.probability, _of_group(n)) > LIKELY]
     sure, base = _together(sure, found)
     written = [n for n in sure if effects[n.effect].written]
     hooked = [n for n in sure if not effects[n.effect].written and _hook(n, effects)]
@@ -130,6 +131,10 @@ def _together(sure: list[Named], found: JointDiagnosis) -> tuple[list[Named], di
         for n in sure
     ]
     return [replace(n, numbers=own) for n, own in zip(sure, numbers, strict=True)], base
+
+
+def _of_group(named: Named) -> float:
+    return named.group_probability if named.certainty == "group" else 0.0
 
 
 def _values(named: Named) -> dict[str, float]:
@@ -188,7 +193,7 @@ def edits(mjcf: Mjcf, action: Action) -> list[Edit]:
     old, new, found = mjcf.model, action.model, []
     for d, name in enumerate(mjcf.joints):
         for attribute, of in JOINT.items():
-            if not _same(of(old, d), of(new, d)):
+            if len(of(old, d)) != len(of(new, d)) or not _same(of(old, d), of(new, d)):
                 found.append(Edit(("joint",), name, attribute, _text(of(new, d))))
     for d, name in enumerate(mjcf.bodies):
         b = int(old.jnt_bodyid[d])
@@ -211,7 +216,7 @@ def edits(mjcf: Mjcf, action: Action) -> list[Edit]:
 
 JOINT: dict[str, Callable[[Any, int], Any]] = {
     "frictionloss": lambda m, d: [m.dof_frictionloss[d]],
-    "damping": lambda m, d: [m.dof_damping[d], *m.dof_dampingpoly[d]],
+    "damping": lambda m, d: np.trim_zeros([m.dof_damping[d], *m.dof_dampingpoly[d]], "b") or [0.0],
     "armature": lambda m, d: [m.dof_armature[d]],
     "stiffness": lambda m, d: [m.jnt_stiffness[d]],
     "ref": lambda m, d: [m.qpos0[d]],
@@ -244,8 +249,5 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def _text(values: Any) -> str:
-    """Numbers as an MJCF has them, zeros at the end left out; none below 0 in the first."""
-    numbers = [float(f"{v:.{DIGITS}g}") for v in values]
-    while len(numbers) > 1 and numbers[-1] == 0:
-        numbers.pop()
-    return " ".join(f"{v:.{DIGITS}g}" for v in numbers)
+    """Numbers as an MJCF has them."""
+    return " ".join(f"{v:.{DIGITS}g}" for v in values)

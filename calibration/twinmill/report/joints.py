@@ -46,13 +46,14 @@ def explanation(found: JointExplanation, written: Mapping[str, str]) -> Renderab
     """
     effects = found.diagnosis.problem.effects
     lines = [
-        f"Added {n.effect} in {'the MJCF' if effects[n.effect].written else 'the hook'}."
+        f"Added {n.effect} in {'the MJCF' if effects[n.effect].written else 'the hook'}, "
+        "with the numbers of the model fitted beside it."
         for n in found.added
     ]
     lines += [f"Left out {n.effect}: neither an MJCF nor a force holds it." for n in found.left_out]
     lines += [f"Written: {path}" for path in written.values()]
     if not written:
-        lines.append("Not written: nothing was found with 90 % or more that a model can hold.")
+        lines.append("Not written: nothing that a model can hold is likelier missing than not.")
     return Group(diagnosis(found.diagnosis), Text(), *map(Text, lines))
 
 

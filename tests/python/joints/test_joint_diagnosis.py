@@ -50,7 +50,7 @@ CARRIAGE = """<mujoco model="emps">
   </actuator>
 </mujoco>
 """
-PERIOD_S, DURATION_S = 0.004, 24.0
+PERIOD_S, DURATION_S = 0.004, 16.0
 
 
 def simulated(damping=10, motor="", push=lambda v: 0.0, seed=1):

@@ -16,7 +16,9 @@ ARM = """<mujoco>
       <geom size="0.1" mass="1"/>
     </body>
   </worldbody>
-  <actuator><motor name="drive" joint="elbow" ctrlrange="-2 2" ctrllimited="true" {motor}/></actuator>
+  <actuator>
+    <motor name="drive" joint="elbow" ctrlrange="-2 2" ctrllimited="true" {motor}/>
+  </actuator>
 </mujoco>
 """
 T_S = np.arange(400) * 0.01
@@ -24,7 +26,10 @@ T_S = np.arange(400) * 0.01
 
 def arm(tmp_path, joint="", motor=""):
     path = tmp_path / "arm.xml"
-    path.write_text(ARM.format(joint=joint, motor=motor))
+    text = ARM.format(joint=joint, motor=motor)
+    path.write_text(
+        text.replace('range="-1.5 1.5" limited="true"', "") if "ball" in joint else text
+    )
     return Mjcf.load(path)
 
 
