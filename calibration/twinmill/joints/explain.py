@@ -194,7 +194,9 @@ def edits(mjcf: Mjcf, action: Action) -> list[Edit]:
     for d, name in enumerate(mjcf.joints):
         for attribute, of in JOINT.items():
             if len(of(old, d)) != len(of(new, d)) or not _same(of(old, d), of(new, d)):
-                found.append(Edit(("joint",), name, attribute, _text(of(new, d))))
+                turned = attribute == "ref" and mjcf.degrees and mjcf.units[d] == "rad"
+                value = np.degrees(of(new, d)) if turned else of(new, d)
+                found.append(Edit(("joint",), name, attribute, _text(value)))
     for d, name in enumerate(mjcf.bodies):
         b = int(old.jnt_bodyid[d])
         if not _same([old.body_mass[b]], [new.body_mass[b]]) and b not in old.jnt_bodyid[:d]:

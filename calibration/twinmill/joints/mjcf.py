@@ -56,6 +56,7 @@ class Mjcf:
         actuators: names.
         moves: (U,) joint of each actuator.
         lag_s, delay_s: (U,) of the actuators.
+        degrees: the text has its angles in degrees.
     """
 
     path: Path
@@ -68,6 +69,7 @@ class Mjcf:
     moves: np.ndarray
     lag_s: np.ndarray
     delay_s: np.ndarray
+    degrees: bool
 
     @classmethod
     def load(cls, path: Path | str) -> "Mjcf":
@@ -104,6 +106,7 @@ class Mjcf:
             model.actuator_trnid[:, 0].astype(int),
             np.array(lag),
             np.array(delay),
+            bool(spec.compiler.degree),
         )
 
     @cached_property

@@ -10,9 +10,10 @@ from twinmill.joints.log import read_joint_log
 from twinmill.joints.mjcf import Mjcf
 
 ARM = """<mujoco>
+  <compiler angle="radian"/>
   <worldbody>
     <body name="link">
-      <joint name="elbow" axis="0 1 0" range="-1.5 1.5" limited="true" {joint}/>
+      <joint name="elbow" axis="0 1 0" {joint}/>
       <geom size="0.1" mass="1"/>
     </body>
   </worldbody>
