@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -152,8 +153,14 @@ class JointLog:
     def saved(self, path: Path) -> None:
         """Writes arrays and names as npz."""
         names = {"joints": self.joints, "actuators": self.actuators}
-        given = {"t_s": self.t_s, "ctrl": self.ctrl, "qpos": self.qpos, "qvel": self.qvel, **names}
-        np.savez(path, **{key: np.asarray(v) for key, v in given.items() if v is not None})
+        given: dict[str, Any] = {
+            "t_s": self.t_s,
+            "ctrl": self.ctrl,
+            "qpos": self.qpos,
+            "qvel": self.qvel,
+            **names,
+        }
+        np.savez(path, **{key: v for key, v in given.items() if v is not None})
 
 
 def read_joint_log(path: Path) -> JointLog:

@@ -270,7 +270,8 @@ class Steps:
         )
 
     def _errors(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
-        found, exact, forces = 0.0, [], self.plant.begin(self.plant.usual)
+        found, forces = np.zeros((1, 1)), self.plant.begin(self.plant.usual)
+        exact = []
         for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
             if instance_of(name) in ("base", "clock"):
                 found = found + (value - NEUTRAL.get(name, 1.0)) * self._column(model, name)
