@@ -27,10 +27,8 @@ T_S = np.arange(400) * 0.01
 
 def arm(tmp_path, joint="", motor=""):
     path = tmp_path / "arm.xml"
-    text = ARM.format(joint=joint, motor=motor)
-    path.write_text(
-        text.replace('range="-1.5 1.5" limited="true"', "") if "ball" in joint else text
-    )
+    limits = "" if "ball" in joint else 'range="-1.5 1.5" limited="true"'
+    path.write_text(ARM.format(joint=f"{limits} {joint}", motor=motor))
     return Mjcf.load(path)
 
 
