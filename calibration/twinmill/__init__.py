@@ -44,6 +44,13 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.defaults import Certainty as Certainty
     from twinmill.defaults import Verdict as Verdict
     from twinmill.fitting.settings import FitSettings as FitSettings
+    from twinmill.joints.compare import JointComparison as JointComparison
+    from twinmill.joints.compare import compare_joints as compare_joints
+    from twinmill.joints.diagnose import JointDiagnosis as JointDiagnosis
+    from twinmill.joints.diagnose import diagnose_joints as diagnose_joints
+    from twinmill.joints.explain import JointExplanation as JointExplanation
+    from twinmill.joints.explain import explain_joints as explain_joints
+    from twinmill.joints.log import JointLog as JointLog
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.model.python_effect import Number as Number
     from twinmill.model.python_effect import PythonEffect as PythonEffect
@@ -61,6 +68,10 @@ _HOME = {
     "Verdict": "twinmill.defaults",
     "FitSettings": "twinmill.fitting.settings",
     "LogError": "twinmill.data.log",
+    **dict.fromkeys(("JointComparison", "compare_joints"), "twinmill.joints.compare"),
+    **dict.fromkeys(("JointDiagnosis", "diagnose_joints"), "twinmill.joints.diagnose"),
+    **dict.fromkeys(("JointExplanation", "explain_joints"), "twinmill.joints.explain"),
+    "JointLog": "twinmill.joints.log",
     "ModelError": "twinmill.model.model_file",
     **dict.fromkeys(("Number", "PythonEffect", "python_effect"), "twinmill.model.python_effect"),
     **dict.fromkeys(

@@ -6,7 +6,7 @@ from __future__ import annotations
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -28,6 +28,7 @@ if working():  # not for --help
         command_line,
         finish,
         holding,
+        is_mjcf,
         load,
         of_robot,
         open_model,
@@ -35,6 +36,8 @@ if working():  # not for --help
         provenance,
         told,
     )
+if TYPE_CHECKING:
+    from twinmill.joints.compare import JointComparison
 
 
 def register(app: typer.Typer) -> None:
@@ -46,7 +49,7 @@ def register(app: typer.Typer) -> None:
 
 def _compare(
     logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
-) -> Comparison:
+) -> Comparison | JointComparison:
     """Measure prediction errors of a model on logs, relative to the noise floor.
 
     Predictions start from measured poses; errors are taken 0.1, 0.2, 0.5, 1 and
@@ -54,7 +57,13 @@ def _compare(
     log can tell; above 1.3 something is missing.
 
     Example: twinmill compare run.lcmlog --model turbopi.toml --out report
+
+    Of a robot that MuJoCo can load: twinmill compare run.csv --model arm.xml
     """
+    if is_mjcf(model):
+        from twinmill_cli.joints import compared  # MuJoCo's Python is slow to import
+
+        return compared(logs, model, as_json, out)
     source = provenance(command_line("compare", logs, model), model_file := open_model(model, out))
     with busy(f"comparing with {model}"):
         measurements = load(logs, model_file)

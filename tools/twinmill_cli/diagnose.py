@@ -35,6 +35,7 @@ if working():  # not for --help
     from twinmill_cli.frame import (
         command_line,
         finish,
+        is_mjcf,
         load,
         open_model,
         option,
@@ -43,6 +44,8 @@ if working():  # not for --help
     )
 if TYPE_CHECKING:
     from twinmill.diagnosis.explain import Explanation
+    from twinmill.joints.diagnose import JointDiagnosis
+    from twinmill.joints.explain import JointExplanation
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
@@ -56,14 +59,20 @@ def register(app: typer.Typer) -> None:
 
 def _diagnose(
     logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
-) -> Diagnosis:
+) -> Diagnosis | JointDiagnosis:
     """Name the physical effect that a model lacks, or say that none is missing or identifiable.
 
     Works best with a model whose base was fitted to another log of the same robot
     and clocks: only then can a new lag or delay be told from an old one.
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
+
+    Of a robot that MuJoCo can load: twinmill diagnose run.csv --model arm.xml
     """
+    if is_mjcf(model):
+        from twinmill_cli.joints import diagnosed  # MuJoCo's Python is slow to import
+
+        return diagnosed(logs, model, as_json, out)
     native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
@@ -237,7 +246,7 @@ def _explain(
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
-) -> Explanation:
+) -> Explanation | JointExplanation:
     """Diagnose, add the effects found, and write the new model; cross-validated at each step.
 
     If an error remains that no effect explains, and a formula for it was
@@ -245,7 +254,13 @@ def _explain(
     last, if that lowers the held-out error.
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
+
+    Of a robot that MuJoCo can load: twinmill explain run.csv --model arm.xml -o better.xml
     """
+    if is_mjcf(model):
+        from twinmill_cli.joints import explained as of_joints  # as in diagnose
+
+        return of_joints(logs, model, output, force=force, as_json=as_json, out=out)
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
     verb = "explain" if formula else "explain --no-formula"

@@ -54,6 +54,11 @@ def open_model(model: str, out: Path | None) -> ModelFile:
     return ModelFile.load(model)
 
 
+def is_mjcf(model: str) -> bool:
+    """True of a model in MuJoCo's own format, which is of joints."""
+    return Path(model).suffix.lower() in (".xml", ".mjcf")
+
+
 def provenance(command: str, model: ModelFile) -> Provenance:
     """Provenance that every output carries."""
     return Provenance(command, f"twinmill {__version__}", model.hash)

@@ -22,8 +22,9 @@ from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
+from twinmill.inference.planar import PlanarProblem, problem_of
 from twinmill.inference.prior import Always, weight_labels
-from twinmill.inference.problem import Problem, View, problem_of
+from twinmill.inference.problem import View
 from twinmill.inference.search import Search, evidence
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import WORTH, noise_of
@@ -77,7 +78,7 @@ def _lasts(effects: tuple[str, ...]) -> bool:
     )
 
 
-def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
+def _grown(p: PlanarProblem, h: Hypothesis, view: View) -> _Grown:
     linear = bare = h.linear(view.fitter.whiten)
     found: list[tuple[Kernel, float]] = []
     prior, odds = 0.0, np.array([_odds(p, kernel) for kernel in p.kernels])
@@ -97,13 +98,13 @@ def _grown(p: Problem, h: Hypothesis, view: View) -> _Grown:
     return _Grown(found, let_in.after(there), total, view)
 
 
-def _odds(p: Problem, kernel: Kernel) -> np.ndarray:
+def _odds(p: PlanarProblem, kernel: Kernel) -> np.ndarray:
     """(S,) prior odds of a kernel with each size."""
     forms = sum(k.depends_on == kernel.depends_on for k in p.kernels)
     return PRIORS.outside / _count_words(p) / forms * CHANCE
 
 
-def _count_words(p: Problem) -> int:
+def _count_words(p: PlanarProblem) -> int:
     return len({k.depends_on for k in p.kernels}) + 1  # and moments
 
 
@@ -114,7 +115,7 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     return np.concatenate([view.stacked[:0], *own])
 
 
-def _sizes(p: Problem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.ndarray:
+def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.ndarray:
     """(S,) posterior probabilities of the sizes of a dependence, each under its best noise."""
     none, some = [], []
     at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
@@ -131,7 +132,9 @@ def _sizes(p: Problem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.n
     return np.exp(logs - logsumexp(logs))[1:]
 
 
-def _conditioned(p: Problem, h: Hypothesis, grown: _Grown, wander: dict[str, np.ndarray]) -> Always:
+def _conditioned(
+    p: PlanarProblem, h: Hypothesis, grown: _Grown, wander: dict[str, np.ndarray]
+) -> Always:
     """The base's and the effects' numbers and the lasting weights, given the base's own log."""
     size = {k.name: s for k, s in grown.kernels}
     there = [k for k in p.kernels if k.name in size]

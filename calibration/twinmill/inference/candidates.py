@@ -2,14 +2,13 @@
 """Effects of the catalogue that a model may lack, and what each would change in a log."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.data.track import Track
-from twinmill.inference.settings import PRIORS
+from twinmill.inference.candidate import Candidate, with_limits, with_sizes
 from twinmill.inference.steps import Steps
 from twinmill.model.parameters import (
     LAG,
@@ -25,45 +24,9 @@ from twinmill.model.parameters import (
     newest_instance,
 )
 
-LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual limit: each a fifth more than the last
 RADII = (0.12, 0.2, 0.35, 0.6)  # of a place, times the floor's side
 LEAST_RADIUS_M = 0.15  # a robot's length
 MOMENTS, LEAST_S = 40, 4.0  # of a log, at which a while may begin or end; its least length
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """An effect that may be added to a model.
-
-    Attributes:
-        name: of the effect.
-        parameters: of its newest instance.
-        columns: (k, W, 3) change of the errors by each size at its default strength, m and rad.
-        masks: (G, W) steps of each place, or from each moment on; None where it acts everywhere.
-        ends: (G', 2) numbers of the masks at which each while begins and ends, where masks alone
-            are no whiles.
-        at: (G, P) values that belong to these, or to limits; None where it has neither.
-        fixed: (G, W, 3) change of the errors by limits, which have no size.
-    """
-
-    name: str
-    parameters: list[Parameter]
-    columns: np.ndarray
-    masks: np.ndarray | None = None
-    ends: np.ndarray | None = None
-    at: np.ndarray | None = None
-    fixed: np.ndarray | None = None
-
-    @property
-    def sizes(self) -> list[int]:
-        """Parameters that have a column."""
-        return [k for k, p in enumerate(self.parameters) if _is_size(p)]
-
-    @property
-    def one_sided(self) -> np.ndarray:
-        """(k,) sizes that the card lets be positive only: their prior is half a normal one."""
-        own = [self.parameters[k] for k in self.sizes]
-        return np.array([p.min >= p.usual for p in own], bool)
 
 
 def candidates(
@@ -111,48 +74,14 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
     parameters = effect_parameters(model, newest_instance(model, name), fresh=True)
     roles = [p.role for p in parameters]
     if "limit" in roles:
-        return _with_limits(name, parameters, model, steps)
+        return with_limits(name, parameters, model, steps)
     masks, ends, at = None, None, None
     on = np.array([p.usual for p in parameters])
     where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN]
     if where:
         masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
         on[where] = _everywhere([parameters[k] for k in where], steps)
-    sizes = [k for k, p in enumerate(parameters) if _is_size(p)]
-    points = [on]
-    for k in sizes:
-        points.append(on.copy())
-        points[-1][k] = parameters[k].value
-    errors = steps.errors(model, [p.name for p in parameters], np.array(points))
-    return Candidate(name, parameters, errors[0] - errors[1:], masks, ends, at)
-
-
-def size_std(parameter: Parameter) -> float:
-    """Standard deviation of the prior of an effect's size, in its unit."""
-    return PRIORS.size * abs(parameter.strength) if _is_size(parameter) else parameter.std
-
-
-def _is_size(parameter: Parameter) -> bool:
-    return parameter.role not in (*WHERE_OR_WHEN, "radius", "limit")
-
-
-def _with_limits(
-    name: str, parameters: list[Parameter], model: native.Model, steps: Steps
-) -> Candidate:
-    """An effect whose limits act or not: no column is linear in them."""
-    usual, value = (np.array([getattr(p, k) for p in parameters]) for k in ("usual", "value"))
-    low, high = (np.array([getattr(p, k) for p in parameters]) for k in ("min", "max"))
-    limit = np.array([p.role == "limit" for p in parameters])
-    others = (1.0,) if limit.all() else (0.0, 1.0)
-    at = np.array(
-        [
-            np.where(limit, np.clip(factor * value, low, high), usual + other * (value - usual))
-            for factor, other in product(LIMITS, others)
-        ]
-    )
-    errors = steps.errors(model, [p.name for p in parameters], np.vstack([usual, at]))
-    fixed = errors[0] - errors[1:]
-    return Candidate(name, parameters, fixed[:0], at=at, fixed=fixed)
+    return with_sizes(name, parameters, model, steps, on=on, masks=masks, ends=ends, at=at)
 
 
 def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:

@@ -23,7 +23,6 @@ GROWS = 1.01 * STEP**2  # times its size in one log, that a wander may have in a
 # known mean the one that says least; the rest is too small to be seen, or too large for a formula.
 BINS = np.r_[SIZES[0] / STEP, np.sqrt(SIZES[1:] * SIZES[:-1]), SIZES[-1] * STEP]
 OF_FORM = -np.diff(np.exp(-BINS / PRIORS.form))
-FORMS = 7  # of that error
 ORDERS = np.arange(1, 5)  # of a smooth function of heading, of a length scale of 1 rad
 OF_ORDERS = (1.0 + ORDERS**2) ** -1.5 / np.sum((1.0 + ORDERS**2) ** -1.5)
 NODES = 7  # of a curve over speed: as a table of duties has
@@ -76,7 +75,7 @@ def kernels(m: Motion) -> list[Kernel]:
 
 
 def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
-    """FORMS arrays (K, W, 3): what an effect's formula may miss, for a relative error of one.
+    """Arrays (K, W, 3): what an effect's formula may miss, each for a relative error of one.
 
     The effect's own change, times a smooth function of how fast the robot is along its fastest
     axis, of how fast it travels or turns, of time, place or heading, or as it comes later; without
@@ -87,15 +86,15 @@ def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
         m: the motion.
     """
     travel = np.hypot(m.moved[:, 0], m.moved[:, 1])
-    in_time, of_time = _waves(m.t_s, 6.0, 3.0)
+    in_time, of_time = waves(m.t_s, 6.0, 3.0)
     in_place, of_place = _over_floor(m, 6)
     forms = (
-        _hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES),
-        _hats(travel, m.top[3], NODES),
-        _hats(np.abs(m.moved[:, 2]), m.top[4], NODES),
+        hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES),
+        hats(travel, m.top[3], NODES),
+        hats(np.abs(m.moved[:, 2]), m.top[4], NODES),
         np.sqrt(of_time)[:, None] * in_time,
         np.sqrt(of_place)[:, None] * in_place,
-        np.sqrt(np.repeat(OF_ORDERS, 2) / 2)[:, None] * _harmonics(m.heading, ORDERS),
+        np.sqrt(np.repeat(OF_ORDERS, 2) / 2)[:, None] * harmonics(m.heading, ORDERS),
     )
     late = np.array([_later(change, n) for n in range(1, LATEST + 1)])
     each = *(f[:, :, None] * change for f in forms), np.sqrt(FADING[1:, None, None]) * late
@@ -108,13 +107,13 @@ Form = tuple[str, np.ndarray, np.ndarray | float]
 
 def _of_time(m: Motion) -> Iterator[Form]:
     for name, shortest_s, smooth_s in (("slow", 12.0, 8.0), ("quick", 3.0, 1.5)):
-        w, share = _waves(m.t_s, shortest_s, smooth_s)
+        w, share = waves(m.t_s, shortest_s, smooth_s)
         yield f"{name} gain", _gains(m, w, "all"), share
         yield f"{name} gain of travel", _gains(m, w, "travel"), share
         yield f"{name} gain of turns", _gains(m, w, "turn"), share
         if name == "slow":
             yield f"{name} way aside", _aside(m, w), share
-    w, share = _waves(m.t_s, 8.0, 4.0)
+    w, share = waves(m.t_s, 8.0, 4.0)
     yield "push", _pushes(m, w, "room"), np.tile(share, 2)
     yield "turning", _pushes(m, w, "turn"), share
 
@@ -128,7 +127,7 @@ def _of_place(m: Motion) -> Iterator[Form]:
     yield "push of the body", _pushes(m, w, "body"), np.tile(share, 2)
     yield "turning", _pushes(m, w, "turn"), share
     yield "way aside", _aside(m, w), share
-    (wx, share_x), (wy, share_y) = (_waves(p, 0.4, 0.12) for p in m.place.T)
+    (wx, share_x), (wy, share_y) = (waves(p, 0.4, 0.12) for p in m.place.T)
     both = np.concatenate([share_x, share_y]) / 2
     strips = np.concatenate([wx, wy])
     yield "strips both ways", _gains(m, strips, "travel"), both
@@ -140,7 +139,7 @@ def _of_place(m: Motion) -> Iterator[Form]:
 
 
 def _of_heading(m: Motion) -> Iterator[Form]:
-    low, high = _harmonics(m.heading, (1, 2)), _harmonics(m.heading, (3, 4))
+    low, high = harmonics(m.heading, (1, 2)), harmonics(m.heading, (3, 4))
     yield "gain of travel", _gains(m, low, "travel"), 1 / 4
     yield "gain of turns", _gains(m, low, "turn"), 1 / 4
     yield "compass, twice a turn", _compass(m, (2,)), 1 / 2
@@ -149,28 +148,28 @@ def _of_heading(m: Motion) -> Iterator[Form]:
     yield "turning", _pushes(m, low, "turn"), 1 / 4
     yield "gain, up to four times a turn", _gains(m, np.concatenate([low, high]), "all"), 1 / 8
     course = m.heading + np.arctan2(m.moved[:, 1], m.moved[:, 0])
-    yield "gain by course", _gains(m, _harmonics(course, (1, 2, 4)), "travel"), 1 / 6
-    yield "way aside by course", _aside(m, _harmonics(course, (1, 2, 4))), 1 / 6
+    yield "gain by course", _gains(m, harmonics(course, (1, 2, 4)), "travel"), 1 / 6
+    yield "way aside by course", _aside(m, harmonics(course, (1, 2, 4))), 1 / 6
 
 
 def _of_speed(m: Motion) -> Iterator[Form]:
     axes = np.eye(3)
     speed = np.hypot(m.moved[:, 0], m.moved[:, 1])
     curves = [
-        _hats(np.abs(m.moved[:, k]), m.top[k], NODES)[1:, :, None] * (m.moved * axes[k])
+        hats(np.abs(m.moved[:, k]), m.top[k], NODES)[1:, :, None] * (m.moved * axes[k])
         for k in range(3)
     ]
     for name, curve in zip(("forward", "left", "turn"), curves, strict=True):
         yield f"curve of {name}", curve, 1.0
-    plane = _hats(speed, m.top[3], NODES)[1:, :, None] * (m.moved * (1, 1, 0))
+    plane = hats(speed, m.top[3], NODES)[1:, :, None] * (m.moved * (1, 1, 0))
     yield "curve of travel", plane, 1.0
     yield "curve of each axis", np.concatenate(curves), 1.0
     signed = [
-        _hats(np.abs(m.moved[:, k]), m.top[k], 4)[1:, :, None] * (np.abs(m.moved) * axes[k])
+        hats(np.abs(m.moved[:, k]), m.top[k], 4)[1:, :, None] * (np.abs(m.moved) * axes[k])
         for k in range(3)
     ]
     yield "curve that differs backwards", np.concatenate(signed), 1 / 4
-    fast = _hats(speed, m.top[3], NODES)[1:]
+    fast = hats(speed, m.top[3], NODES)[1:]
     yield "push of the body", _pushes(m, fast, "body"), 1 / 4
     yield "turning", _pushes(m, fast, "turn"), 1 / 4
 
@@ -184,9 +183,9 @@ def _of_coupling(m: Motion) -> Iterator[Form]:
     )  # fmt: skip
     yield "linear", _terms(linear, m.usual), 1 / 4
     yield "products", _terms(products, m.usual), 1 / 4
-    spin = _hats(np.abs(m.moved[:, 2]), m.top[4], NODES)[1:, :, None]
+    spin = hats(np.abs(m.moved[:, 2]), m.top[4], NODES)[1:, :, None]
     yield "travel by rate of turn", spin * (m.moved * (1, 1, 0)), 1.0
-    speed = _hats(np.hypot(m.moved[:, 0], m.moved[:, 1]), m.top[3], NODES)[1:, :, None]
+    speed = hats(np.hypot(m.moved[:, 0], m.moved[:, 1]), m.top[3], NODES)[1:, :, None]
     yield "turns by speed", speed * (m.moved * (0, 0, 1)), 1.0
 
 
@@ -279,7 +278,7 @@ def _compass(m: Motion, orders) -> np.ndarray:
     return np.array(out)
 
 
-def _waves(along: np.ndarray, shortest: float, smooth: float) -> tuple[np.ndarray, np.ndarray]:
+def waves(along: np.ndarray, shortest: float, smooth: float) -> tuple[np.ndarray, np.ndarray]:
     """(K, W) cosines over a span, and the variance shares of a Matern 3/2 of that length scale."""
     span = max(np.ptp(along), 1e-9)
     k = np.arange(1, int(np.clip(2 * span / shortest, 3, 60)) + 1)
@@ -288,13 +287,13 @@ def _waves(along: np.ndarray, shortest: float, smooth: float) -> tuple[np.ndarra
     return waves, share / share.sum()
 
 
-def _harmonics(angle_rad: np.ndarray, orders) -> np.ndarray:
+def harmonics(angle_rad: np.ndarray, orders) -> np.ndarray:
     """(2 K, W) sines and cosines of an angle, of mean square one."""
     each = [(np.cos(n * angle_rad), np.sin(n * angle_rad)) for n in orders]
     return np.sqrt(2) * np.concatenate(each)
 
 
-def _hats(values: np.ndarray, top: float, count: int) -> np.ndarray:
+def hats(values: np.ndarray, top: float, count: int) -> np.ndarray:
     """(count, W) linear interpolation between even nodes from 0 to top."""
     at = np.clip(values / max(top, 1e-9), 0, 1) * (count - 1)
     return np.maximum(1 - np.abs(at - np.arange(count)[:, None]), 0)

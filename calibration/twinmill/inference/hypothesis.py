@@ -2,16 +2,15 @@
 """A hypothesis: a base model with some effects, fitted, and linear about its best numbers."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-import twinmill_native as native
 from scipy.special import log_ndtr
 
-from twinmill.inference.candidates import Candidate, size_std
+from twinmill.inference.candidate import Candidate, size_std
 from twinmill.inference.evidence import Linear
 from twinmill.inference.noise import Noise
 from twinmill.inference.prior import Prior
-from twinmill.inference.steps import Steps
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
     catalogue_name,
@@ -48,7 +47,7 @@ class Hypothesis:
     """
 
     effects: tuple[str, ...]
-    model: native.Model
+    model: Any
     labels: tuple[str, ...]
     named: np.ndarray
     mean: np.ndarray
@@ -63,7 +62,7 @@ class Hypothesis:
     errors: np.ndarray | None = field(default=None, repr=False)
 
     @classmethod
-    def of_base(cls, model: native.Model, prior: Prior) -> "Hypothesis":
+    def of_base(cls, model: Any, prior: Prior) -> "Hypothesis":
         """The base alone, at the prior's mean."""
         more = len(prior.mean) - len(prior.names)
         wide = np.full(more, np.inf)
@@ -139,7 +138,7 @@ class Fitter:
         discrepancy: (K, W, 3) columns of the base's discrepancy.
     """
 
-    steps: Steps
+    steps: Any
     noise: Noise
     discrepancy: np.ndarray
 
@@ -266,7 +265,7 @@ class Fitter:
         count = len(h.value)
         if known == count and slopes is not None:
             return slopes
-        out = np.empty((count, len(self.steps), 3))
+        out = np.empty((count, len(self.steps), len(self.steps.observed)))
         out[:known] = slopes[:known] if known else 0.0
         if not h.named.all():
             out[~h.named] = self.discrepancy

@@ -10,8 +10,8 @@ from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
 from twinmill.inference.discrepancy import SIZES
 from twinmill.inference.kept import kept
+from twinmill.inference.planar import problem_of
 from twinmill.inference.prior import Always
-from twinmill.inference.problem import problem_of
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of

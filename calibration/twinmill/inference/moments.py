@@ -13,10 +13,7 @@ from twinmill.inference.steps import Motion
 MOMENTS = "moments"  # the word that an answer says
 BIN_S = 0.5
 LENGTHS = (1, 2, 4)  # bins that a moment may last
-WAYS = (  # travel and turns alike, or each of four numbers by itself
-    np.array([[1.0], [1.0], [0.0], [0.0]]),
-    np.eye(4),
-)
+WAYS = 2  # all gains alike, or each number by itself
 MOST = 32  # moments that are let in, one by one: more are no moments
 SPREAD = 10.0  # pseudo-observations behind the expected share of moments: known to a factor of two
 
@@ -106,7 +103,7 @@ class Found:
     def log_chance(self, rate: Rate) -> np.ndarray:
         """(n + 1,) log prior of just the first so many, each of its length and in its way."""
         on = np.arange(len(self.gains))
-        return rate.log_chance(on, self.count) - on * np.log(len(LENGTHS) * len(WAYS))
+        return rate.log_chance(on, self.count) - on * np.log(len(LENGTHS) * WAYS)
 
 
 def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> Found:
@@ -114,23 +111,24 @@ def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> F
 
     Args:
         linear: the model beside which they are.
-        white: (B + 1, 4, R) whitened columns, as of `columns`.
-        gram: (4 B + 4, 4 B + 4) their products.
+        white: (B + 1, N, R) whitened columns, as of `columns`, of which the first half are gains.
+        gram: (N (B + 1), N (B + 1)) their products.
         worth: least gain in log evidence of a further moment.
     """
-    nodes = len(white)
-    gram, push = linear.projected(white.reshape(nodes * 4, -1), gram)
-    gram, push = gram.reshape(nodes, 4, nodes, 4), push.reshape(nodes, 4)
+    nodes, numbers = white.shape[:2]
+    ways = np.repeat([[1.0], [0.0]], numbers // 2, axis=0), np.eye(numbers)
+    gram, push = linear.projected(white.reshape(nodes * numbers, -1), gram)
+    gram, push = gram.reshape(nodes, numbers, nodes, numbers), push.reshape(nodes, numbers)
     gains, on = [0.0], []
     for _ in range(MOST):
         each = [
             (*_best(gram, push, length, way), length, way)
             for length in LENGTHS
             if length < nodes
-            for way in WAYS
+            for way in ways
         ]
         gain, begin, length, way = max(each, key=lambda e: e[0])
-        if gain - np.log(len(LENGTHS) * len(WAYS)) < worth:
+        if gain - np.log(len(LENGTHS) * WAYS) < worth:
             break
         end = begin + length
         gains.append(gains[-1] + gain)

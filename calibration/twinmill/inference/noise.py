@@ -37,11 +37,14 @@ class Course:
         step_s: length of a step.
         stretches: slices of steps that follow each other without a gap.
         pace: (W,) how fast the robot moves, over its usual displacement in a step.
+        seen: (C, W) False for steps of a channel that say nothing, whose errors are 0; None where
+            all say something.
     """
 
     step_s: float
     stretches: Sequence[slice]
     pace: np.ndarray = field(repr=False)
+    seen: np.ndarray | None = field(default=None, repr=False)
 
     @cached_property
     def follows(self) -> np.ndarray:
@@ -50,18 +53,22 @@ class Course:
         found[[part.start for part in self.stretches]] = 0
         return found
 
+    def of(self, channel: int) -> "Course":
+        """The course of one channel."""
+        return self if self.seen is None else replace(self, seen=self.seen[[channel]])
+
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of three channels.
+    """Noise of the channels of steps, C of them: of a robot in the plane forward, left, turn.
 
     Attributes:
-        sensor: (3,) of a pose, m, m, rad.
-        drive, gain: (3,) displacement per step by the disturbance, m, m, rad: always, and at the
+        sensor: (C,) of a pose, m, m, rad.
+        drive, gain: (C,) displacement per step by the disturbance, m, m, rad: always, and at the
             usual pace in proportion to it.
-        memory_s: (3,) of the disturbance.
+        memory_s: (C,) of the disturbance.
         course: the steps.
-        weight: (3, W) of each step's error; None for ones.
+        weight: (C, W) of each step's error; None for ones.
     """
 
     sensor: np.ndarray
@@ -72,7 +79,7 @@ class Noise:
     weight: np.ndarray | None = None
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
-        """(..., 3 W) white errors or columns of (..., W, 3), channel after channel."""
+        """(..., C W) white errors or columns of (..., W, C), channel after channel."""
         *many, count, channels = rows.shape
         out = self._filter.white(np.moveaxis(rows, -1, -2).reshape(*many, channels * count))
         if self.weight is not None:
@@ -80,7 +87,7 @@ class Noise:
         return out
 
     def log_sizes(self, observed: np.ndarray) -> np.ndarray:
-        """(3 W,) log standard deviations of what is whitened: what the likelihood is divided by."""
+        """(C W,) log standard deviations of what is whitened: what the likelihood is divided by."""
         found = self._filter.log_sizes
         if self.weight is not None:
             found = found - np.log(self.weight).ravel()
@@ -92,7 +99,7 @@ class Noise:
 
     @property
     def logs(self) -> np.ndarray:
-        """(4, 3) logarithms of sensor, drive, gain and memory of each channel."""
+        """(4, C) logarithms of sensor, drive, gain and memory of each channel."""
         return np.log([self.sensor, self.drive, self.gain, self.memory_s])
 
     @cached_property
@@ -107,18 +114,23 @@ class Filter:
     Attributes:
         kept: (R,) share of the disturbance that is left from the step before.
         low: (3, R) bands of the Cholesky factor of the covariance of what AR leaves.
+        seen: (R,) 0 for rows that say nothing.
     """
 
     kept: np.ndarray
     low: np.ndarray
+    seen: np.ndarray | None = None
 
     @classmethod
     def of(cls, logs: np.ndarray, course: Course) -> "Filter":
         """Of (4, C) logarithms of sensor, drive, gain, memory in s of C channels."""
         sensor2, drive2, gain2 = np.exp(2 * logs[:3])[:, :, None]
         a = np.exp(-course.step_s / np.clip(np.exp(logs[3]), *MEMORY_S))[:, None]
-        one, two = course.follows, course.follows.copy()
-        two[1:] *= one[:-1]
+        one = course.follows
+        if course.seen is not None:
+            one = one * course.seen * np.roll(course.seen, 1, axis=-1)
+        two = one.copy()
+        two[..., 1:] *= one[..., :-1]
         # shares of the pose before a step, and of the one before that, in what AR leaves
         before, last = -(1 + a * one), a * one
         push2 = (drive2 + gain2 * course.pace**2) * (1 - last**2)
@@ -126,7 +138,8 @@ class Filter:
         band[0] = push2 + sensor2 * (1 + before**2 + last**2)
         band[1, :, :-1] = sensor2 * ((before + last * np.roll(before, 1, axis=1)) * one)[:, 1:]
         band[2, :, :-2] = sensor2 * (last * two)[:, 2:]
-        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True))
+        seen = None if course.seen is None else course.seen.ravel()
+        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True), seen)
 
     def white(self, rows: np.ndarray) -> np.ndarray:
         """(..., R) of (..., R)."""
@@ -140,7 +153,8 @@ class Filter:
     @property
     def log_sizes(self) -> np.ndarray:
         """(R,) log standard deviation of each row, given those before."""
-        return np.log(self.low[0])
+        logs = np.log(self.low[0])
+        return logs if self.seen is None else logs * self.seen
 
 
 def first_noise(course: Course, recorded: dict[str, float]) -> Noise:
@@ -162,17 +176,18 @@ def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise) -> Noise:
     """The noise with the largest evidence of a linear model, channel by channel.
 
     Args:
-        errors: (W, 3) of the base, m and rad.
-        columns: (K, W, 3) of what is free, each with a standard normal prior.
+        errors: (W, C) of the base.
+        columns: (K, W, C) of what is free, each with a standard normal prior.
         begin: where to begin, with a weak prior of one unit of the logarithms about it.
     """
     logs = begin.logs
-    for c in range(3):
+    for c in range(errors.shape[1]):
         if np.any(errors[:, c]):
             used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
-            own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], begin.course))
+            course = begin.course.of(c)
+            own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], course))
             both = np.concatenate([errors[None, :, c], own])
-            logs[:, c] = _fit_channel(both, logs[:, c], begin.course)
+            logs[:, c] = _fit_channel(both, logs[:, c], course)
     sensor, drive, gain, memory = np.exp(logs)
     return replace(
         begin, sensor=sensor, drive=drive, gain=gain, memory_s=np.clip(memory, *MEMORY_S)
@@ -205,7 +220,7 @@ def _fit_channel(both: np.ndarray, start: np.ndarray, course: Course) -> np.ndar
 
 
 def weights_of(left: np.ndarray) -> np.ndarray:
-    """(3, W) weights of residuals (3, W), those of Student's t for what is far off."""
+    """(C, W) weights of residuals (C, W), those of Student's t for what is far off."""
     size = np.sqrt(np.median(left**2, axis=1) / 0.455)  # 0.455: median of a squared normal variate
     size = np.where(size > 0, size, 1.0)[:, None]
     return np.minimum(1.0, HEAVY / np.maximum(np.abs(left) / size, 1e-9)) / np.maximum(size, 1.0)

@@ -15,21 +15,10 @@ from scipy.special import logsumexp
 from twinmill.inference.search import log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Entry, Table, subsets
-from twinmill.model.parameters import beginning_at_a_moment, catalogue, catalogue_name
+from twinmill.model.parameters import catalogue_name
 
 DRAWS = 400  # of blocks
 AGAIN = "time"  # what a thing depends on that comes and goes
-TOLD_BY = {  # what a thing depends on that is mistaken for an effect, by what its card needs
-    "steady_speed": ("speed", "coupling of turns"),
-    "poses": ("coupling of turns",),
-    "changes": ("past",),
-    "clocks": ("past", "time"),
-    "history": ("time", "moments"),
-    "battery": ("time",),
-    "room": ("place", "heading"),
-    "heading": ("heading",),
-    "wheel_angle": ("past", "place", "time"),
-}
 
 
 @dataclass(frozen=True)
@@ -86,19 +75,17 @@ def beliefs(table: Table) -> list[Belief]:
     some = np.exp(logs - logsumexp(logs[~nothing]))
     p[~nothing] = some[~nothing] * (1 - p[nothing].sum())
     return [
-        _belief(mimicked, e, float(v), table.swells.get(e.effects))
-        for (mimicked, _, e), v in zip(rows, p, strict=True)
+        _belief(mimicked, e, float(v), table) for (mimicked, _, e), v in zip(rows, p, strict=True)
     ]
 
 
-def _belief(
-    mimicked: tuple[str, ...], entry: Entry, probability: float, swells: str | None
-) -> Belief:
+def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float, table: Table) -> Belief:
     """What begins or ends several times is no effect of the catalogue, but depends on time.
 
     What comes and goes once, in several steps, is one thing of a kind.
     """
-    at_moments = [n for n in map(catalogue_name, entry.effects) if n in beginning_at_a_moment()]
+    at_moments = [n for n in map(catalogue_name, entry.effects) if n in table.kinds.at_moments]
+    swells = table.swells.get(entry.effects)
     steps = [n for n in at_moments if n != swells] if len(at_moments) > 1 else []
 
     def once(effects) -> tuple[str, ...]:
@@ -132,7 +119,7 @@ def _log_likeness(effect: str, words: tuple[str, ...], table: Table) -> float:
     """Log probability that an unnamed thing with these dependences looks like an effect."""
 
     def of_kind(word: str) -> list[str]:
-        return [n for n in table.candidates if word in TOLD_BY[catalogue()[n]["needs"]]]
+        return [n for n in table.candidates if word in table.kinds.told_by[n]]
 
     kin = max((1 / len(of_kind(w)) for w in words if effect in of_kind(w)), default=0.0)
     return float(np.log(PRIORS.alike * kin + (1 - PRIORS.alike) / len(table.candidates)))

@@ -8,7 +8,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.linalg import block_diag
 
-from twinmill.inference.candidates import size_std
+from twinmill.inference.candidate import size_std
 from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.duties import refined
 from twinmill.inference.moments import Rate
@@ -70,7 +70,9 @@ class Prior:
         names: quantities of the base, P of them.
         mean, cov: (P + K,), (P + K, P + K).
         step, low, high: (P,) of finite differences, and bounds.
-        columns: (K, W, 3) of the discrepancy, m and rad.
+        columns: (K, W, C) of the discrepancy.
+        sheet: (P,) how much less well than others each is known from a data sheet alone; 0 where
+            no data sheet tells it.
     """
 
     names: list[str]
@@ -80,14 +82,14 @@ class Prior:
     low: np.ndarray
     high: np.ndarray
     columns: np.ndarray = field(repr=False)
+    sheet: np.ndarray
 
     @property
     def stale(self) -> np.ndarray:
         """(P + K, P + K) covariance of a base of which nothing is known but a data sheet."""
         cov = self.cov.copy()
-        for k, name in enumerate(self.names):
-            if name not in (CLOCK, CLOCK_RATE):
-                cov[k, k] += ((2 if name == LAG else 1) * PRIORS.sheet * self.mean[k]) ** 2
+        for k, share in enumerate(self.sheet):
+            cov[k, k] += (share * PRIORS.sheet * self.mean[k]) ** 2
         return cov
 
 
@@ -132,6 +134,7 @@ def base_prior(
         np.array([p.min for p in parts]),
         np.array([p.max for p in parts]),
         np.zeros((0, 0, 3)),
+        np.array([0 if n in (CLOCK, CLOCK_RATE) else 2 if n == LAG else 1 for n in names]),
     )
 
 

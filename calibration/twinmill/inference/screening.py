@@ -8,11 +8,11 @@ from itertools import combinations, product
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
-from twinmill.inference.candidates import Candidate
+from twinmill.inference.candidate import Candidate
 from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.problem import Steps
 from twinmill.inference.settings import PRIORS
-from twinmill.inference.steps import Steps
 from twinmill.model.parameters import WHERE_OR_WHEN, key_of, newest_instance
 
 CELL = 4  # reaches by which a place or a while is moved make a step of the grid, as ...

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinmill.inference.candidates import Candidate
+from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import CHANCE, SIZES
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis, next_of_kind

@@ -9,15 +9,14 @@ import numpy as np
 from scipy.special import logsumexp
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, FORMS, OF_FORM, SIZES, STEP, forms_of
+from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
-from twinmill.inference.problem import Problem, View
+from twinmill.inference.problem import Kinds, Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
 from twinmill.model.parameters import (
-    beginning_at_a_moment,
     catalogue_name,
     effect_names,
     with_role,
@@ -66,6 +65,7 @@ class Table:
         words: dependences that compete.
         swells: of sets in which several effects act from moments on, the kind of the one thing
             that they are steps of, where what they change together comes and goes once.
+        kinds: of effects.
     """
 
     entries: list[Entry]
@@ -74,6 +74,7 @@ class Table:
     candidates: tuple[str, ...]
     words: tuple[str, ...]
     swells: dict[tuple[str, ...], str]
+    kinds: Kinds
 
 
 def subsets(effects: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -126,13 +127,14 @@ def table_of(search: Search) -> Table:
         max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
         tuple(p.names),
         search.words,
-        {names: kind for names, h in fitted.items() if (kind := _swells(h))},
+        {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
+        p.kinds,
     )
 
 
-def _swells(h: Hypothesis) -> str | None:
+def _swells(h: Hypothesis, kinds: Kinds) -> str | None:
     """Kind of the one thing that several effects at moments are steps of; None if not of one."""
-    own = [n for n in h.effects if catalogue_name(n) in beginning_at_a_moment()]
+    own = [n for n in h.effects if catalogue_name(n) in kinds.at_moments]
     steps: list[tuple[float, float]] = []
     for name in own:
         kind, instance = catalogue_name(name), h.instance(name)
@@ -297,10 +299,11 @@ class _Comparison:
         """With what the formula of one effect misses at its likeliest size; none if it is exact."""
         linear, best = self._linear(beside), (0.0, beside)
         for change in self.changes:
-            for columns in forms_of(change, self.problem.motion):
+            forms = self.problem.forms(change)
+            for columns in forms:
                 white = self.view.fitter.whiten(columns)
                 gains, _ = gains_by_size(*linear.projected(white, white @ white.T), SIZES)
-                chance = np.log(OF_FORM / FORMS)
+                chance = np.log(OF_FORM / len(forms))
                 s = int(np.argmax(gains + chance))
                 gain = float(gains[s] + chance[s])
                 if gain > best[0]:
@@ -466,4 +469,4 @@ def _changes(p: Problem, h: Hypothesis) -> np.ndarray:
         model = h.model.copy()
         model.remove_effect(effect_names(model).index(h.instance(name)))
         found.append(p.steps.errors(model)[0] - p.steps.errors(h.model)[0])
-    return np.array(found).reshape(-1, len(p.steps), 3)
+    return np.array(found).reshape(-1, len(p.steps), len(p.steps.observed))

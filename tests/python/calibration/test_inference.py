@@ -19,7 +19,7 @@ from twinmill.fitting.fit import fit
 from twinmill.inference.always import always_of
 from twinmill.inference.infer import infer, infer_robots
 from twinmill.inference.kept import kept, with_kept
-from twinmill.inference.problem import problem_of
+from twinmill.inference.planar import problem_of
 from twinmill.inference.screening import nearby, screened
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile

@@ -24,6 +24,7 @@ from twinmill.inference.discrepancy import (
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise
+from twinmill.inference.planar import planar_kinds
 from twinmill.inference.posterior import beliefs
 from twinmill.inference.screening import _products, _products_of_whiles, gains_of_pairs
 from twinmill.inference.settings import PRIORS
@@ -201,7 +202,8 @@ OF_OTHERS = ("wheel_gain", "dead_zone", "motor_lag", "marker_offset", "floor_pat
 
 def table(entries, swells=()):
     """Of ten effects, four of which act with time."""
-    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"), dict(swells))
+    kinds = planar_kinds()
+    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"), dict(swells), kinds)
 
 
 def entry(effects, words, log_evidence, mimicked=None):

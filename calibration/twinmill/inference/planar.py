@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots that drive on a floor, ready for inference."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.data.measurement import Measurement
+from twinmill.inference import candidates, discrepancy, moments
+from twinmill.inference.candidate import Candidate
+from twinmill.inference.duties import refined
+from twinmill.inference.hypothesis import Fitter, Hypothesis
+from twinmill.inference.noise import Course, Noise, first_noise
+from twinmill.inference.prior import Always, Prior, base_prior, with_always
+from twinmill.inference.problem import Kinds, Problem, flexible_noise
+from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
+from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import CLOCK, LAG, beginning_at_a_moment, catalogue, is_local
+
+CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between two commands
+FINE_GRID_S = np.arange(-0.05, 0.0501, 0.002)  # about that, where logs are set side by side
+CLOCK_REACH_S = 0.3  # about the best of the grid
+NO_LAG_S = 1e-3
+TOLD_BY = {  # what a thing depends on that is mistaken for an effect, by what its card needs
+    "steady_speed": ("speed", "coupling of turns"),
+    "poses": ("coupling of turns",),
+    "changes": ("past",),
+    "clocks": ("past", "time"),
+    "history": ("time", "moments"),
+    "battery": ("time",),
+    "room": ("place", "heading"),
+    "heading": ("heading",),
+    "wheel_angle": ("past", "place", "time"),
+}
+
+
+@dataclass(frozen=True)
+class PlanarProblem(Problem):
+    """A robot that drives on a floor, in one log or several.
+
+    Attributes:
+        motion: as the base predicts it.
+    """
+
+    steps: Steps
+    motion: Motion
+
+    def candidate(self, name: str, model: native.Model) -> Candidate:
+        """What an effect of the twin's catalogue would change beside a model."""
+        return candidates.candidate(name, model, self.steps)
+
+    def forms(self, change: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What an effect's formula may miss, by speed, time, place and heading."""
+        return discrepancy.forms_of(change, self.motion)
+
+    def of_moments(self) -> np.ndarray:
+        """Gains of travel and turning, and two pushes, up to each of the bins."""
+        return moments.columns(self.motion)
+
+
+def planar_kinds() -> Kinds:
+    """Of the twin's catalogue."""
+    return Kinds(
+        {
+            name: TOLD_BY[card["needs"]]
+            for name, card in catalogue().items()
+            if card["needs"] in TOLD_BY  # others show only to cameras
+        },
+        frozenset(filter(is_local, catalogue())),
+        frozenset(beginning_at_a_moment()),
+    )
+
+
+def problem_of(
+    measurements: Sequence[Measurement],
+    model_file: ModelFile,
+    always: Always | None = None,
+    sheet: bool = False,
+) -> PlanarProblem:
+    """Prepares the logs of a robot.
+
+    Args:
+        measurements: of one robot, one for each log.
+        model_file: its base model.
+        always: what the model misses in the log that it was fitted to.
+        sheet: nothing of the base is known but a data sheet.
+    """
+    measurements = [m.punctual() for m in measurements]
+    whole = model_file.model
+    if whole.drive == "duty":
+        whole = refined(model_file).model
+    model = whole.for_robot(measurements[0].track.robot_id)
+    bare = model.copy()
+    for name in always.effects if always else ():
+        model.add_effect(name)
+    known = model.clock_known and not any(
+        m.log_sha256 in model_file.clock_logs for m in measurements
+    )
+    one_clock = all(m.same_clock for m in measurements)
+    if one_clock and not known:
+        model.set(CLOCK, 0.0)
+    declared = one_clock or model.clock_same
+    same_clock = (known or declared) and all(m.lateness is None for m in measurements)
+    logs = [StepsOfLog(m) for m in measurements]
+    prior = base_prior(
+        model,
+        model_file,
+        same_clock=same_clock,
+        known=known,
+        effects=always.effects if always else (),
+    )
+    if sheet:
+        prior = replace(prior, cov=prior.stale)
+    if not same_clock:
+        prior, logs = _with_clock(prior, model, logs)
+    steps = Steps(logs)
+    if always is not None:
+        _set_to(model, prior, always)
+    bare.set(CLOCK, model.get(CLOCK))
+    motion = _motion(steps, bare, always)  # as in its own log: weights belong to these columns
+    found = discrepancy.kernels(motion)
+    if always is not None:
+        prior = with_always(prior, always, found)
+    noise = _begin_noise(steps, motion, model_file, always)
+    base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
+    names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
+    rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
+    wander = {w: discrepancy.in_another_log(p) for w, p in always.wander.items()} if always else {}
+    rough = PlanarProblem(
+        steps, prior, base, found, names, rate, noise, noise, wander, planar_kinds(), motion
+    )
+    noise = flexible_noise(rough)
+    base = Fitter(steps, noise, prior.columns).fit(base)
+    return replace(rough, noise=noise, base=base)
+
+
+def _set_to(model: native.Model, prior: Prior, always: Always) -> None:
+    """Sets a model to the numbers that the base's own log gave, but for its clock."""
+    known = dict(zip(always.labels, always.mean, strict=True))
+    for name, low, high in zip(prior.names, prior.low, prior.high, strict=True):
+        if name in known and not name.startswith("clock."):
+            model.set(name, float(np.clip(known[name], low, high)))
+
+
+def _with_clock(
+    prior: Prior, model: native.Model, logs: list[StepsOfLog]
+) -> tuple[Prior, list[StepsOfLog]]:
+    """The prior about the offset of the first log's clocks, and each log with its own beside it."""
+    each = [_least_s(model, log, CLOCK_GRID_S + model.get(CLOCK)) for log in logs]
+    best = each[0]
+    if len(logs) > 1:
+        each = [_least_s(model, log, at + FINE_GRID_S) for log, at in zip(logs, each, strict=True)]
+        best = each[0]
+        logs = [StepsOfLog(log.measurement, at - best) for log, at in zip(logs, each, strict=True)]
+    k = prior.names.index(CLOCK)
+    mean, low, high = prior.mean.copy(), prior.low.copy(), prior.high.copy()
+    mean[k], low[k], high[k] = best, best - CLOCK_REACH_S, best + CLOCK_REACH_S
+    model.set(CLOCK, best)
+    return replace(prior, mean=mean, low=low, high=high), logs
+
+
+def _least_s(model: native.Model, log: StepsOfLog, grid_s: np.ndarray) -> float:
+    """Offset of the clocks at which the errors of a log are least."""
+    errors = log.errors(model, [CLOCK], grid_s[:, None])
+    size = np.sqrt((errors**2).mean(axis=(0, 1)))
+    size = np.where(size > 0, size, 1.0)
+    return float(grid_s[np.argmin(((errors / size) ** 2).sum(axis=(1, 2)))])
+
+
+def _motion(steps: Steps, model: native.Model, always: Always | None) -> Motion:
+    moved = steps.predicted(model)
+    instant = moved
+    if model.get(LAG) > 0:
+        quick = model.copy()
+        quick.set(LAG, NO_LAG_S)
+        instant = steps.predicted(quick)
+    return motion_of(steps, moved, instant, (always.usual, always.top) if always else None)
+
+
+def _begin_noise(
+    steps: Steps, motion: Motion, model_file: ModelFile, always: Always | None
+) -> Noise:
+    course = Course(float(np.median(steps.step_s)), steps.stretches, motion.pace)
+    if always is not None:
+        return Noise(*always.noise, course)
+    return first_noise(course, model_file.recorded_noise)

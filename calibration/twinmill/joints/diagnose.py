@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an MJCF lacks, from a log: the answer, with the effects' cards."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from twinmill.data.lcm_log import LogError
+from twinmill.inference.answer import Answer, answer
+from twinmill.inference.search import Evidence, Search
+from twinmill.inference.settings import PRIORS
+from twinmill.inference.table import table_of
+from twinmill.joints.log import JointLog, read_joint_log
+from twinmill.joints.mjcf import Mjcf
+from twinmill.joints.plant import Plant
+from twinmill.joints.problem import JointProblem, problem_of
+from twinmill.joints.series import Series, series_of
+
+TOO_FAR = 1.05  # times a joint's range, in which a position is the range's own softness
+
+
+@dataclass(frozen=True)
+class JointDiagnosis:
+    """What a log says of an MJCF.
+
+    Attributes:
+        answer: verdict, effects and dependences with their probabilities.
+        problem: that was solved.
+        fitted: sets of effects that were fitted.
+        warnings: what is odd about the log, in sentences.
+    """
+
+    answer: Answer
+    problem: JointProblem
+    fitted: Mapping[tuple[str, ...], Evidence]
+    warnings: tuple[str, ...]
+
+    @property
+    def mjcf(self) -> Mjcf:
+        """The model that was judged."""
+        return self.problem.plant.mjcf
+
+    def to_json(self) -> dict[str, Any]:
+        """Fields of `twinmill diagnose --json` of an MJCF."""
+        told = self.answer.to_json()
+        for finding in told["findings"]:
+            card = self.problem.effects[finding["effect"]]
+            units = {n.key: n.unit for n in card.parameters}
+            finding |= {"summary": card.summary, "equation": card.equation, "in_mjcf": card.written}
+            for p in finding["parameters"]:
+                p["unit"] = units[p["name"]]
+        return {
+            **told,
+            "log": self.problem.plant.series.log.name,
+            "joints": list(self.mjcf.joints),
+            "actuators": list(self.mjcf.actuators),
+            "warnings": list(self.warnings),
+            "settings": {name: value for name, value, _ in PRIORS.listed()},
+        }
+
+
+def diagnose_joints(
+    log: JointLog | Path | str,
+    model: Mjcf | Path | str,
+    progress: Callable[[str], None] = lambda _: None,
+) -> JointDiagnosis:
+    """Probabilities of what an MJCF lacks, from a log of its joints and commands.
+
+    Args:
+        log: arrays, or a file of them.
+        model: opened, or its path.
+        progress: told in words what is being done.
+
+    Raises:
+        LogError: the log does not fit the model, or cannot be read.
+        ModelError: the model cannot be loaded, or is of a kind that is not judged.
+    """
+    mjcf = model if isinstance(model, Mjcf) else Mjcf.load(model)
+    plant, warnings = plant_of(log, mjcf)
+    progress("what the model predicts")
+    problem = problem_of(plant)
+    search = Search(problem, progress).run()
+    return JointDiagnosis(answer(table_of(search)), problem, search.fitted, warnings)
+
+
+def plant_of(log: JointLog | Path | str, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
+    """MuJoCo at the states of a log, and what is odd about the log."""
+    log = log if isinstance(log, JointLog) else read_joint_log(Path(log))
+    log = log.ordered(mjcf.joints, mjcf.actuators)
+    _check_units(log, mjcf)
+    series = series_of(log)
+    return Plant(mjcf, series), (*_warnings(log, mjcf), *_of_speeds(log, series, mjcf))
+
+
+def _check_units(log: JointLog, mjcf: Mjcf) -> None:
+    """Raises LogError where hinges are in degrees: beyond their ranges, which degrees would fit."""
+    model = mjcf.model
+    for d, name in enumerate(mjcf.joints):
+        if mjcf.units[d] != "rad" or not model.jnt_limited[d]:
+            continue
+        middle, half = model.jnt_range[d].mean(), TOO_FAR * np.ptp(model.jnt_range[d]) / 2
+        far = np.abs(log.qpos[:, d] - middle).max()
+        if far > half and np.abs(np.radians(log.qpos[:, d]) - middle).max() <= half and far > np.pi:
+            raise LogError(
+                f"{log.name}: joint '{name}' reaches {np.abs(log.qpos[:, d]).max():.4g}, beyond "
+                f"its range of {model.jnt_range[d][0]:.3g} to {model.jnt_range[d][1]:.3g} rad: "
+                "these are degrees; give radians."
+            )
+
+
+def _warnings(log: JointLog, mjcf: Mjcf) -> list[str]:
+    model, found = mjcf.model, []
+    for d, name in enumerate(mjcf.joints):
+        low, high = model.jnt_range[d]
+        over = ((log.qpos[:, d] < low) | (log.qpos[:, d] > high)).mean()
+        if model.jnt_limited[d] and over > 0:
+            found.append(
+                f"joint '{name}' is beyond its range of {low:.4g} to {high:.4g} "
+                f"{mjcf.units[d]} in {100 * over:.2g} % of the samples; is its zero the model's?"
+            )
+    for a, name in enumerate(mjcf.actuators):
+        low, high = model.actuator_ctrlrange[a]
+        over = ((log.ctrl[:, a] < low) | (log.ctrl[:, a] > high)).mean()
+        if model.actuator_ctrllimited[a] and over > 0:
+            found.append(
+                f"commands to '{name}' are beyond its ctrlrange of {low:.4g} to {high:.4g} in "
+                f"{100 * over:.2g} % of the samples; MuJoCo clips them."
+            )
+    if len(log.stretches) > 1:
+        found.append(f"{len(log.stretches) - 1} gaps; steps across them are left out.")
+    return found
+
+
+def _of_speeds(log: JointLog, series: Series, mjcf: Mjcf) -> list[str]:
+    """Says which velocities of the robot are not those of its positions."""
+    if log.qvel is None:
+        return []
+    found = []
+    for d, name in enumerate(mjcf.joints):
+        told = np.interp(series.t_s, log.t_s, log.qvel[:, d])
+        factor = float(told @ series.v[:, d] / max(series.v[:, d] @ series.v[:, d], 1e-300))
+        if not 0.8 < factor < 1.25:
+            found.append(
+                f"qvel of '{name}' is {factor:.3g} times the slope of its positions; it is not "
+                "used."
+            )
+    return found

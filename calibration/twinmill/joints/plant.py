@@ -1,0 +1,338 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What stock MuJoCo predicts of a log's steps, from the states that were measured.
+
+A candidate changes MuJoCo's own numbers, a command, a measured state, or adds a force. Errors are
+changes of momentum, so that a friction of one joint shows in its channel alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from scipy.signal import lfilter
+
+from twinmill.joints.mjcf import Mjcf
+from twinmill.joints.series import Series
+from twinmill.model.parameters import effect_names, instance_of, key_of
+
+CLOCK = "clock.offset_s"  # by which positions are stamped later than commands
+STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+INPUT = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+NEUTRAL = {CLOCK: 0.0}  # numbers of the base that are no factors
+SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
+SLOW = 0.02  # of a joint's usual speed, below which its direction is soft
+CLOCK_NUDGE_S = 1e-3
+KEPT = 200  # predictions that are kept, since searches ask for them again
+HELD = 0.98  # share of a push that a joint takes, below which friction holds it
+NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether it gives way
+
+
+@dataclass
+class Action:
+    """What is put into MuJoCo, for effects to change.
+
+    Attributes:
+        series: of the log.
+        usual: forces and velocities of the base, see `Usual`; None while these are looked for.
+        model: MuJoCo's.
+        q, v: (n, J) measured states.
+        late_s, lag_s: (U,) of commands.
+        shapes: actuator, and what becomes of its command (n,), in turn.
+        force: (n, J) forces of effects.
+    """
+
+    series: Series
+    usual: "Usual | None"
+    model: Any
+    q: np.ndarray
+    v: np.ndarray
+    late_s: np.ndarray
+    lag_s: np.ndarray
+    shapes: list[tuple[int, Any]]
+    force: np.ndarray
+
+    def commands(self) -> np.ndarray:
+        """(n, U) commands once they are late, slow and shaped."""
+        ctrl = self.series.commands(self.late_s)
+        for a, lag_s in enumerate(self.lag_s):
+            if lag_s > 0:
+                ctrl[:, a] = _lagged(ctrl[:, a], lag_s, self.series.width_s[0])
+        for a, shape in self.shapes:
+            ctrl[:, a] = shape(ctrl[:, a])
+        return ctrl
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What the base does in a log.
+
+    Attributes:
+        torque: (n, J) forces of its actuators.
+        load: (J,) root mean square of the force on each joint.
+        speed, reach: (J,) root mean square velocity, and range of positions.
+        command: (U,) root mean square command, about a servo's position.
+        gives: (n, J) momentum that a joint takes from a small force: 0 where friction holds it.
+        slides: (W, J) 1 for steps in which a joint neither turns back nor is held by friction; 0
+            for others, which say nothing: friction is anything up to its limit there.
+    """
+
+    torque: np.ndarray
+    load: np.ndarray
+    speed: np.ndarray
+    reach: np.ndarray
+    command: np.ndarray
+    gives: np.ndarray
+    slides: np.ndarray
+
+    def sign(self, v: np.ndarray, d: int) -> np.ndarray:
+        """(n,) direction of a joint's motion, soft near standstill."""
+        return np.tanh(v[:, d] / (SLOW * self.speed[d]))
+
+
+class JointModel:
+    """Numbers of an MJCF and of effects beside it, by name: `base.damping@elbow`, `clock.offset_s`.
+
+    Attributes:
+        effects: names of effects, in the order in which they were added.
+    """
+
+    def __init__(self, catalogue: Mapping[str, Any], numbers: dict[str, float]) -> None:
+        self.catalogue, self.effects = catalogue, list[str]()
+        self._numbers = dict(numbers)
+
+    def copy(self) -> "JointModel":
+        """Another one that may be changed."""
+        other = JointModel(self.catalogue, self._numbers)
+        other.effects = list(self.effects)
+        return other
+
+    def add_effect(self, name: str) -> None:
+        """Adds one of the catalogue at its default."""
+        self.effects.append(name)
+        instance = effect_names(self)[-1]  # type: ignore[arg-type]
+        for p in self.catalogue[name].parameters:
+            self._numbers[f"{instance}.{p.key}"] = p.value
+
+    def remove_effect(self, index: int) -> None:
+        """Takes the effect at that place out."""
+        name = self.effects.pop(index)
+        for p in self.catalogue[name].parameters:
+            del self._numbers[f"{name}.{p.key}"]
+
+    def get(self, name: str) -> float:
+        """One number."""
+        return self._numbers[name]
+
+    def set(self, name: str, value: float) -> None:
+        """Changes one number."""
+        self._numbers[name] = value
+
+    def own(self, instance: str, other: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Numbers of an effect, those of another mapping in their place."""
+        every = {**self._numbers, **(other or {})}
+        return {n: v for n, v in every.items() if instance_of(n) == instance}
+
+
+@dataclass(frozen=True)
+class Plant:
+    """MuJoCo at the states of a log.
+
+    Attributes:
+        mjcf: the model.
+        series: of the log.
+    """
+
+    mjcf: Mjcf
+    series: Series
+
+    def begin(self, usual: Usual | None = None) -> Action:
+        """The base as it stands."""
+        return Action(
+            self.series,
+            usual,
+            copy(self.mjcf.model),
+            self.series.q.copy(),
+            self.series.v.copy(),
+            self.mjcf.delay_s.copy(),
+            self.mjcf.lag_s.copy(),
+            [],
+            np.zeros_like(self.series.q),
+        )
+
+    def accelerations(self, action: Action) -> np.ndarray:
+        """(n, J) at each state, by one step of MuJoCo."""
+        n, data = len(action.q), mujoco.MjData(action.model)
+        mujoco.mj_setConst(action.model, data)  # what depends on masses
+        state = np.zeros((n, mujoco.mj_stateSize(action.model, STATE)))
+        count = self.mjcf.model.nv
+        state[:, 1 : 1 + count], state[:, 1 + count : 1 + 2 * count] = action.q, action.v
+        given = np.concatenate([action.commands(), action.force], axis=1)[:, None]
+        after, _ = rollout.rollout(action.model, data, state, given, control_spec=INPUT, nstep=1)
+        gained = after[:, 0, 1 + count : 1 + 2 * count] - action.v
+        return gained / float(action.model.opt.timestep)
+
+    def momenta(self, accelerations: np.ndarray) -> np.ndarray:
+        """(W, J) momentum of each joint that is measured, less that of these accelerations."""
+        error = self.series.changes - self.series.weights @ accelerations
+        return np.einsum("wij,wj->wi", self.inertia, error)
+
+    def momentum_of(self, force: np.ndarray) -> np.ndarray:
+        """(W, J) that forces (n, J) add, where friction lets the joints slide."""
+        return (self.series.weights @ (force * self.usual.gives)) * self.usual.slides
+
+    @cached_property
+    def inertia(self) -> np.ndarray:
+        """(W, J, J) in the middle of each step."""
+        model, data = self.mjcf.model, mujoco.MjData(self.mjcf.model)
+        full = np.zeros((model.nv, model.nv))
+        out = np.empty((len(self.series.at), model.nv, model.nv))
+        for w, k in enumerate(self.series.at):
+            data.qpos[:] = self.series.q[k]
+            mujoco.mj_fwdPosition(model, data)
+            mujoco.mj_fullM(model, data, full)
+            out[w] = full
+        return out
+
+    @cached_property
+    def usual(self) -> Usual:
+        """What the base does, from one look at each state."""
+        action, s = self.begin(), self.series
+        model, data, ctrl = action.model, mujoco.MjData(action.model), action.commands()
+        torque, inertial = np.empty_like(s.q), np.empty_like(s.q)
+        for k in range(len(s.q)):
+            data.qpos[:], data.qvel[:], data.ctrl[:] = s.q[k], s.v[k], ctrl[k]
+            mujoco.mj_forward(model, data)
+            torque[k] = data.qfrc_actuator
+            inertial[k] = data.qfrc_bias
+        load = np.sqrt((torque**2).mean(axis=0))
+        load = np.where(load > 0, load, np.sqrt((inertial**2).mean(axis=0)))
+        lead = ctrl - np.where(self.mjcf.servo, s.q[:, self.mjcf.moves], 0.0)
+        speed = np.sqrt((s.v**2).mean(axis=0))
+        return Usual(
+            torque,
+            np.maximum(load, 1e-9),
+            np.maximum(speed, 1e-9),
+            np.maximum(np.ptp(s.q, axis=0), 1e-9),
+            np.maximum(np.sqrt((lead**2).mean(axis=0)), 1e-9),
+            gives := self._gives(load),
+            (abs(s.weights) @ ((gives < HELD) | _turns(s.v)) == 0).astype(float),
+        )
+
+    def _gives(self, load: np.ndarray) -> np.ndarray:
+        """(n, J) by two pushes of each joint."""
+        out = np.empty_like(self.series.q)
+        for d, nudge in enumerate(NUDGE * np.maximum(load, 1e-9)):
+            each = []
+            for sign in (1, -1):
+                action = self.begin()
+                action.force[:, d] = sign * nudge
+                each.append(self.accelerations(action)[:, d])
+            out[:, d] = (each[0] - each[1]) / (2 * nudge)
+        share = out / np.maximum(out.max(axis=0), 1e-300)
+        soft = 1 - self.mjcf.model.dof_solimp[:, 0]  # what MuJoCo's friction lets through
+        return np.clip((share - soft) / (1 - soft), 0.0, 1.0)
+
+
+class Steps:
+    """Errors of a log's steps, as `twinmill.inference` asks for them; see its protocol.
+
+    What is linear in a number (all of the base's, most effects) is predicted by MuJoCo once, and
+    forces are added as such: MuJoCo runs again for delays, lags, limits, gains, inertias and zeros.
+
+    Attributes:
+        plant: MuJoCo at the states of the log.
+        block: (W,) number of the block of time.
+        observed: (J,) all joints are.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant = plant
+        self.block = plant.series.block
+        self.observed = np.ones(plant.series.q.shape[1], bool)
+        self._columns: dict[str, np.ndarray] = {}
+        self._known: dict[tuple[Any, ...], np.ndarray] = {}
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    def errors(
+        self, model: JointModel, names: Sequence[str] = (), values: Any = None
+    ) -> np.ndarray:
+        """(B, W, J) momentum measured less predicted, for B rows of values of named numbers."""
+        rows = np.zeros((1, 0)) if values is None else np.atleast_2d(values)
+        return np.array(
+            [self._errors(model, dict(zip(names, map(float, row), strict=True))) for row in rows]
+        )
+
+    def _errors(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
+        found, forces = np.zeros((1, 1)), self.plant.begin(self.plant.usual)
+        exact = []
+        for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
+            if instance_of(name) in ("base", "clock"):
+                found = found + (value - NEUTRAL.get(name, 1.0)) * self._column(model, name)
+        for instance in effect_names(model):  # type: ignore[arg-type]
+            kind = instance.split("#")[0]
+            own, effect = model.own(instance, other), model.catalogue[kind]
+            if effect.changes == "force":
+                effect.act(forces, {key_of(n): v for n, v in own.items()})
+            elif effect.changes == "linear":
+                for n, value in own.items():
+                    found = found + value * self._column(model, f"{kind}.{key_of(n)}")
+            else:
+                exact.append((kind, tuple((key_of(n), v) for n, v in own.items())))
+        found = found + self._exactly(model.catalogue, tuple(exact))
+        if forces.force.any():
+            found = found - self.plant.momentum_of(forces.force)
+        return np.asarray(found)
+
+    def _exactly(self, catalogue: Mapping[str, Any], effects: tuple[Any, ...]) -> np.ndarray:
+        """(W, J) errors of the base with some effects."""
+        if effects not in self._known:
+            if len(self._known) >= KEPT:
+                self._known.pop(next(iter(self._known)))
+            action = self.plant.begin(self.plant.usual)
+            for kind, own in effects:
+                catalogue[kind].act(action, dict(own))
+            self._known[effects] = self._run(action)
+        return self._known[effects]
+
+    def _column(self, model: JointModel, name: str) -> np.ndarray:
+        """(W, J) change of the errors by a number, over the number."""
+        if name not in self._columns:
+            action, nudge = self.plant.begin(self.plant.usual), CLOCK_NUDGE_S
+            if name == CLOCK:
+                action.late_s += nudge
+            elif instance_of(name) == "base":
+                nudge = SMALL
+                model.catalogue[name].act(action, {"value": 1 + nudge})
+            else:
+                card = model.catalogue[instance_of(name)]
+                (nudge,) = [SMALL * p.value for p in card.parameters if p.key == key_of(name)]
+                none = {p.key: 0.0 for p in card.parameters}
+                card.act(action, {**none, key_of(name): nudge})
+            change = self._run(action) - self._exactly(model.catalogue, ())
+            self._columns[name] = change / nudge
+        return self._columns[name]
+
+    def _run(self, action: Action) -> np.ndarray:
+        return self.plant.momenta(self.plant.accelerations(action)) * self.plant.usual.slides
+
+
+def _turns(v: np.ndarray) -> np.ndarray:
+    """(n, J) True of states between which and a neighbour a velocity changes its sign."""
+    change = np.diff(np.sign(v), axis=0) != 0
+    none = np.zeros((1, v.shape[1]), bool)
+    return np.asarray(np.concatenate([change, none]) | np.concatenate([none, change]))
+
+
+def _lagged(u: np.ndarray, lag_s: float, step_s: float) -> np.ndarray:
+    """Mean of a first-order lag's output over each of equal times, its input constant in each."""
+    kept = np.exp(-step_s / lag_s)
+    end, _ = lfilter([1 - kept], [1, -kept], u, zi=[kept * u[0]])
+    before = np.r_[u[0], end[:-1]]
+    return np.asarray(u + (before - u) * (lag_s / step_s) * (1 - kept))

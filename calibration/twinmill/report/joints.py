@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an MJCF lacks, as sentences and tables."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from twinmill.joints.compare import WINDOW_S, JointComparison
+from twinmill.joints.diagnose import JointDiagnosis
+from twinmill.joints.explain import JointExplanation
+from twinmill.report import show
+from twinmill.report.inference import percent, sentence
+from twinmill.report.tables import Cell, Table, number
+
+SHOWN = 0.05  # probability of an effect that is listed; --json has all
+
+
+def diagnosis(found: JointDiagnosis) -> RenderableType:
+    """Text of `twinmill diagnose` of an MJCF."""
+    answer = found.answer
+    parts: list[RenderableType] = [Text(sentence(answer))]
+    if answer.findings:
+        parts += [Text(), show.table(_effects(found))]
+    named = {f.effect for f in answer.findings}
+    rest = {n: p for n, p in answer.effects.items() if n not in named and p >= SHOWN}
+    if rest:
+        rows = [[Cell(name), Cell(percent(p), bar=p)] for name, p in rest.items()]
+        parts += [show.table(Table("Not ruled out", ["effect", "probability"], rows))]
+    if answer.depends_on:
+        rows = [[Cell(word), Cell(percent(p), bar=p)] for word, p in answer.depends_on.items()]
+        note = f"The first explains {percent(answer.share)} of the squared error above the noise."
+        parts += [
+            show.table(Table("The residual depends on", ["", "probability"], rows, note=note))
+        ]
+    return Group(*parts)
+
+
+def explanation(found: JointExplanation, written: Mapping[str, str]) -> RenderableType:
+    """Text of `twinmill explain` of an MJCF.
+
+    Args:
+        found: what was added.
+        written: files, by what they are.
+    """
+    effects = found.diagnosis.problem.effects
+    lines = [
+        f"Added {n.effect} in {'the MJCF' if effects[n.effect].written else 'the hook'}, "
+        "with the numbers of the model fitted beside it."
+        for n in found.added
+    ]
+    lines += [f"Left out {n.effect}: neither an MJCF nor a force holds it." for n in found.left_out]
+    lines += [f"Written: {path}" for path in written.values()]
+    if not written:
+        lines.append("Not written: nothing that a model can hold is likelier missing than not.")
+    return Group(diagnosis(found.diagnosis), Text(), *map(Text, lines))
+
+
+def comparison(found: JointComparison, hook: Path | None) -> RenderableType:
+    """Text of `twinmill compare` of an MJCF."""
+    rows = [
+        [Cell(joint), Cell(number(window)), Cell(number(free)), Cell(unit)]
+        for joint, window, free, unit in zip(
+            found.joints,
+            found.window_rms.tolist(),
+            found.free_rms.tolist(),
+            found.units,
+            strict=True,
+        )
+    ]
+    columns = ["joint", f"windows of {WINDOW_S:g} s", "free run", "unit"]
+    note = f"With the forces of {hook}." if hook else ""
+    return show.table(Table("RMS errors of positions", columns, rows, note=note))
+
+
+def _effects(found: JointDiagnosis) -> Table:
+    rows = []
+    for f in found.answer.findings:
+        card = found.problem.effects[f.effect]
+        units = {n.key: n.unit for n in card.parameters}
+        for k, (name, (value, std)) in enumerate(f.numbers.items()):
+            rows.append(
+                [
+                    Cell("" if k else f.effect),
+                    Cell("" if k else percent(f.probability), bar=None if k else f.probability),
+                    Cell(name),
+                    Cell(number(value)),
+                    Cell(f"± {number(std, 2)} {units[name]}"),
+                    Cell("" if k else card.summary),
+                ]
+            )
+    columns = ["effect", "probability", "number", "value", "std", "what it is"]
+    return Table("Missing effects", columns, rows, words=(0, 2, 5))

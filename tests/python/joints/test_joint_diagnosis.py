@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an MJCF lacks is named, written so that stock MuJoCo has it, and told on a real machine.
+
+The simulated slide is run by `mj_step` with what is planted in its XML or set as a force, by none
+of the code that judges it.
+"""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.io import loadmat
+from threadpoolctl import threadpool_limits
+
+from twinmill import JointLog, compare_joints, diagnose_joints, explain_joints
+from twinmill.joints.diagnose import plant_of
+from twinmill.joints.effects import effects_of
+from twinmill.joints.explain import edits
+from twinmill.joints.mjcf import Mjcf
+from twinmill_cli.main import run
+
+SLIDE = """<mujoco model="slide">
+  <option timestep="0.002"/>
+  <worldbody>
+    <!-- a carriage on a guide -->
+    <body name="carriage">
+      <joint name="x" type="slide" axis="1 0 0" damping="{damping}" frictionloss="3"/>
+      <geom type="box" size=".1 .1 .1" mass="5"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="drive" joint="x" {motor}/>
+  </actuator>
+</mujoco>
+"""
+EMPS = Path(__file__).resolve().parents[4] / "shared/data/emps"
+CARRIAGE = """<mujoco model="emps">
+  <option timestep="0.001"/>
+  <worldbody>
+    <body name="carriage">
+      <joint name="x" type="slide" axis="1 0 0" damping="200" frictionloss="20"/>
+      <geom type="box" size=".1 .1 .1" mass="95"/>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="drive" joint="x"/>
+  </actuator>
+</mujoco>
+"""
+PERIOD_S, DURATION_S = 0.004, 16.0
+
+
+def simulated(damping=10, motor="", push=lambda v: 0.0, seed=1):
+    """A log of a controlled slide, its encoder with 20 um of noise."""
+    model = mujoco.MjModel.from_xml_string(SLIDE.format(damping=damping, motor=motor))
+    data, random = mujoco.MjData(model), np.random.default_rng(seed)
+    t_s = np.arange(0, DURATION_S, PERIOD_S)
+    knots = np.arange(0, DURATION_S + 2, 0.8)
+    wanted = np.interp(t_s, knots, random.uniform(-0.3, 0.3, len(knots)))
+    qpos, ctrl = np.zeros(len(t_s)), np.zeros(len(t_s))
+    data.qpos[0] = wanted[0]
+    for k in range(len(t_s)):
+        qpos[k] = data.qpos[0] + 2e-5 * random.standard_normal()
+        data.ctrl[0] = ctrl[k] = 600 * (wanted[k] - data.qpos[0]) - 60 * data.qvel[0]
+        for _ in range(2):
+            data.qfrc_applied[0] = push(data.qvel[0])
+            mujoco.mj_step(model, data)
+    return JointLog(t_s, ctrl, qpos)
+
+
+@pytest.fixture
+def slide(tmp_path):
+    path = tmp_path / "slide.xml"
+    path.write_text(SLIDE.format(damping=10, motor=""))
+    return path
+
+
+def judged(log, model):
+    with threadpool_limits(1, "blas"):
+        return diagnose_joints(log, model)
+
+
+def test_no_alarm_where_nothing_is_missing(slide):
+    found = judged(simulated(), slide).answer
+    assert found.verdict in ("model_adequate", "cannot_tell")
+    assert not found.findings
+
+
+def test_friction_one_way_is_named_by_a_force_of_another_formula(slide):
+    """12 N s/m more, forward alone: half of the difference is 6."""
+    found = judged(simulated(push=lambda v: -12 * v if v > 0 else 0.0), slide).answer
+    first = found.findings[0]
+    assert first.effect == "viscous_friction_by_direction@x"
+    value, std = first.numbers["half_difference"]
+    assert abs(value - 6) < 3 * std
+
+
+def test_the_written_mjcf_has_what_was_found_and_nothing_else_changed(slide, tmp_path):
+    """10 N s/m become 25; the text differs in that joint's line, and stock MuJoCo reads it."""
+    log = simulated(damping=25)
+    with threadpool_limits(1, "blas"):
+        found = explain_joints(log, slide)
+    assert [n.effect for n in found.added] == ["viscous_friction@x"] and not found.hook
+    before, after = slide.read_text().splitlines(), found.text.splitlines()
+    changed = [a for b, a in zip(before, after, strict=True) if a != b]
+    assert any('name="x"' in line for line in changed)
+    assert all('name="x"' in line or 'name="drive"' in line for line in changed)
+    better = tmp_path / "better.xml"
+    better.write_text(found.text)
+    assert mujoco.MjModel.from_xml_path(str(better)).dof_damping[0] == pytest.approx(25, rel=0.1)
+    worse, now = (compare_joints(log, m).window_rms[0] for m in (slide, better))
+    assert now < worse / 3
+
+
+def test_each_effect_that_an_mjcf_holds_reads_back_as_it_was_written(slide):
+    """Numbers of the compiled text against those of the model that was changed in memory."""
+    mjcf = Mjcf.load(slide)
+    plant, _ = plant_of(simulated(), mjcf)
+    tried = 0
+    for effect in effects_of(plant).values():
+        if not effect.written:
+            continue
+        action = plant.begin(plant.usual)
+        values = {n.key: n.value for n in effect.parameters}
+        effect.write(action, values)
+        changed = edits(mjcf, action)
+        assert changed, effect.name
+        text = mjcf.edited(changed)
+        path = slide.with_name("written.xml")
+        path.write_text(text)
+        read, wanted = Mjcf.load(path), action.model
+        for array in (
+            *("dof_frictionloss", "dof_damping", "dof_dampingpoly", "dof_armature", "qpos0"),
+            *("jnt_stiffness", "body_mass", "actuator_forcerange"),
+        ):
+            got = getattr(read.model, array)
+            assert np.allclose(got, getattr(wanted, array), rtol=1e-5, atol=1e-9), effect.name
+        gains = [
+            np.array([m.actuator_gear[0, 0] * m.actuator_gainprm[0, 0], *m.actuator_biasprm[0, :3]])
+            for m in (read.model, wanted)
+        ]
+        assert np.allclose(*gains, rtol=1e-5), effect.name
+        assert np.allclose(read.delay_s, action.late_s) and np.allclose(read.lag_s, action.lag_s)
+        tried += 1
+    assert tried >= 10
+
+
+def test_the_commands_name_write_and_compare(slide, tmp_path, capsys):
+    path, better = tmp_path / "run.npz", tmp_path / "better.xml"
+    simulated(damping=25).saved(path)
+    run(["explain", str(path), "--model", str(slide), "-o", str(better), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert told["findings"][0]["effect"] == "viscous_friction@x"
+    assert told["output"] == str(better) and told["hook"] is None
+    run(["compare", str(path), "--model", str(better), "--json"])
+    (joint,) = json.loads(capsys.readouterr().out)["joints"]
+    assert joint["joint"] == "x" and joint["window_rms"] < 1e-3
+
+
+@cache
+def emps(name):
+    if not (EMPS / f"{name}.mat").exists():
+        pytest.skip(f"the public recording {name} is not in ../shared/data/emps")
+    held = loadmat(EMPS / f"{name}.mat")
+    force = float(held["gtau"].item()) * held["vir"]
+    return JointLog(held["t"].ravel(), force, held["qm"], name=name)
+
+
+def test_a_drive_whose_friction_differs_by_direction_is_named_from_its_training_record(tmp_path):
+    """Published: about 160 N s/m forward and 245 back; half of the difference is -42."""
+    path = tmp_path / "emps.xml"
+    path.write_text(CARRIAGE)
+    found = judged(emps("DATA_EMPS"), path).answer
+    first = found.findings[0]
+    assert first.effect == "viscous_friction_by_direction@x"
+    assert first.probability > 0.8
+    value, _ = first.numbers["half_difference"]
+    assert value == pytest.approx(-42, abs=10)

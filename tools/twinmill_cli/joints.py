@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`diagnose`, `explain` and `compare` of a model in MJCF: robots of joints in stock MuJoCo."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from twinmill.data.lcm_log import LogError
+from twinmill.files import check_new_file, replacing
+from twinmill.joints.compare import JointComparison, compare_joints
+from twinmill.joints.diagnose import JointDiagnosis, diagnose_joints
+from twinmill.joints.explain import JointExplanation, explain_joints
+from twinmill.report import joints as shown
+from twinmill.version import __version__
+from twinmill_cli.frame import command_line
+from twinmill_cli.output import deliver, say, telling
+
+
+def diagnosed(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointDiagnosis:
+    """Names what an MJCF lacks."""
+    log = _one("diagnose", logs, out)
+    with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
+        found = diagnose_joints(log, model, progress)
+    _warn(found.warnings)
+    command = command_line("diagnose", logs, model)
+    deliver({**found.to_json(), **_source(command)}, shown.diagnosis(found), as_json)
+    return found
+
+
+def explained(
+    logs: list[Path],
+    model: str,
+    output: Path,
+    *,
+    force: bool,
+    as_json: bool,
+    out: Path | None,
+) -> JointExplanation:
+    """Writes an MJCF with what was found, and a hook for what it cannot hold."""
+    log = _one("explain", logs, out)
+    hook = output.with_name(f"{output.stem}_hook.py")
+    for path in (output, hook):
+        check_new_file(path, force, [Path(model), *logs])
+    with telling(f"explaining with {model}") as progress, threadpool_limits(1, "blas"):
+        found = explain_joints(log, model, progress)
+    _warn(found.diagnosis.warnings)
+    written = {}
+    for key, path, text in (("output", output, found.text), ("hook", hook, found.hook)):
+        if found.added and text:
+            with replacing(path, force) as place:
+                place.write_text(text, encoding="utf-8")
+            written[key] = str(path)
+    command = command_line("explain", logs, model, output)
+    data = {**found.to_json(), "output": None, "hook": None, **written, **_source(command)}
+    deliver(data, shown.explanation(found, written), as_json)
+    return found
+
+
+def compared(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointComparison:
+    """Errors of an MJCF on a log; a hook that `explain` wrote beside it acts as well."""
+    log = _one("compare", logs, out)
+    beside = Path(model).with_name(f"{Path(model).stem}_hook.py")
+    hook = beside if beside.is_file() else None
+    found = compare_joints(log, model, hook)
+    _warn(found.warnings)
+    command = command_line("compare", logs, model)
+    data = {**found.to_json(), "hook": str(hook) if hook else None, **_source(command)}
+    deliver(data, shown.comparison(found, hook), as_json)
+    return found
+
+
+def _one(verb: str, logs: list[Path], out: Path | None) -> Path:
+    """The log, if it is one, and no report is wanted.
+
+    Raises:
+        LogError: there are several.
+        ValueError: a report is wanted, and there is none for joints.
+    """
+    if len(logs) > 1:
+        raise LogError(
+            f"{verb}: one log of a jointed robot is judged at a time, and these are {len(logs)}; "
+            f"give {shlex.quote(str(logs[0]))} alone."
+        )
+    if out is not None:
+        raise ValueError(f"{verb}: there is no report of jointed robots; leave --out away.")
+    return logs[0]
+
+
+def _warn(warnings: tuple[str, ...]) -> None:
+    for warning in warnings:
+        say(warning)
+
+
+def _source(command: str) -> dict[str, Any]:
+    return {"command": command, "version": f"twinmill {__version__}"}
