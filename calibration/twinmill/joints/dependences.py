@@ -72,7 +72,7 @@ def of_base(plant: Plant) -> np.ndarray:
 
 
 def forms_of(plant: Plant, change: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What an effect's formula may miss, for a relative error of one.
+    """Columns of errors that an effect's formula may have, each for a relative error of one.
 
     The effect's own change, times a smooth function of the speed of the joint that it changes most,
     of time, position or the actuator's force; without its size, which is the effect's own number.

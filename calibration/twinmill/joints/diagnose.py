@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an MJCF lacks, from a log: the answer, with the effects' cards."""
+"""Effects that an MJCF lacks, by the evidence of a log, with their cards."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ TOO_FAR = 1.05  # times a joint's range, in which a position is the range's own 
 
 @dataclass(frozen=True)
 class JointDiagnosis:
-    """What a log says of an MJCF.
+    """Answer of a log about an MJCF.
 
     Attributes:
         answer: verdict, effects and dependences with their probabilities.

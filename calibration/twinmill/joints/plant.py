@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What stock MuJoCo predicts of a log's steps, from the states that were measured.
+"""Predictions of a log's steps by stock MuJoCo, from the states that were measured.
 
 A candidate changes MuJoCo's own numbers, a command, a measured state, or adds a force. Errors are
 changes of momentum, so that a friction of one joint shows in its channel alone.
@@ -34,7 +34,7 @@ NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether i
 
 @dataclass
 class Action:
-    """What is put into MuJoCo, for effects to change.
+    """Inputs of MuJoCo, for effects to change.
 
     Attributes:
         series: of the log.
@@ -69,7 +69,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Usual:
-    """What the base does in a log.
+    """Motion and forces of the base in a log.
 
     Attributes:
         torque: (n, J) forces of its actuators.
@@ -200,7 +200,7 @@ class Plant:
 
     @cached_property
     def usual(self) -> Usual:
-        """What the base does, from one look at each state."""
+        """Motion and forces of the base, from one look at each state."""
         action, s = self.begin(), self.series
         model, data, ctrl = action.model, mujoco.MjData(action.model), action.commands()
         torque, inertial = np.empty_like(s.q), np.empty_like(s.q)

@@ -41,7 +41,7 @@ class JointProblem(Problem):
     catalogue: Mapping[str, Any]
 
     def candidate(self, name: str, model: JointModel) -> Candidate:
-        """What an effect of the catalogue would change beside a model."""
+        """Columns of an effect of the catalogue beside a model."""
         model = model.copy()
         model.add_effect(name)
         parameters = [_parameter(name, n) for n in self.effects[name].parameters]
@@ -51,7 +51,7 @@ class JointProblem(Problem):
         return with_sizes(name, parameters, model, self.steps, on=on)
 
     def forms(self, change: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What an effect's formula may miss, by speed, force, time and position."""
+        """Errors of an effect's formula, by speed, force, time and position."""
         return dependences.forms_of(self.plant, change)
 
     def of_moments(self) -> np.ndarray:

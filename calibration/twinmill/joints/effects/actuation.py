@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of a command: gains, delays, lags, dead zones, play, limits, a supply that falls."""
+"""Effects between command and force: gains, delays, lags, dead zones, play, limits, a supply that falls."""
 
 from collections.abc import Mapping
 
@@ -246,7 +246,7 @@ class SupplyDrift(ActuatorEffect):
         action.force[:, self.joint] -= values["loss"] * share * own
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """The same force."""
+        """Python source of that force, from the joint's state and command."""
         return f"-{values['loss']:.6g} * f * min(t / {np.ptp(self.plant.series.t_s):.6g}, 1.0)"
 
 

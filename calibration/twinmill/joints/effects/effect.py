@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all effects have: a card, what they change in MuJoCo, and how an MJCF holds it."""
+"""Base class of effects: a card, the change in MuJoCo, and how an MJCF holds it."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -120,7 +120,7 @@ class JointEffect(Effect):
 
     @property
     def unit(self) -> str:
-        """Of a force on the joint."""
+        """Unit of a force on the joint: N of a slide, N m of a hinge."""
         return "N m" if self.plant.mjcf.units[self.at] == "rad" else "N"
 
     @property

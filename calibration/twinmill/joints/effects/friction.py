@@ -53,7 +53,7 @@ class CoulombByDirection(JointEffect):
         action.force[:, self.at] -= values["half_difference"] * np.abs(sign)
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """The same force."""
+        """Python source of that force, from the joint's state and command."""
         return f"-{values['half_difference']:.6g} * abs({self.sign})"
 
 
@@ -101,7 +101,7 @@ class ViscousByDirection(JointEffect):
         action.force[:, self.at] -= values["half_difference"] * np.abs(action.v[:, self.at])
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """The same force."""
+        """Python source of that force, from the joint's state and command."""
         return f"-{values['half_difference']:.6g} * abs(v)"
 
 
@@ -155,7 +155,7 @@ class Stribeck(JointEffect):
         action.force[:, self.at] -= values["extra"] * near * sign
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """The same force."""
+        """Python source of that force, from the joint's state and command."""
         return f"-{values['extra']:.6g} * np.exp(-((v / {values['speed']:.6g}) ** 2)) * {self.sign}"
 
 
@@ -182,7 +182,7 @@ class LoadFriction(JointEffect):
         action.force[:, self.at] -= values["share"] * load * sign
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """The same force."""
+        """Python source of that force, from the joint's state and command."""
         return f"-{values['share']:.6g} * abs(f) * {self.sign}"
 
 
@@ -216,5 +216,5 @@ class FrictionByPosition(JointEffect):
         action.force[:, self.at] -= values["slope"] * away * sign
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """The same force."""
+        """Python source of that force, from the joint's state and command."""
         return f"-{values['slope']:.6g} * (q - {self._middle:.6g}) * {self.sign}"

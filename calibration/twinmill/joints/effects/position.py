@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What depends on where a joint is, and forces that always act."""
+"""Effects of a joint's position, and forces that always act."""
 
 from collections.abc import Mapping
 
