@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Effects between command and force: gains, delays, lags, dead zones, play, limits, a supply that falls."""
+"""Effects between command and force: gains, delays, lags, dead zones, play, limits, supplies."""
 
 from collections.abc import Mapping
 
