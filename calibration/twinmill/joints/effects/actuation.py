@@ -247,7 +247,7 @@ class SupplyDrift(ActuatorEffect):
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"-{values['loss']:.6g} * f * min(t / {np.ptp(self.plant.series.t_s):.6g}, 1.0)"
+        return f"{-values['loss']:.6g} * f * min(t / {np.ptp(self.plant.series.t_s):.6g}, 1.0)"
 
 
 def _play(u: np.ndarray, width: float) -> np.ndarray:

@@ -54,7 +54,7 @@ class CoulombByDirection(JointEffect):
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"-{values['half_difference']:.6g} * abs({self.sign})"
+        return f"{-values['half_difference']:.6g} * abs({self.sign})"
 
 
 class Viscous(JointEffect):
@@ -102,7 +102,7 @@ class ViscousByDirection(JointEffect):
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"-{values['half_difference']:.6g} * abs(v)"
+        return f"{-values['half_difference']:.6g} * abs(v)"
 
 
 class Drag(JointEffect):
@@ -156,7 +156,7 @@ class Stribeck(JointEffect):
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"-{values['extra']:.6g} * np.exp(-((v / {values['speed']:.6g}) ** 2)) * {self.sign}"
+        return f"{-values['extra']:.6g} * np.exp(-((v / {values['speed']:.6g}) ** 2)) * {self.sign}"
 
 
 class LoadFriction(JointEffect):
@@ -183,7 +183,7 @@ class LoadFriction(JointEffect):
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"-{values['share']:.6g} * abs(f) * {self.sign}"
+        return f"{-values['share']:.6g} * abs(f) * {self.sign}"
 
 
 class FrictionByPosition(JointEffect):
@@ -217,4 +217,4 @@ class FrictionByPosition(JointEffect):
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"-{values['slope']:.6g} * (q - {self._middle:.6g}) * {self.sign}"
+        return f"{-values['slope']:.6g} * (q - {self._middle:.6g}) * {self.sign}"
