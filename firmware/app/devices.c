@@ -268,6 +268,7 @@ bool devices_make(const struct app_config *config, bool dry_run, struct loop_dev
     }
     use_camera(config, devices);
     devices->config = config;
+    devices->dry_run = dry_run;
     devices->explain = explain;
     devices->camera_is_live = after(config->camera, "stub:") == NULL;
     return true;

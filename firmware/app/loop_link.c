@@ -123,5 +123,6 @@ void loop_link_report(const struct loop *loop, struct link_report *report)
     report->status_flags |= (state->lost ? LINK_STATUS_LINK_LOST : 0) |
                             (untethered ? LINK_STATUS_UNTETHERED : 0) |
                             (state->latch.is_lost ? LINK_STATUS_LATCH_LOST : 0) |
+                            (loop->devices.dry_run ? LINK_STATUS_DRY_RUN : 0) |
                             (loop->filter.latched ? LINK_STATUS_LATCHED : 0);
 }

@@ -44,6 +44,8 @@ struct loop_devices
     const char *board;
     // Looks at the world: a picture that never changes is none. Recordings may stand still.
     bool camera_is_live;
+    // The board is a stand-in, and no motor moves.
+    bool dry_run;
     // Says which device failed, why, and what to do; NULL: the error alone is told.
     void (*explain)(const struct app_config *config, enum loop_part part, enum fw_err err,
                     char reason[LOOP_REASON_MAX]);

@@ -151,6 +151,17 @@ static void test_no_stop_can_be_kept_where_nothing_can_be_written(void)
     TEST_ASSERT_EQUAL(0, umount(folder));
 }
 
+// Its board is a stand-in, and what that takes says nothing of wheels.
+static void test_dry_run_is_told_by_all_that_is_sent(void)
+{
+    robot_steps(1);
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_DRY_RUN, robot.report.status_flags);
+    robot.devices.dry_run = true;
+    robot_boot();
+    robot_steps(1);
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_DRY_RUN, robot.report.status_flags);
+}
+
 // A folder that is not there yet.
 static void test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later(void)
 {
@@ -257,6 +268,7 @@ int main(void)
     RUN_TEST(test_stop_outlives_the_program);
     RUN_TEST(test_stop_is_kept_where_there_is_no_room);
     RUN_TEST(test_no_stop_can_be_kept_where_nothing_can_be_written);
+    RUN_TEST(test_dry_run_is_told_by_all_that_is_sent);
     RUN_TEST(test_stop_that_cannot_be_kept_in_mind_is_told_and_kept_later);
     RUN_TEST(test_robot_that_loses_its_operator_stops);
     RUN_TEST(test_robot_that_hears_its_operator_goes_on);

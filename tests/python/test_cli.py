@@ -646,3 +646,25 @@ def test_ctrl_c_while_it_starts_is_one_sentence(module):
     )
     sentence = "twinmill: Stopped before it began: nothing was done, and nothing was sent.\n"
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", sentence)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("module", ["typer", "twinmill.robots.tell"])
+def test_no_start_begins_that_was_asked_to_end(module, number):
+    """A script's background job has SIGINT ignored, and nohup's SIGHUP: to a start they count."""
+    code = (
+        "import sys, os; sys.argv[0] = 'twinmill'\n"
+        "def hook(event, args):\n"
+        f"    if event == 'import' and args[0] == '{module}': os.kill(os.getpid(), {int(number)})\n"
+        "sys.addaudithook(hook)\n"
+        "from twinmill_cli.main import main; main()\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code, "swarm", "start", "--json"],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_IGN),
+    )
+    told = strict(ended.stdout)
+    assert ended.returncode == 130 and (told["verb"], told["ok"]) == ("start", False)
+    assert "nothing was sent" in told["sentence"] and told["sentence"] in ended.stderr

@@ -64,6 +64,20 @@ def hold(fleet: Fleet, robot_id: int, *, key=KEY, session=SESSION, made_us=0) ->
     fleet.bus.hear("SWARM_SIGNED", keys.sign(keys.of_robot(key, robot_id), sealed.encode()))
 
 
+def test_a_command_is_told_with_the_time_at_which_it_was_said():
+    """A laptop that wakes up hears late what another operator said while it slept."""
+    fleet = fleet_of(robot(1))
+    command, sealed = turbopi.swarm_command_t(), turbopi.signed_command_t()
+    command.verb, command.utime_us = VERBS_START, round((time.time() - 3600) * 1e6)
+    sealed.robot_id, sealed.session, sealed.counter = 1, SESSION, 5
+    sealed.command = command.encode()
+    sealed.command_size = len(sealed.command)
+    sealed.tag = bytes(keys.TAG_BYTES)
+    fleet.bus.hear("SWARM_SIGNED", keys.sign(keys.of_robot(KEY, 1), sealed.encode()))
+    said = time.strftime("%H:%M:%S", time.localtime(command.utime_us / 1e6))
+    assert fleet.robots[1].commands[5].words == f"start at {said}"
+
+
 @pytest.mark.parametrize(
     ("mode", "timeout_ms", "says"),
     [

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """`twinmill swarm stop` where nobody answers: a person sees at once what it waits for."""
 
+import errno
 import json
 import os
 import pty
+import re
+import shlex
 import signal
+import socket
 import sys
 import time
 from contextlib import suppress
@@ -14,7 +18,9 @@ import pytest
 from twinmill.data.bus import Reach
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
+from twinmill.robots.key import load
 from twinmill_cli import swarm_door, swarm_stop
+from twinmill_cli.swarm_door import key_fault
 from twinmill_cli.swarm_signals import saying_nothing
 from twinmill_cli.swarm_verdict import Saying, of_stop
 
@@ -163,6 +169,39 @@ def test_a_stop_whose_bus_cannot_be_read_says_that_nothing_was_stopped(twinmill,
     """Nobody knows on which network those are who are meant."""
     code, _, err = twinmill("swarm", "stop", *words)
     assert code == 2 and "NOTHING WAS STOPPED" in err and len(err.splitlines()) == 1
+
+
+def test_what_is_to_be_done_with_a_key_can_be_pasted_into_a_shell(tmp_path):
+    key = tmp_path / "USB STICK" / "swarm.key"
+    key.parent.mkdir()
+    key.write_bytes(b"ab" * 32)
+    key.chmod(0o644)
+    with pytest.raises(ValueError, match="others may read it") as told:
+        load(key)
+    (command,) = re.findall("`(.*)`", str(told.value))
+    assert shlex.split(command) == ["chmod", "600", str(key)]
+    refused = PermissionError(errno.EACCES, "Permission denied", str(key))
+    *_, owning = re.findall("`(.*?)`", key_fault(refused))
+    assert shlex.split(owning) == ["sudo", "chown", "$USER", str(key)]
+
+
+@pytest.mark.parametrize(
+    ("code", "says"),
+    [
+        (socket.EAI_AGAIN, "give the address instead"),
+        (socket.EAI_NONAME, "no machine of that name"),
+    ],
+)
+def test_a_name_server_that_is_away_knows_of_no_machine(monkeypatch, code, says):
+    def look_up(_):
+        raise socket.gaierror(code, "as getaddrinfo says")
+
+    monkeypatch.setattr("socket.gethostbyname", look_up)
+    hosts = tell.Hosts(["robot02.lab"])
+    end_s = time.monotonic() + 5
+    while not hosts._faults and time.monotonic() < end_s:
+        time.sleep(0.01)
+    assert says in hosts._faults["robot02.lab"]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from twinmill.data.bus import Reach
 from twinmill.robots.countdown import NOT_BEGUN, STOPPED, Dropouts
-from twinmill.robots.fleet import Heard
+from twinmill.robots.fleet import DRY_RUN, Heard
 from twinmill.robots.hold import (
     BY_BUTTON,
     BY_COMMAND,
@@ -28,6 +28,7 @@ from twinmill_cli.swarm_verdict import (
     Verdict,
     of_arm,
     of_clocks,
+    of_dry_run,
     of_end,
     of_select,
     of_start,
@@ -74,6 +75,7 @@ BY_START = Heard(9, 1, 7, 8, "start milling at 12:00:01")
 TAKEN, TAKEN_AND_LOST = of_taken(BY_START), of_taken(BY_START, LINK_LOST)
 
 
+DRY = replace(STANDS, alarms=[DRY_RUN])
 # What is said begins so, and the command ends with that code.
 SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
@@ -113,6 +115,8 @@ SENTENCES = [
     ),
     (of_start(begun(SHORT, replace(LOOSE, accepted=False))), "Started at", 1),
     (of_start(begun(GOOD)), "Started at", 0),
+    (of_start(begun(GOOD, replace(GOOD, alarms=[DRY_RUN]))), "Started at", 1),
+    (of_stop([DRY]).more(of_dry_run([DRY])), "All stand. R02 with --dry-run", 0),
     (of_start(begun(SHORT)), "Started at", 0),
     (of_start(begun(LOOSE)), "Started at", 1),
     (of_start(begun(LOOSE, link_timeout_ms=0)), "Started at", 0),

@@ -81,6 +81,46 @@ def test_words_that_fail_are_noticed_and_those_behind_them_are_told(voice):
         voice.check()
 
 
+@pytest.fixture
+def streams(monkeypatch):
+    """Stands for stdout and stderr: gives both ends of two pipes, by what kind of file they are."""
+    opened = []
+
+    def make(*kinds):
+        ends = []
+        for kind in kinds:
+            pair = os.pipe() if kind == "pipe" else (-1, os.open(kind, os.O_WRONLY))
+            ends.append(pair)
+        opened.extend(ends)
+        monkeypatch.setattr("twinmill_cli.voice.STREAMS", [writes for _, writes in ends])
+        return [reads for reads, _ in ends]
+
+    yield make
+    for _, writes in opened:
+        os.close(writes)
+
+
+def test_robots_are_held_until_both_streams_have_lost_their_reader(streams, voice):
+    """As an ssh without a terminal that breaks: no signal comes, and nothing is read at its end."""
+    stdout, stderr = streams("pipe", "pipe")
+    voice.check_listener()
+    os.close(stdout)  # as of `| head -1`: who watches stderr is told
+    voice.check_listener()
+    os.close(stderr)
+    with pytest.raises(OSError, match="nobody reads"):
+        voice.check_listener()
+
+
+@pytest.mark.parametrize("kind", [os.devnull, "/proc/self/comm"])
+def test_what_needs_no_reader_has_lost_none(streams, voice, kind):
+    """A job of a script, `>/dev/null 2>&1 &`, or one that writes into a file."""
+    streams(kind, kind)
+    voice.check_listener()
+    (pipe, _) = streams("pipe", kind)
+    os.close(pipe)
+    voice.check_listener()
+
+
 def test_a_table_that_cannot_be_drawn_is_noticed(voice):
     """It had gone on as a picture of the moment at which its thread ended."""
 

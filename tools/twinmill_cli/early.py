@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ctrl-C before a command has begun, as in the second that imports take: one sentence.
+"""Ctrl-C, or a failure, before a command has begun, as in the second of imports: one sentence.
 
 An exception in the midst of imports would be a traceback, or be swallowed by a library.
 """
@@ -8,32 +8,78 @@ import _signal  # the part of `signal` that takes no time to import
 import os
 import sys
 from contextlib import suppress
+from types import TracebackType
 from typing import Any, NoReturn
 
-PROGRAMS = ("twinmill", "twin_run", "twin_sweep")
+from twinmill_cli.own_path import PROGRAMS, is_program
+
 STOPPED = 130  # as a shell has it
+MOVING = ("start", "arm", "select")  # below `swarm`: they begin only if nobody has asked for an end
+# As a background job of a script has SIGINT, and `nohup` SIGHUP, these are ignored at first.
+ENDING = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
+
+
+def _verb() -> str:
+    """The word behind `swarm`, if any."""
+    return "".join(sys.argv[2:3]).lower() if sys.argv[1:2] == ["swarm"] else ""
+
+
+def _name() -> str:
+    name = os.path.basename(sys.argv[0])
+    return name if name in PROGRAMS else PROGRAMS[0]
 
 
 def _leave(*_: Any) -> NoReturn:
-    name = os.path.basename(sys.argv[0])
-    words = f"{name}: Stopped before it began: nothing was done, and nothing was sent.\n"
-    os.write(2, words.encode(errors="replace"))
+    sentence = "Stopped before it began: nothing was done, and nothing was sent."
+    if _verb() in MOVING and "--json" in sys.argv:  # in the midst of imports there is no `json`
+        told = f'"verb": "{_verb()}", "ok": false, "sentence": "{sentence}", "robots": []'
+        os.write(1, f"{{{told}}}\n".encode())
+    os.write(2, f"{_name()}: {sentence}\n".encode(errors="replace"))
     os._exit(STOPPED)
 
 
 def begin() -> None:
-    """From now on Ctrl-C leaves, unless something else was made of it."""
-    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
-        with suppress(ValueError):  # not in the main thread
+    """From now on Ctrl-C leaves, unless something else was made of it.
+
+    Where robots are to move, so does each signal that asks for the end, be it ignored until now.
+    """
+    with suppress(ValueError):  # not in the main thread
+        if is_program() and _verb() in MOVING:
+            for number in ENDING:
+                _signal.signal(number, _leave)
+        elif _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
             _signal.signal(_signal.SIGINT, _leave)
 
 
 def end() -> None:
-    """From now on Ctrl-C is a KeyboardInterrupt again."""
-    if _signal.getsignal(_signal.SIGINT) is _leave:
-        _signal.signal(_signal.SIGINT, _signal.default_int_handler)
+    """From now on Ctrl-C is a KeyboardInterrupt again, and the other signals end the program."""
+    for number in ENDING:
+        if _signal.getsignal(number) is _leave:
+            is_int = number == _signal.SIGINT
+            _signal.signal(number, _signal.default_int_handler if is_int else _signal.SIG_DFL)
 
 
-def is_program() -> bool:
-    """This is one of our programs, which has not begun; else who imports us goes on."""
-    return os.path.basename(sys.argv[0] if sys.argv else "") in PROGRAMS
+def why_not_begun(error: BaseException) -> str:
+    """Sentence on a part of this program that cannot be imported."""
+    trace = error.__traceback__
+    while trace and trace.tb_next:
+        trace = trace.tb_next
+    where = f" in {trace.tb_frame.f_code.co_filename}" if trace else ""
+    became = {"": "", "stop": " NOTHING WAS STOPPED: switch off by hand what drives."}
+    return (
+        f"a part of this program cannot be imported ({type(error).__name__}{where}: {error}); if "
+        "that is no file of yours, which another name would put out of the way, install Twinmill "
+        f"again.{became.get(_verb(), ' Nothing was said to any robot.')}"
+    )
+
+
+def tell_failure(_: type, error: BaseException, __: TracebackType | None) -> None:
+    """An exception hook that tells of an import in one sentence, and with --json in an object."""
+    sentence = why_not_begun(error)
+    os.write(2, f"{_name()}: {sentence}\n".encode(errors="replace"))
+    if "--json" in sys.argv:
+        import json  # may itself be what fails
+
+        told = {"verdict": "bad_input", "sentence": sentence, "input": []}
+        robots = {"verb": _verb(), "ok": False, "robots": []} if _verb() else {}
+        os.write(1, f"{json.dumps({**robots, **told})}\n".encode())

@@ -43,6 +43,7 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
         run: does what the words of the command line say; returns an exit code, if an int.
         stopped: what to say after Ctrl-C.
     """
+    sys.excepthook = sys.__excepthook__  # all that every command needs is imported
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
@@ -56,7 +57,7 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
         _end_untouched()
     except KeyboardInterrupt:  # before the command, or after it
         code = decided_or(STOPPED)
-    except (typer.TyperException, ModuleNotFoundError, OSError, ValueError) as error:
+    except (typer.TyperException, ImportError, OSError, ValueError) as error:
         code, sentence = _told(error)
         if sentence:
             say(sentence, program)

@@ -60,6 +60,10 @@ class LazyCommand(TyperCommand):
         early.begin()
         try:
             module = import_module(self.module)
+        except Exception as error:  # whatever a file that stands in the way may do
+            if isinstance(error, ModuleNotFoundError) and self.name != "swarm":
+                raise  # as an extra that is not installed
+            raise ImportError(early.why_not_begun(error)) from error
         finally:
             early.end()
         gc.freeze()

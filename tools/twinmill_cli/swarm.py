@@ -132,7 +132,7 @@ def _start(
             "link_timeout_s": timeout_ms / 1e3,
         }
         code, voice = 1, Voice()
-        with ended_by_signals(fleet, voice.check) as asked_to_end:
+        with ended_by_signals(fleet, voice.check_listener) as asked_to_end:
             try:
                 verdict = _drive(
                     fleet, asked, behavior, voice, data=data, as_json=as_json, **options

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -124,7 +126,14 @@ def key_if_there(path: Path | None) -> tuple[bytes | None, str]:
 
 def key_fault(error: OSError) -> str:
     """Sentence on a key file that the system does not give."""
-    return f"{option('key', str(error.filename))}: {error.strerror}."
+    file = str(error.filename)
+    told = f"{option('key', file)}: {error.strerror}"
+    if error.errno != errno.EACCES:
+        return f"{told}."
+    return (
+        f"{told}; it may be another user's, as made with sudo: `ls -ld {quote(file)}` tells whose, "
+        f"and `sudo chown $USER {quote(file)}` makes it yours (so for its folder)."
+    )
 
 
 def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:

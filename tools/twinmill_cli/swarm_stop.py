@@ -33,7 +33,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
     from twinmill_cli.swarm_end import driving, finish
-    from twinmill_cli.swarm_verdict import Saying, Verdict, of_stop
+    from twinmill_cli.swarm_verdict import Saying, Verdict, of_dry_run, of_stop
     from twinmill_cli.voice import Voice
 
 WRONG_COMMAND_LINE = 2
@@ -173,6 +173,7 @@ def stop(
             key_fault=f"No robot's signature could be checked: {fault}" if fault else "",
         )
         verdict = of_stop(given, how, is_of_some=bool(asked)).beside(driving(fleet, asked))
+        verdict = verdict.more(of_dry_run(given))
         code = WRONG_COMMAND_LINE if misread else verdict.code
         if misread:
             verdict = Verdict(False, f"{misread} {verdict.sentence}")

@@ -9,7 +9,7 @@ from datetime import datetime
 
 from twinmill.data.bus import Reach
 from twinmill.robots.countdown import STOPPED
-from twinmill.robots.fleet import Robot
+from twinmill.robots.fleet import DRY_RUN, Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
     AHEAD_S,
@@ -320,6 +320,7 @@ def of_start(begun: Start) -> Verdict:
         f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
+        _dry_run(given),
         *_odd_links(begun),
     ]
     if not any(told):
@@ -329,6 +330,20 @@ def of_start(begun: Start) -> Verdict:
     if begun.late:
         words = f"{words} {of_stop(begun.late, is_of_some=True).sentence}"
     return Verdict(False, words)
+
+
+def of_dry_run(given: list[Answer]) -> str:
+    """Sentence on robots whose stop says nothing of their wheels; empty if none is so."""
+    dry = _dry_run(given)
+    return (
+        f"{dry}: what it signs says nothing of wheels that another program drives." if dry else ""
+    )
+
+
+def _dry_run(given: list[Answer]) -> str:
+    """Robots that do all but move; words to go on behind."""
+    dry = [a for a in given if DRY_RUN in a.alarms]
+    return f"{_names(dry)} with --dry-run, its motor board not opened" if dry else ""
 
 
 def _as_before(given: list[Answer]) -> str:

@@ -7,7 +7,9 @@ robots hear their operator, and his stop, all the same.
 
 from __future__ import annotations
 
+import errno
 import os
+import select
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -26,6 +28,22 @@ if TYPE_CHECKING:
 SHOW_PERIOD_S = 0.25
 JOIN_S = 0.05
 LAST_WORD_S = 0.5  # in which a terminal that takes anything has taken the last sentence
+
+
+STREAMS = (1, 2)  # stdout and stderr
+NOBODY = "nobody reads any more what is told, so nobody could be told of a fault"
+
+
+def can_be_heard() -> bool:
+    """Stdout or stderr is a file, or has somebody at its other end.
+
+    Both have lost him, as when a connection by ssh breaks that had no terminal: no signal comes.
+    """
+    poll = select.poll()
+    for stream in STREAMS:
+        poll.register(stream, 0)  # that nobody is there is told unasked
+    gone = [stream for stream, what in poll.poll(0) if what & (select.POLLERR | select.POLLHUP)]
+    return len(gone) < len(STREAMS)
 
 
 class Voice:
@@ -107,6 +125,12 @@ class Voice:
             raise self.failure
         if self.failure:
             raise ValueError(f"what is to be told cannot be: {self.failure}") from self.failure
+
+    def check_listener(self) -> None:
+        """Raises as check() does, and OSError if nobody can be told anything any more."""
+        self.check()
+        if not can_be_heard():
+            raise OSError(errno.EPIPE, NOBODY)
 
     def end(self, code: int, signals: Sequence[int] = ()) -> None:
         """Waits until all is written. Who does not want to wait any more (Ctrl-C) need not.

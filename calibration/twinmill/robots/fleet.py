@@ -27,12 +27,14 @@ GONE_S = 1.0  # a robot that said nothing for so long is not there; it speaks 30
 ALL, ROBOTS_MAX = -1, 100  # in swarm_command_t, robot_id is one of 0..99, or all
 MODES = ("stopped", "running", "script", "fault")
 TELEMETRY = turbopi.telemetry_t
+DRY_RUN = "dry run: its motor board is not opened"
 # What keeps a robot from doing what it is told, or hides it, loudest first.
 ALARMS = (
     (TELEMETRY.STATUS_STOP_UNCONFIRMED, "STOP NOT CONFIRMED: WHEELS MAY TURN"),
     (TELEMETRY.STATUS_BOARD_LOST, "BOARD LOST"),
     (TELEMETRY.STATUS_DOUBLE, "HEARS ANOTHER ROBOT OF ITS NUMBER"),
     (TELEMETRY.STATUS_UNGUARDED, "unguarded: its watching process is gone"),
+    (TELEMETRY.STATUS_DRY_RUN, DRY_RUN),
     (TELEMETRY.STATUS_LINK_LOST, "lost its operator"),
     (TELEMETRY.STATUS_CAMERA_LOST, "camera lost"),
     (TELEMETRY.STATUS_BATTERY_LOW, "battery low"),
@@ -62,7 +64,8 @@ class Heard:
 
     Attributes:
         seq, verb, session, counter: as in swarm_command_t and signed_command_t.
-        words: the command as a person would write it, and when it was heard.
+        words: the command as a person would write it, and when it was said, by its sender's clock:
+            a computer that slept hears it late.
     """
 
     seq: int
@@ -283,6 +286,12 @@ class Robot:
         }
 
 
+def _time_of_day(utime_us: int) -> str:
+    with suppress(ValueError, OverflowError, OSError):
+        return f"{datetime.fromtimestamp(utime_us / 1e6):%H:%M:%S}"
+    return f"{datetime.now():%H:%M:%S}"  # no calendar has that time
+
+
 class Fleet:
     """All robots of a bus."""
 
@@ -386,7 +395,7 @@ class Fleet:
             robot.hold_s = time.monotonic()
         elif sealed.counter not in robot.commands:
             words = f"{COMMANDS.get(command.verb, '?')} {plain_line(command.behavior, NAME_MAX)}"
-            words = f"{words.strip()} at {datetime.now():%H:%M:%S}"
+            words = f"{words.strip()} at {_time_of_day(command.utime_us)}"
             robot.commands[sealed.counter] = Heard(
                 command.seq, command.verb, sealed.session, sealed.counter, words
             )

@@ -8,6 +8,7 @@ import secrets
 from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
+from shlex import quote
 
 from twinmill.arguments import option
 
@@ -74,8 +75,9 @@ def load(path: Path | None = None) -> bytes:
     mode = file.stat().st_mode & 0o777
     if mode & 0o077:
         raise ValueError(
-            f"{option('key', str(file))}: others may read it (mode {mode:o}): `chmod 600 {file}` "
-            "if nobody has, else make a new one (remove it, and flash the robots again)."
+            f"{option('key', str(file))}: others may read it (mode {mode:o}): "
+            f"`chmod 600 {quote(str(file))}` if nobody has, else make a new one (remove it, and "
+            "flash the robots again)."
         )
     text = file.read_bytes().strip()
     if not re.fullmatch(rb"[0-9a-f]{%d}" % (2 * KEY_BYTES), text):

@@ -36,6 +36,8 @@ SIGNED_VERBS = turbopi.signed_command_t
 STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 DRIVING = ("running", "script")
 STANDING = ("stopped", "fault")
+# Of looking a name up: nobody knows whether there is a machine of it.
+UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
 NEVER_HEARD = "was never heard"
 NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
@@ -325,8 +327,13 @@ class Hosts:
     def _look_up(self, name: str) -> None:
         try:
             self._address_of[name] = socket.gethostbyname(name)
-        except (OSError, UnicodeError):
-            self._faults[name] = "there is no machine of that name"
+        except (OSError, UnicodeError) as error:
+            is_unknown = not isinstance(error, socket.gaierror) or error.errno not in UNASKED
+            self._faults[name] = (
+                "there is no machine of that name"
+                if is_unknown
+                else "no name server answered; give the address instead, as --host 192.168.1.23"
+            )
 
     def tell(self, fleet: Fleet, command, robots: set[int]) -> None:
         """Says a command to them, and to the machines that speak as some robots, or all."""
