@@ -255,7 +255,7 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 
-    Of a robot that MuJoCo can load: twinmill explain run.csv --model arm.xml -o better.xml
+    Of an MJCF: twinmill explain run.csv --model arm.xml -o better.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import explained as of_joints  # as in diagnose

@@ -39,7 +39,6 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import LINK_TIMEOUT_MS, RUN_PERIOD_S, Fleet
     from twinmill.robots.hold import Held
-    from twinmill.robots.tell import Answer
     from twinmill.terminal import PlainConsole
     from twinmill_cli.swarm_end import clocks, driving, finish
     from twinmill_cli.swarm_screen import status_table
@@ -126,7 +125,7 @@ def _start(
         if busy:
             say(f"{of_busy(busy)}; this start takes over.")
         if arm:
-            _let_start(fleet, asked)
+            tell.arm(fleet, asked)
         data = {
             "drove_before": [robot.robot_id for robot in busy if robot.drives],
             "link_timeout_s": timeout_ms / 1e3,
@@ -214,12 +213,6 @@ def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
         voice.clear()
 
 
-def _let_start(fleet: Fleet, asked: set[int]) -> list[Answer]:
-    """Arms robots, and shows on a terminal for whom that waits."""
-    with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
-        return tell.arm(fleet, asked)
-
-
 def _arm(
     *,
     robots: Robots = None,
@@ -240,7 +233,8 @@ def _arm(
         busy = tell.find_busy(fleet, asked)
         if busy:
             say(f"{of_busy(busy)}.")
-        given = _let_start(fleet, asked)
+        with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
+            given = tell.arm(fleet, asked)
         return finish("arm", given, of_arm(given), {}, as_json=as_json)
 
 

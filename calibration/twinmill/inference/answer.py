@@ -58,7 +58,7 @@ class Answer:
     Attributes:
         verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
             cannot_tell.
-        findings: effects, the one worth most first.
+        findings: effects that are sure, the one worth most first, then the others by probability.
         nothing, outside: probabilities that nothing is missing, and that something nameless is.
         stale: probability that the base is known no better than a data sheet.
         effects: probability of each effect that was fitted, likeliest first.
@@ -103,7 +103,8 @@ def answer(table: Table) -> Answer:
     something = nothing <= 1 - PRIORS.sure
     best = _likeliest(every, lambda b: tuple(sorted(b.fitted))) if something else ()
     named = [_named(name, best, every, table) for name in _by_worth(best, table)]
-    findings = [f for f in named if f.probability >= PRIORS.member]
+    told = [f for f in named if f.probability >= PRIORS.member]
+    findings = sorted(told, key=lambda f: -min(f.probability, PRIORS.sure))
     stale = sum(b.probability for b in every if b.entry.stale)
     if not something:
         refit = sum(b.probability for b in every if b.nothing and b.entry.stale)

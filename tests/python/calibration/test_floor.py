@@ -233,7 +233,7 @@ def test_a_log_too_short_gives_no_floor_and_says_why(tanh_robot, measure, model_
     first, second = both.robots
     assert np.isnan(first.score) and np.isfinite(second.score)
     assert both.score == second.score
-    assert any("too short to tell the noise from the motion" in w for w in both.warnings)
+    assert any("too few to tell the noise from the motion" in w for w in both.warnings)
 
 
 def test_what_never_moves_is_not_judged(driven, model_file):

@@ -780,10 +780,13 @@ def _stamps(
 def _heard(topic: str, received: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """(N,) bool, times of receipt that are some; a remark on those before a simulated clock began.
 
-    A recorder with `use_sim_time` takes 0 for what it hears before the first /clock.
+    A recorder with `use_sim_time` takes 0 for what it hears before the first /clock. One message at
+    0, and the next as soon after as others follow each other, is a clock that began at 0.
     """
     heard = received > 0
-    if heard.all() or not heard.any():
+    gaps = np.diff(np.sort(received[heard]))
+    begins = np.count_nonzero(~heard) == 1 and len(gaps) and received[heard].min() <= gaps.max()
+    if heard.all() or not heard.any() or begins:
         return np.full(len(received), True), []
     early = counted(np.count_nonzero(~heard), "message")
     return heard, [f"{topic}: {early} received at time 0, before the clock began; left out."]
