@@ -17,8 +17,8 @@ def is_program() -> bool:
     return name in (*PROGRAMS, "-m")  # python -m calls itself so until our module is found
 
 
-    """Moves entries of `sys.path` before the standard library behind all others, where they count."""
-    """What precedes the standard library in `sys.path` goes behind all else, and is found there."""
+def put_first() -> None:
+    """Moves entries of `sys.path` before the standard library behind all others."""
     library = os.path.dirname(os.__file__)
     if library not in sys.path:
         return
