@@ -7,6 +7,7 @@ effect more, two at once, one exchanged, one left out.
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,9 @@ SETS = 2  # best sets whose effects are exchanged, within ...
 NEAR = 4.0  # ... this log odds of the best
 TRIED = (-2, -1, -0.5, 0.5, 1, 2, 4)  # sizes at which a fit may begin, times the card's
 WORTH = -3.0  # gain in log evidence below which an effect is not fitted
+
+
+_Screen = tuple[tuple[Hypothesis, Linear], dict[str, Candidate], dict[str, Screened]]
 
 
 @dataclass(frozen=True)
@@ -121,9 +125,7 @@ class Search:
 
     def _pair(self) -> None:
         """Fits effects that gain together, none of which is the best alone, where growth begins."""
-        told = self.problem.told(self.problem.base)
-        linear = told.linear(self.view.fitter.whiten)
-        alone = screened(linear, self.problem.columns(told), self.view.fitter.whiten)
+        (_, linear), _, alone = self._beside_base
         best = max(alone, key=lambda n: alone[n].gain, default="")
         gains = gains_of_pairs(linear, {n: own.white for n, own in alone.items() if n != best})
         known = {tuple(sorted(k)) for k in self.fitted}
@@ -139,16 +141,18 @@ class Search:
         self, h: Hypothesis, alone: int, beside: int, names: Collection[str] | None = None
     ) -> list[Hypothesis]:
         """Fits the likeliest sets of one effect more, one of some or of all."""
-        own, told = self.fitted[h.effects], self.problem.told(h)
-        columns, linear = self.problem.columns(told, names), told.linear(self.view.fitter.whiten)
-        each = screened(linear, columns, self.view.fitter.whiten)
+        own = self.fitted[h.effects]
+        told, columns, each = self._screened(h, names) if h.effects else self._beside_base
+        if names is not None:
+            each = {n: each[n] for n in names if n in each}
         order = sorted(each, key=lambda n: -each[n].gain)[:alone]
         if own.gains.max() > 0 and beside:
             f, s = np.unravel_index(own.gains.argmax(), own.gains.shape)
-            with_likely = linear.with_columns(SIZES[s] * own.white(self.view, f))
-            other = screened(with_likely, columns, self.view.fitter.whiten)
+            with_likely = told[1].with_columns(SIZES[s] * own.white(self.view, f))
+            among = {n: columns[n] for n in each}
+            other = screened(with_likely, among, self.view.fitter.whiten)
             more = sorted(other, key=lambda n: -other[n].gain)[:beside]
-            each |= {n: other[n] for n in more if n not in order}
+            each = each | {n: other[n] for n in more if n not in order}
             order += [n for n in more if n not in order]
         known = {tuple(sorted(k)) for k in self.fitted}
         grown = []
@@ -156,10 +160,20 @@ class Search:
             seen, more_of = each[name], tuple(sorted((*h.effects, next_of_kind(h.effects, name))))
             if seen.gain < WORTH or more_of in known:
                 continue
-            found = self._fitted(h, (told, linear), columns[name], seen)
+            found = self._fitted(h, told, columns[name], seen)
             self._keep(found)
             grown.append(found)
         return grown
+
+    @cached_property
+    def _beside_base(self) -> _Screen:
+        return self._screened(self.problem.base)
+
+    def _screened(self, h: Hypothesis, names: Collection[str] | None = None) -> _Screen:
+        """A hypothesis with the base as known, linear there, and some effects or all beside it."""
+        told = self.problem.told(h)
+        columns, linear = self.problem.columns(told, names), told.linear(self.view.fitter.whiten)
+        return (told, linear), columns, screened(linear, columns, self.view.fitter.whiten)
 
     def _fitted(
         self, h: Hypothesis, told: tuple[Hypothesis, Linear], c: Candidate, seen: Screened

@@ -128,6 +128,11 @@ class JointEffect(Effect):
         """Unit of a force over a speed."""
         return "N m s/rad" if self.plant.mjcf.units[self.at] == "rad" else "N s/m"
 
+    @property
+    def per_way(self) -> str:
+        """Unit of a force over a way."""
+        return "N m/rad" if self.plant.mjcf.units[self.at] == "rad" else "N/m"
+
 
 class ActuatorEffect(Effect):
     """An effect that each actuator may have."""

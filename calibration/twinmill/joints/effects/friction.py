@@ -201,8 +201,7 @@ class FrictionByPosition(JointEffect):
     def parameters(self) -> list[Number]:
         """The slope."""
         usual = 2 * self.load / float(self.plant.usual.reach[self.at])
-        unit = "N m/rad" if self.unit == "N m" else "N/m"
-        return [Number("slope", unit, SHARE * usual, -100 * usual, 100 * usual)]
+        return [Number("slope", self.per_way, SHARE * usual, -100 * usual, 100 * usual)]
 
     @property
     def _middle(self) -> float:

@@ -87,8 +87,7 @@ class Stiffness(JointEffect):
         """The stiffness that is added."""
         own = float(self.plant.mjcf.model.jnt_stiffness[self.at])
         usual = 2 * self.load / float(self.plant.usual.reach[self.at])
-        unit = "N m/rad" if self.unit == "N m" else "N/m"
-        return [Number("stiffness", unit, SHARE * usual, -own, 100 * usual)]
+        return [Number("stiffness", self.per_way, SHARE * usual, -own, 100 * usual)]
 
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
