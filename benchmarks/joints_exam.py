@@ -4,9 +4,9 @@
 
 The robots are a two-joint arm told torques, and a leg of two servos. What is planted shares no code
 with the catalogue: numbers of the XML are changed, and forces that MJCF lacks are set in a loop of
-`mj_step` by other formulas than those of the catalogue (a friction of arctan, a backlash as a
-second body behind a gap, a supply that sags with the charge taken, ...). Positions carry white
-noise of an encoder. A row of results is printed for each case, and a table in the end.
+`mj_step` by other formulas than those of the catalogue (a friction of arctan, a spring that
+hardens, a supply that falls by a root, ...). Positions carry white noise of an encoder. A row of
+results is printed for each case, and a table in the end.
 
     .venv/bin/python benchmarks/joints_exam.py --seeds 3
 """
@@ -63,6 +63,7 @@ LEG = """<mujoco model="leg">
 """
 ROBOTS = {"arm": ARM, "leg": LEG}
 PERIOD_S, DURATION_S = 0.004, 40.0
+STEP_S = 0.00025  # of the simulated robot: its time is continuous, whatever the model's step is
 ENCODER_RAD = 2e-4
 Push = Callable[[mujoco.MjData, float], None]
 
@@ -175,6 +176,45 @@ def constant(d: int, size: float) -> Push:
     return push
 
 
+def coupled(size: float) -> Push:
+    """A cable over the first joint that pulls at the second by the first one's speed."""
+
+    def push(data, _):
+        data.qfrc_applied[1] += size * np.tanh(data.qvel[0])
+
+    return push
+
+
+def knocks(d: int, size: float) -> Push:
+    """Three pushes of 0.2 s: nothing that lasts."""
+
+    def push(data, t):
+        if any(0 <= t - begin < 0.2 for begin in (7.3, 18.9, 31.1)):
+            data.qfrc_applied[d] += size
+
+    return push
+
+
+def dead_band(d: int, width: float, stiffness: float) -> Push:
+    """A servo that lets small errors of its position be."""
+
+    def push(data, _):
+        error = data.ctrl[d] - data.qpos[d]
+        data.qfrc_applied[d] -= stiffness * width * np.tanh(error / width)
+
+    return push
+
+
+def hardening(d: int, stiffness: float) -> Push:
+    """A hose that pulls back with more than proportion to the angle."""
+
+    def push(data, _):
+        q = data.qpos[d]
+        data.qfrc_applied[d] -= stiffness * q * (1 + 0.5 * q * q)
+
+    return push
+
+
 def both(*parts: Push) -> Push:
     """Several at once."""
 
@@ -196,7 +236,7 @@ def limited(name: str, limit: float):
 
 def delayed(name: str):
     """A command that acts 16 ms later."""
-    late = f'name="{name}" delay="0.016" nsample="16"'
+    late = f'name="{name}" delay="0.016" nsample="80"'
     return lambda text: text.replace(f'name="{name}"', late)
 
 
@@ -265,11 +305,15 @@ def cases(robot: str) -> dict[str, Case]:
         "one way and gain": Case(
             (vbd, any_of(f"actuator_gain@{a2}")), weaker, one_way(0, 0.5), also=more
         ),
+        "spring": Case((any_of(f"joint_stiffness@{j1}"),), push=hardening(0, 0.6)),
+        "coupled": Case(push=coupled(0.3), outside=True),
+        "knocks": Case(push=knocks(1, 0.8), outside=True),
         "cogging": Case(push=cogging(0, 0.35, 9), outside=True),
         "hum": Case(push=hum(1, 0.3, 2.7), outside=True),
     }  # fmt: skip
     if robot == "leg":
         del found["limit"]
+        found["dead band"] = Case(push=dead_band(0, 0.015, 40), outside=True)
     return found
 
 
@@ -294,6 +338,7 @@ def record(robot: str, case: Case, seed: int) -> JointLog:
     random = np.random.default_rng([seed, sum(map(ord, robot))])
     model = mujoco.MjModel.from_xml_string(case.change(ROBOTS[robot]))
     plain = mujoco.MjModel.from_xml_string(ROBOTS[robot])
+    model.opt.timestep = STEP_S
     data, held = mujoco.MjData(model), mujoco.MjData(plain)
     every = round(PERIOD_S / model.opt.timestep)
     t_s = np.arange(0, DURATION_S, PERIOD_S)

@@ -3,13 +3,11 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from twinmill.data.lcm_log import LogError
 from twinmill.files import check_new_file, replacing
 from twinmill.joints.compare import JointComparison, compare_joints
 from twinmill.joints.diagnose import JointDiagnosis, diagnose_joints
@@ -22,9 +20,9 @@ from twinmill_cli.output import deliver, say, telling
 
 def diagnosed(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointDiagnosis:
     """Names what an MJCF lacks."""
-    log = _one("diagnose", logs, out)
+    _no_report("diagnose", out)
     with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
-        found = diagnose_joints(log, model, progress)
+        found = diagnose_joints(logs, model, progress)
     _warn(found.warnings)
     command = command_line("diagnose", logs, model)
     deliver({**found.to_json(), **_source(command)}, shown.diagnosis(found), as_json)
@@ -41,12 +39,12 @@ def explained(
     out: Path | None,
 ) -> JointExplanation:
     """Writes an MJCF with what was found, and a hook for what it cannot hold."""
-    log = _one("explain", logs, out)
+    _no_report("explain", out)
     hook = output.with_name(f"{output.stem}_hook.py")
     for path in (output, hook):
         check_new_file(path, force, [Path(model), *logs])
     with telling(f"explaining with {model}") as progress, threadpool_limits(1, "blas"):
-        found = explain_joints(log, model, progress)
+        found = explain_joints(logs, model, progress)
     _warn(found.diagnosis.warnings)
     written = {}
     for key, path, text in (("output", output, found.text), ("hook", hook, found.hook)):
@@ -62,10 +60,10 @@ def explained(
 
 def compared(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointComparison:
     """Errors of an MJCF on a log; a hook that `explain` wrote beside it acts as well."""
-    log = _one("compare", logs, out)
+    _no_report("compare", out)
     beside = Path(model).with_name(f"{Path(model).stem}_hook.py")
     hook = beside if beside.is_file() else None
-    found = compare_joints(log, model, hook)
+    found = compare_joints(logs, model, hook)
     _warn(found.warnings)
     command = command_line("compare", logs, model)
     data = {**found.to_json(), "hook": str(hook) if hook else None, **_source(command)}
@@ -73,21 +71,10 @@ def compared(logs: list[Path], model: str, as_json: bool, out: Path | None) -> J
     return found
 
 
-def _one(verb: str, logs: list[Path], out: Path | None) -> Path:
-    """The log, if it is one, and no report is wanted.
-
-    Raises:
-        LogError: there are several.
-        ValueError: a report is wanted, and there is none for joints.
-    """
-    if len(logs) > 1:
-        raise LogError(
-            f"{verb}: one log of a jointed robot is judged at a time, and these are {len(logs)}; "
-            f"give {shlex.quote(str(logs[0]))} alone."
-        )
+def _no_report(verb: str, out: Path | None) -> None:
+    """Raises ValueError if a report is wanted: there is none for joints."""
     if out is not None:
         raise ValueError(f"{verb}: there is no report of jointed robots; leave --out away.")
-    return logs[0]
 
 
 def _warn(warnings: tuple[str, ...]) -> None:

@@ -31,6 +31,11 @@ COMMANDS = (
         "Make a log from motion capture exports and command tables, or of poses alone.",
     ),
     (
+        "import-joints",
+        "import_joints",
+        "Make a log of joints for an MJCF from a table, a ROS bag or a LeRobot data set.",
+    ),
+    (
         "export",
         "export",
         "Write a log as MCAP for Foxglove, as a ROS bag, or as tables, CSV or Parquet.",
@@ -208,6 +213,7 @@ TOP = (
 )
 # The others by the first word of their names, and what they are called there.
 BELOW = {
+    "import": {"joints": "import-joints"},
     "twin": {"effects": "effects", "add": "add", "set": "set", "export": "export-model"},
     "swarm": {
         "metrics": "metrics",

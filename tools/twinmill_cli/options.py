@@ -59,7 +59,11 @@ Out = Annotated[
 NewModel = Annotated[
     Path,
     typer.Option(
-        "--output", "-o", metavar="M2", show_default=False, help="The new model file (.toml)."
+        "--output",
+        "-o",
+        metavar="M2",
+        show_default=False,
+        help="The new model file (.toml; .xml of an MJCF).",
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace M2 if it exists.")]

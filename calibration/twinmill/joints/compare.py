@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from twinmill.joints.diagnose import plant_of
+from twinmill.joints.diagnose import Logs, plant_of
 from twinmill.joints.log import JointLog
 from twinmill.joints.mjcf import Mjcf
 
@@ -52,13 +52,11 @@ class JointComparison:
         }
 
 
-def compare_joints(
-    log: JointLog | Path | str, model: Path | str, hook: Path | str | None = None
-) -> JointComparison:
+def compare_joints(log: Logs, model: Path | str, hook: Path | str | None = None) -> JointComparison:
     """Runs a log's commands through MuJoCo, and compares positions.
 
     Args:
-        log: arrays, or a file of them.
+        log: arrays, or a file of them; or several of one machine.
         model: path of the MJCF.
         hook: Python file of `explain_joints`, whose forces act as well.
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that an MJCF lacks, by the evidence of a log, with their cards."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,14 @@ from twinmill.inference.answer import Answer, answer
 from twinmill.inference.search import Evidence, Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
-from twinmill.joints.log import JointLog, read_joint_log
+from twinmill.joints.files import read_joint_log
+from twinmill.joints.log import JointLog, joined
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.plant import Plant
 from twinmill.joints.problem import JointProblem, problem_of
 from twinmill.joints.series import Series, series_of
 
+Logs = JointLog | Path | str | Sequence[JointLog | Path | str]
 TOO_FAR = 1.05  # times a joint's range, in which a position is the range's own softness
 
 
@@ -63,14 +65,14 @@ class JointDiagnosis:
 
 
 def diagnose_joints(
-    log: JointLog | Path | str,
+    log: Logs,
     model: Mjcf | Path | str,
     progress: Callable[[str], None] = lambda _: None,
 ) -> JointDiagnosis:
     """Probabilities of what an MJCF lacks, from a log of its joints and commands.
 
     Args:
-        log: arrays, or a file of them.
+        log: arrays, or a file of them; or several of one machine, which are judged together.
         model: opened, or its path.
         progress: told in words what is being done.
 
@@ -86,16 +88,17 @@ def diagnose_joints(
     return JointDiagnosis(answer(table_of(search)), problem, search.fitted, warnings)
 
 
-def plant_of(log: JointLog | Path | str, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
-    """MuJoCo at the states of a log, and what is odd about the log."""
-    log = log if isinstance(log, JointLog) else read_joint_log(Path(log))
-    log = log.ordered(mjcf.joints, mjcf.actuators)
-    _check_units(log, mjcf)
+def plant_of(logs: Logs, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
+    """MuJoCo at the states of a log, or of several of one machine, and what is odd about them."""
+    given = [logs] if isinstance(logs, JointLog | Path | str) else logs
+    each = [log if isinstance(log, JointLog) else read_joint_log(Path(log)) for log in given]
+    log = joined([one.ordered(mjcf.joints, mjcf.actuators) for one in each])
+    check_units(log, mjcf)
     series = series_of(log)
-    return Plant(mjcf, series), (*_warnings(log, mjcf), *_of_speeds(log, series, mjcf))
+    return Plant(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
 
 
-def _check_units(log: JointLog, mjcf: Mjcf) -> None:
+def check_units(log: JointLog, mjcf: Mjcf) -> None:
     """Raises LogError where hinges are in degrees: beyond their ranges, which degrees would fit."""
     model = mjcf.model
     for d, name in enumerate(mjcf.joints):
@@ -107,11 +110,13 @@ def _check_units(log: JointLog, mjcf: Mjcf) -> None:
             raise LogError(
                 f"{log.name}: joint '{name}' reaches {np.abs(log.qpos[:, d]).max():.4g}, beyond "
                 f"its range of {model.jnt_range[d][0]:.3g} to {model.jnt_range[d][1]:.3g} rad: "
-                "these are degrees; give radians."
+                "these are degrees; give radians, as "
+                "`twinmill import joints --degrees` does."
             )
 
 
-def _warnings(log: JointLog, mjcf: Mjcf) -> list[str]:
+def warnings_of(log: JointLog, mjcf: Mjcf) -> list[str]:
+    """Sentences on positions and commands beyond ranges, and gaps."""
     model, found = mjcf.model, []
     for d, name in enumerate(mjcf.joints):
         low, high = model.jnt_range[d]
@@ -129,8 +134,9 @@ def _warnings(log: JointLog, mjcf: Mjcf) -> list[str]:
                 f"commands to '{name}' are beyond its ctrlrange of {low:.4g} to {high:.4g} in "
                 f"{100 * over:.2g} % of the samples; MuJoCo clips them."
             )
-    if len(log.stretches) > 1:
-        found.append(f"{len(log.stretches) - 1} gaps; steps across them are left out.")
+    gaps = len(log.stretches) - len(log.begins)
+    if gaps:
+        found.append(f"{gaps} gaps; steps across them are left out.")
     return found
 
 

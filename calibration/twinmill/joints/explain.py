@@ -13,9 +13,8 @@ import mujoco
 import numpy as np
 
 from twinmill.inference.answer import Named
-from twinmill.joints.diagnose import JointDiagnosis, diagnose_joints
+from twinmill.joints.diagnose import JointDiagnosis, Logs, diagnose_joints
 from twinmill.joints.effects.effect import Effect
-from twinmill.joints.log import JointLog
 from twinmill.joints.mjcf import INERTIAL, Edit, Mjcf
 from twinmill.joints.plant import Action
 from twinmill.model.model_file import ModelError
@@ -79,7 +78,7 @@ class JointExplanation:
 
 
 def explain_joints(
-    log: JointLog | Path | str,
+    log: Logs,
     model: Mjcf | Path | str,
     progress: Callable[[str], None] = lambda _: None,
 ) -> JointExplanation:
@@ -88,7 +87,7 @@ def explain_joints(
     Of a group that cannot be told apart the likeliest is added.
 
     Args:
-        log: arrays, or a file of them.
+        log: arrays, or a file of them; or several of one machine.
         model: opened, or its path.
         progress: told in words what is being done.
 

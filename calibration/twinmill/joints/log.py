@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from twinmill.data.lcm_log import LogError
 
-TIME, POSITION, VELOCITY, COMMAND = "t_s", "qpos.", "qvel.", "ctrl."  # how columns of files begin
 FEWEST = 40  # samples: five steps of a joint
 GAP = 3.0  # periods between two samples, from which something is missing between them
+APART_S = 1.0  # between runs that are joined: more than a command is late
 
 
 @dataclass(frozen=True)
@@ -33,6 +32,7 @@ class JointLog:
             used. None without.
         joints, actuators: names of the columns; None for those of the model, in its order.
         name: what messages call the log.
+        begins: first sample of each run, where several are joined.
     """
 
     t_s: np.ndarray
@@ -42,6 +42,7 @@ class JointLog:
     joints: Sequence[str] | None = None
     actuators: Sequence[str] | None = None
     name: str = field(default="log", kw_only=True)
+    begins: tuple[int, ...] = field(default=(0,), kw_only=True)
 
     def __post_init__(self) -> None:
         self._hold("t_s", np.asarray(self.t_s, float).reshape(-1))
@@ -97,16 +98,27 @@ class JointLog:
             )
 
     @property
+    def runs(self) -> list[slice]:
+        """Samples of each run."""
+        return [slice(a, b) for a, b in pairwise([*self.begins, len(self.t_s)])]
+
+    @property
     def period_s(self) -> float:
-        """Usual time between two samples."""
-        return float(np.median(np.diff(self.t_s)))
+        """Usual time between two samples, of the slowest run."""
+        return max(self._period_s(run) for run in self.runs)
+
+    def _period_s(self, run: slice) -> float:
+        return float(np.median(np.diff(self.t_s[run])))
 
     @property
     def stretches(self) -> list[slice]:
-        """Samples that follow each other without a gap."""
-        cuts = np.flatnonzero(np.diff(self.t_s) > GAP * self.period_s) + 1
-        edges = [0, *cuts, len(self.t_s)]
-        return [slice(a, b) for a, b in pairwise(edges)]
+        """Samples of a run that follow each other without a gap."""
+        found = []
+        for run in self.runs:
+            far = np.diff(self.t_s[run]) > GAP * self._period_s(run)
+            edges = [run.start, *(run.start + 1 + np.flatnonzero(far)), run.stop]
+            found += [slice(int(a), int(b)) for a, b in pairwise(edges)]
+        return found
 
     def ordered(self, joints: Sequence[str], actuators: Sequence[str]) -> "JointLog":
         """With the columns of a model, in its order.
@@ -152,7 +164,7 @@ class JointLog:
 
     def saved(self, path: Path) -> None:
         """Writes arrays and names as npz."""
-        names = {"joints": self.joints, "actuators": self.actuators}
+        names = {"joints": self.joints, "actuators": self.actuators, "begins": self.begins}
         given: dict[str, Any] = {
             "t_s": self.t_s,
             "ctrl": self.ctrl,
@@ -160,68 +172,35 @@ class JointLog:
             "qvel": self.qvel,
             **names,
         }
-        np.savez(path, **{key: v for key, v in given.items() if v is not None})
+        with Path(path).open("wb") as stream:
+            np.savez(stream, **{key: v for key, v in given.items() if v is not None})
 
 
-def read_joint_log(path: Path) -> JointLog:
-    """A log in a file: npz with the fields of `JointLog`, or a table of columns named by them.
+def joined(logs: Sequence[JointLog]) -> JointLog:
+    """Runs of one machine as one log, one after the other, each begun with its first command held.
 
-    A CSV has `t_s`, one column `qpos.NAME` for each joint and one `ctrl.NAME` for each actuator;
-    `qvel.NAME` if there are velocities.
-
-    Raises:
-        LogError: it cannot be read, or columns are missing.
+    Args:
+        logs: with the columns of one model, in its order.
     """
-    path = Path(path)
-    try:
-        if path.suffix == ".npz":
-            with np.load(path, allow_pickle=False) as held:
-                return _of_arrays({key: held[key] for key in held.files}, path.name)
-        return _of_table(pd.read_csv(path), path.name)
-    except (OSError, ValueError, UnicodeDecodeError) as error:
-        raise LogError(
-            f"{path}: cannot be read as a log of joints ({error}); give npz with t_s, ctrl and "
-            "qpos, or CSV with columns t_s, qpos.NAME and ctrl.NAME."
-        ) from error
-
-
-def _of_arrays(held: dict[str, np.ndarray], name: str) -> JointLog:
-    for needed in ("t_s", "ctrl", "qpos"):
-        if needed not in held:
-            raise LogError(f"{name}: has no array '{needed}'; it needs t_s, ctrl and qpos.")
-    names = {
-        key: tuple(map(str, np.atleast_1d(held[key])))
-        for key in ("joints", "actuators")
-        if key in held
-    }
-    return JointLog(held["t_s"], held["ctrl"], held["qpos"], held.get("qvel"), name=name, **names)
-
-
-def _of_table(table: pd.DataFrame, name: str) -> JointLog:
-    if TIME not in table:
-        raise LogError(f"{name}: has no column '{TIME}'; its first are {_first(table)}.")
-    own = {
-        begin: [str(c) for c in table.columns if str(c).startswith(begin)]
-        for begin in (POSITION, COMMAND, VELOCITY)
-    }
-    for begin in (POSITION, COMMAND):
-        if not own[begin]:
-            raise LogError(
-                f"{name}: has no column '{begin}NAME'; its first are {_first(table)}. Rename the "
-                "columns after the model's joints and actuators."
-            )
-    joints = [c.removeprefix(POSITION) for c in own[POSITION]]
-    speeds = [VELOCITY + joint for joint in joints]
-    return JointLog(
-        table[TIME].to_numpy(float),
-        table[own[COMMAND]].to_numpy(float),
-        table[own[POSITION]].to_numpy(float),
-        table[speeds].to_numpy(float) if set(speeds) <= set(table.columns) else None,
-        joints,
-        [c.removeprefix(COMMAND) for c in own[COMMAND]],
-        name=name,
+    if len(logs) == 1:
+        return logs[0]
+    t_s: list[np.ndarray] = []
+    begins, count = list[int](), 0
+    for log in logs:
+        start_s = t_s[-1][-1] + APART_S if t_s else 0.0
+        t_s.append(log.t_s - log.t_s[0] + start_s)
+        begins += [count + k for k in log.begins]
+        count += len(log.t_s)
+    ctrl = np.concatenate([log.ctrl for log in logs])
+    for first in begins[1:]:  # a run's last command acts on nothing but the pause behind it
+        ctrl[first - 1] = ctrl[first]
+    speeds = [log.qvel for log in logs if log.qvel is not None]
+    return replace(
+        logs[0],
+        t_s=np.concatenate(t_s),
+        ctrl=ctrl,
+        qpos=np.concatenate([log.qpos for log in logs]),
+        qvel=np.concatenate(speeds) if len(speeds) == len(logs) else None,
+        name=", ".join(dict.fromkeys(log.name for log in logs)),
+        begins=tuple(begins),
     )
-
-
-def _first(table: pd.DataFrame) -> str:
-    return ", ".join(map(str, table.columns[:6]))

@@ -114,6 +114,15 @@ class Mjcf:
         """(U,) True of actuators that are told a position and hold it."""
         return np.asarray(self.model.actuator_biasprm[:, 1] < 0)
 
+    @cached_property
+    def told(self) -> tuple[str, ...]:
+        """Kind of command of each actuator: "position", "velocity" or "effort"."""
+        speed = (self.model.actuator_biasprm[:, 1] == 0) & (self.model.actuator_biasprm[:, 2] < 0)
+        # a motor with damping of its own is told no speed: its gain is not that of the damping
+        speed &= np.isclose(self.model.actuator_gainprm[:, 0], -self.model.actuator_biasprm[:, 2])
+        both = zip(self.servo, speed, strict=True)
+        return tuple("position" if p else "velocity" if v else "effort" for p, v in both)
+
     def edited(self, edits: Sequence[Edit]) -> str:
         """The text with other attributes, and nothing else changed.
 

@@ -16,6 +16,7 @@ import numpy as np
 from mujoco import rollout
 from scipy.signal import lfilter
 
+from twinmill.inference.settings import PRIORS
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.series import Series
 from twinmill.model.parameters import effect_names, instance_of, key_of
@@ -24,6 +25,7 @@ CLOCK = "clock.offset_s"  # by which positions are stamped later than commands
 STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 INPUT = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
 NEUTRAL = {CLOCK: 0.0}  # numbers of the base that are no factors
+SHARE = 0.1  # default strength of what adds to a force or scales a number: a tenth
 SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
 SLOW = 0.02  # of a joint's usual speed, below which its direction is soft
 CLOCK_NUDGE_S = 1e-3
@@ -61,7 +63,8 @@ class Action:
         ctrl = self.series.commands(self.late_s)
         for a, lag_s in enumerate(self.lag_s):
             if lag_s > 0:
-                ctrl[:, a] = _lagged(ctrl[:, a], lag_s, self.series.width_s[0])
+                for run in self.series.runs:
+                    ctrl[run, a] = _lagged(ctrl[run, a], lag_s, self.series.width_s[0])
         for a, shape in self.shapes:
             ctrl[:, a] = shape(ctrl[:, a])
         return ctrl
@@ -77,8 +80,9 @@ class Usual:
         speed, reach: (J,) root mean square velocity, and range of positions.
         command: (U,) root mean square command, about a servo's position.
         gives: (n, J) momentum that a joint takes from a small force: 0 where friction holds it.
-        slides: (W, J) 1 for steps in which a joint neither turns back nor is held by friction; 0
-            for others, which say nothing: friction is anything up to its limit there.
+        slides: (W, J) 1 for steps in which a joint neither turns back nor is held by friction, were
+            that more by an effect of usual size; 0 for others, which say nothing: friction is
+            anything up to its limit there.
     """
 
     torque: np.ndarray
@@ -219,23 +223,41 @@ class Plant:
             np.maximum(speed, 1e-9),
             np.maximum(np.ptp(s.q, axis=0), 1e-9),
             np.maximum(np.sqrt((lead**2).mean(axis=0)), 1e-9),
-            gives := self._gives(load),
-            (abs(s.weights) @ ((gives < HELD) | _turns(s.v)) == 0).astype(float),
+            self._gives(load, 0.0),
+            self._slides(load),
         )
 
-    def _gives(self, load: np.ndarray) -> np.ndarray:
-        """(n, J) by two pushes of each joint."""
+    def _slides(self, load: np.ndarray) -> np.ndarray:
+        """(W, J), see `Usual`."""
+        held = self._gives(load, PRIORS.size * SHARE) < HELD
+        touched = abs(self.series.weights) @ (held | _turns(self.series.v))
+        return np.asarray(touched == 0, float)
+
+    def _gives(self, load: np.ndarray, more: float) -> np.ndarray:
+        """(n, J) by two pushes of each joint, over those without its own friction in that pose.
+
+        Args:
+            load: (J,) usual force.
+            more: friction than the model's, over the load.
+        """
         out = np.empty_like(self.series.q)
-        for d, nudge in enumerate(NUDGE * np.maximum(load, 1e-9)):
-            each = []
-            for sign in (1, -1):
-                action = self.begin()
-                action.force[:, d] = sign * nudge
-                each.append(self.accelerations(action)[:, d])
-            out[:, d] = (each[0] - each[1]) / (2 * nudge)
-        share = out / np.maximum(out.max(axis=0), 1e-300)
-        soft = 1 - self.mjcf.model.dof_solimp[:, 0]  # what MuJoCo's friction lets through
-        return np.clip((share - soft) / (1 - soft), 0.0, 1.0)
+        for d, usual in enumerate(np.maximum(load, 1e-9)):
+            own = float(self.mjcf.model.dof_frictionloss[d]) + more * usual
+            free = np.maximum(self._yields(d, NUDGE * usual, 0.0), 1e-300)
+            share = self._yields(d, NUDGE * usual, own) / free
+            soft = 1 - self.mjcf.model.dof_solimp[d, 0]  # what MuJoCo's friction lets through
+            out[:, d] = np.clip((share - soft) / (1 - soft), 0.0, 1.0)
+        return out
+
+    def _yields(self, d: int, nudge: float, friction: float) -> np.ndarray:
+        """(n,) acceleration of a joint with some friction, over a small force on it."""
+        each = []
+        for sign in (1, -1):
+            action = self.begin()
+            action.model.dof_frictionloss[d] = friction
+            action.force[:, d] = sign * nudge
+            each.append(self.accelerations(action)[:, d])
+        return np.asarray(each[0] - each[1]) / (2 * nudge)
 
 
 class Steps:

@@ -40,6 +40,7 @@ class Series:
         weights: (W, n) sparse: the same of accelerations (n, J).
         at: (W,) state in the middle of each step.
         stretches: slices of steps that follow each other without a gap.
+        runs: slices of states of each run.
         block: (W,) number of the block of time.
     """
 
@@ -54,8 +55,14 @@ class Series:
     weights: csr_matrix
     at: np.ndarray
     stretches: list[slice]
+    runs: list[slice]
     block: np.ndarray
     _integral: np.ndarray = field(repr=False)
+
+    @property
+    def since_s(self) -> np.ndarray:
+        """(n,) time of each state since its run began."""
+        return np.concatenate([self.t_s[run] - self.t_s[run][0] for run in self.runs])
 
     def commands(self, delay_s: np.ndarray) -> np.ndarray:
         """(n, U) mean command to each actuator about each state, held from stamp to stamp."""
@@ -93,10 +100,12 @@ def series_of(log: JointLog) -> Series:
     first = np.cumsum([0, *(len(p.t_s) for p in found)])
     mid_s = np.concatenate([p.mid_s for p in found])
     length_s = min(BLOCK_S, np.ptp(mid_s) / FEWEST_BLOCKS)
+    t_s = np.concatenate([p.t_s for p in found])
+    edges = [*np.searchsorted(t_s, log.t_s[[*log.begins]]), len(t_s)]
     held = np.diff(log.t_s)[:, None] * log.ctrl[:-1]
     return Series(
         log,
-        np.concatenate([p.t_s for p in found]),
+        t_s,
         np.concatenate([p.q for p in found]),
         np.concatenate([p.v for p in found]),
         np.full(first[-1], fine),
@@ -106,6 +115,7 @@ def series_of(log: JointLog) -> Series:
         _stacked([p.weights for p in found]),
         np.concatenate([p.at + begin for p, begin in zip(found, first, strict=False)]),
         [slice(a, b) for a, b in pairwise(rows)],
+        [slice(int(a), int(b)) for a, b in pairwise(edges) if b > a],
         np.floor((mid_s - mid_s[0]) / length_s * (1 - 1e-9)).astype(int),
         np.concatenate([np.zeros((1, log.ctrl.shape[1])), np.cumsum(held, axis=0)]),
     )

@@ -4,12 +4,14 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.joints.compare import WINDOW_S, JointComparison
 from twinmill.joints.diagnose import JointDiagnosis
 from twinmill.joints.explain import JointExplanation
+from twinmill.joints.importers.import_joints import Imported
 from twinmill.report import show
 from twinmill.report.inference import percent, sentence
 from twinmill.report.tables import Cell, Table, number
@@ -55,6 +57,25 @@ def explanation(found: JointExplanation, written: Mapping[str, str]) -> Renderab
     if not written:
         lines.append("Not written: nothing that a model can hold is likelier missing than not.")
     return Group(diagnosis(found.diagnosis), Text(), *map(Text, lines))
+
+
+def imported(found: Imported, path: Path) -> RenderableType:
+    """Text of `twinmill import joints`."""
+    log, mjcf = found.log, found.mjcf
+    rows = [
+        [Cell(name), Cell(number(low)), Cell(number(high)), Cell(unit)]
+        for names, table, units in (
+            (mjcf.joints, log.qpos, mjcf.units),
+            (mjcf.actuators, log.ctrl, ["ctrl"] * len(mjcf.actuators)),
+        )
+        for name, low, high, unit in zip(
+            names, table.min(axis=0).tolist(), table.max(axis=0).tolist(), units, strict=True
+        )
+    ]
+    last_s = sum(float(np.ptp(log.t_s[run])) for run in log.runs)
+    runs = f", {len(log.begins)} runs" if len(log.begins) > 1 else ""
+    title = f"{path}: {last_s:.4g} s at {1 / log.period_s:.4g} Hz{runs}"
+    return show.table(Table(title, ["joint or actuator", "least", "most", "unit"], rows))
 
 
 def comparison(found: JointComparison, hook: Path | None) -> RenderableType:

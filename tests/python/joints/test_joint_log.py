@@ -6,7 +6,7 @@ import pytest
 
 from twinmill import JointLog, LogError, ModelError
 from twinmill.joints.diagnose import plant_of
-from twinmill.joints.log import read_joint_log
+from twinmill.joints.files import read_joint_log
 from twinmill.joints.mjcf import Mjcf
 
 ARM = """<mujoco>

@@ -137,7 +137,7 @@ def list_topics(path: Path) -> list[Topic]:
     Raises:
         LogError: it is no bag, broken, or empty.
     """
-    with _open(path) as reader:
+    with open_bag(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         counts = {name: topic.msgcount for name, topic in reader.topics.items()}
         many = [c for c in reader.connections if c.msgtype in MANY]
@@ -366,7 +366,7 @@ def _number(pair: tuple[str, str], options: BagOptions, robots: int) -> int:
 
 
 @contextmanager
-def _open(path: Path):
+def open_bag(path: Path):
     """The bag, open for reading; what goes wrong inside is one sentence."""
     with needing("ros"):  # slow to import
         from apsw import Error as SqliteError
@@ -617,7 +617,7 @@ def _read(path: Path, topics: list[Role]) -> dict[Role, _Messages]:
     wanted: dict[str, dict[str, _Messages]] = {}  # frames, by the topic of tf
     whole: dict[str, list[tuple[_Messages, Callable[[Any], Row]]]] = {}  # topics that are one thing
     frames, with_frames = Frames(), any(":" in topic for topic, _ in topics)
-    with _open(path) as reader:
+    with open_bag(path) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         names = [_in_bag(topic.partition(":")[0], role, kinds) for topic, role in topics]
         if missing := [name for name in names if name not in kinds]:

@@ -86,7 +86,7 @@ class ServoDamping(ActuatorEffect):
         """The gain that is added."""
         usual = float(self.plant.usual.load[self.joint] / self.plant.usual.speed[self.joint])
         own = -float(self.plant.mjcf.model.actuator_biasprm[self.at, 2])
-        return [Number("more", "N m s/rad", SHARE * usual, -own, 100 * usual)]
+        return [Number("more", self.per_speed, SHARE * usual, -own, 100 * usual)]
 
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """In MuJoCo's own number."""
@@ -240,14 +240,14 @@ class SupplyDrift(ActuatorEffect):
 
     def act(self, action: Action, values: Mapping[str, float]) -> None:
         """A force that takes away what is lost."""
-        t_s = action.series.t_s
-        share = (t_s - t_s[0]) / max(np.ptp(t_s), 1e-9)
+        since_s = action.series.since_s
+        share = since_s / max(since_s.max(), 1e-9)
         own = self.plant.usual.torque[:, self.joint]
         action.force[:, self.joint] -= values["loss"] * share * own
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""
-        return f"{-values['loss']:.6g} * f * min(t / {np.ptp(self.plant.series.t_s):.6g}, 1.0)"
+        return f"{-values['loss']:.6g} * f * min(t / {self.plant.series.since_s.max():.6g}, 1.0)"
 
 
 def _play(u: np.ndarray, width: float) -> np.ndarray:

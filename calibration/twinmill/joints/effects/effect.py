@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from twinmill.joints.plant import SHARE as SHARE
 from twinmill.joints.plant import SLOW, Action, Plant
-
-SHARE = 0.1  # default strength of what adds to a force or scales a number: a tenth
 
 
 @dataclass(frozen=True)
@@ -89,6 +88,21 @@ class Effect(ABC):
         """The joint that it acts on; the first for the whole robot."""
         return self.at
 
+    @property
+    def unit(self) -> str:
+        """Unit of a force on the joint: N of a slide, N m of a hinge."""
+        return "N m" if self.plant.mjcf.units[self.joint] == "rad" else "N"
+
+    @property
+    def per_speed(self) -> str:
+        """Unit of a force over a speed."""
+        return "N m s/rad" if self.plant.mjcf.units[self.joint] == "rad" else "N s/m"
+
+    @property
+    def per_way(self) -> str:
+        """Unit of a force over a way."""
+        return "N m/rad" if self.plant.mjcf.units[self.joint] == "rad" else "N/m"
+
     def words(self) -> tuple[str, ...]:
         """Dependences for which it may be mistaken, with the joint."""
         return tuple(f"{word} of {plain(self.plant.mjcf.joints[self.joint])}"
@@ -117,21 +131,6 @@ class JointEffect(Effect):
     def sign(self) -> str:
         """Direction of motion in Python, soft as in `Usual.sign`."""
         return f"np.tanh(v / {SLOW * self.speed:.6g})"
-
-    @property
-    def unit(self) -> str:
-        """Unit of a force on the joint: N of a slide, N m of a hinge."""
-        return "N m" if self.plant.mjcf.units[self.at] == "rad" else "N"
-
-    @property
-    def per_speed(self) -> str:
-        """Unit of a force over a speed."""
-        return "N m s/rad" if self.plant.mjcf.units[self.at] == "rad" else "N s/m"
-
-    @property
-    def per_way(self) -> str:
-        """Unit of a force over a way."""
-        return "N m/rad" if self.plant.mjcf.units[self.at] == "rad" else "N/m"
 
 
 class ActuatorEffect(Effect):

@@ -18,6 +18,7 @@ class Coulomb(JointEffect):
     source = "MuJoCo, joint/frictionloss; Olsson et al. 1998, Eur. J. Control 4, ch. 3"
     told_by = ("speed",)
     written = True
+    changes = "exact"  # it decides what is held
 
     @property
     def parameters(self) -> list[Number]:
