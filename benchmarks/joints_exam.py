@@ -278,7 +278,6 @@ def cases(robot: str) -> dict[str, Case]:
     offset = any_of(f"force_offset@{j2}", f"coulomb_friction_by_direction@{j2}")
     found = {
         "nothing": Case(),
-        "nothing b": Case(),
         "coulomb": Case((any_of(f"coulomb_friction@{j2}"),),
                         attribute("joint", j2, "frictionloss", plus=0.15)),
         "viscous": Case((any_of(f"viscous_friction@{j1}", f"servo_damping@{a1}"),),

@@ -12,6 +12,7 @@ from twinmill.files import check_new_file, replacing
 from twinmill.joints.compare import JointComparison, compare_joints
 from twinmill.joints.diagnose import JointDiagnosis, diagnose_joints
 from twinmill.joints.explain import JointExplanation, explain_joints
+from twinmill.joints.next import Excitation, next_joints
 from twinmill.report import joints as shown
 from twinmill.version import __version__
 from twinmill_cli.frame import command_line
@@ -68,6 +69,35 @@ def compared(logs: list[Path], model: str, as_json: bool, out: Path | None) -> J
     command = command_line("compare", logs, model)
     data = {**found.to_json(), "hook": str(hook) if hook else None, **_source(command)}
     deliver(data, shown.comparison(found, hook), as_json)
+    return found
+
+
+def designed(
+    logs: list[Path],
+    model: str,
+    output: Path,
+    *,
+    duration_s: float,
+    times_speed: float,
+    force: bool,
+    as_json: bool,
+    out: Path | None,
+) -> Excitation:
+    """Writes the motion that parts what logs leave open."""
+    _no_report("next", out)
+    check_new_file(output, force, [Path(model), *logs])
+    with telling(f"designing a run with {model}") as progress, threadpool_limits(1, "blas"):
+        found = next_joints(
+            logs, model, duration_s=duration_s, times_speed=times_speed, progress=progress
+        )
+    _warn(found.diagnosis.warnings)
+    with replacing(output, force) as place:
+        place.write_text(found.text(), encoding="utf-8")
+    verb = f"next --duration-s {duration_s:g} --times-speed {times_speed:g}"
+    command = command_line(verb, logs, model, output)
+    then = command_line("diagnose", [*logs, Path("next.mcap")], model)
+    data = {"script": str(output), **found.to_json(), "then": then, **_source(command)}
+    deliver(data, shown.excitation(found, output, then), as_json)
     return found
 
 

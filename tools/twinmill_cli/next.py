@@ -27,10 +27,19 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import next_run as present
     from twinmill.terminal import progress_bar
-    from twinmill_cli.frame import command_line, finish, load, open_model, provenance, told
+    from twinmill_cli.frame import (
+        command_line,
+        finish,
+        is_mjcf,
+        load,
+        open_model,
+        provenance,
+        told,
+    )
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
 if TYPE_CHECKING:
+    from twinmill.joints.next import Excitation
     from twinmill.swarm.narrowing import Narrowing
     from twinmill.swarm.request import Request
 
@@ -80,11 +89,20 @@ def _next(
     draws: Annotated[int, typer.Option("--draws", min=4, help="Models that are drawn.")] = 40,
     seeds: Annotated[int, typer.Option("--seeds", min=1, help="Runs of each model.")] = 20,
     swarm_s: Annotated[float, typer.Option("--swarm-s", min=10, help="Length of each run.")] = 120,
+    times_speed: Annotated[
+        float,
+        typer.Option(
+            "--times-speed",
+            min=0.1,
+            max=5,
+            help="Of an MJCF: highest speed of each joint, over that in the logs.",
+        ),
+    ] = 1.0,
     force: Annotated[bool, typer.Option("--force", help="Replace SCRIPT if it exists.")] = False,
     script_as: ScriptAs = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> Plan | Narrowing:
+) -> Plan | Narrowing | Excitation:
     """Design the run that best discriminates what these logs cannot, and write its script.
 
     In question are the effects that `diagnose` cannot distinguish, else those
@@ -96,7 +114,14 @@ def _next(
     script determines the parameters on which their outcomes depend most.
 
     Example: twinmill next run.lcmlog --model fitted.toml -o script.csv
+
+    Of an MJCF: twinmill next run.mcap --model arm.xml -o excitation.csv
     """
+    if is_mjcf(model):
+        from twinmill_cli.joints import designed  # MuJoCo's Python is slow to import
+
+        how_long = {"duration_s": duration_s, "times_speed": times_speed}
+        return designed(logs, model, output, **how_long, force=force, as_json=as_json, out=out)
     limits = Limits(duration_s, _sides(floor_m), max_duty_pct / 100)
     verb = f"next --duration-s {duration_s:g} --floor-m {floor_m} --max-duty-pct {max_duty_pct}"
     verb += f" --script-as {script_as}" if script_as else ""

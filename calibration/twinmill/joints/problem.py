@@ -59,14 +59,19 @@ class JointProblem(Problem):
         return dependences.moments(self.plant)
 
 
-def problem_of(plant: Plant) -> JointProblem:
-    """Prepares a log of a robot."""
+def begun(plant: Plant) -> tuple[dict[str, Effect], JointModel, Prior]:
+    """Effects that a robot may have in a log, its base's model, and what is known of that."""
     effects = effects_of(plant)
     base = {f"base.{key}": factor for key, factor in base_numbers(plant).items()}
     names = [CLOCK, *base]
-    catalogue = {**effects, **base}
-    model = JointModel(catalogue, {n: 0.0 if n == CLOCK else 1.0 for n in names})
-    steps, prior = Steps(plant), _prior(names, plant)
+    model = JointModel({**effects, **base}, {n: 0.0 if n == CLOCK else 1.0 for n in names})
+    return effects, model, _prior(names, plant)
+
+
+def problem_of(plant: Plant) -> JointProblem:
+    """Prepares a log of a robot."""
+    effects, model, prior = begun(plant)
+    steps = Steps(plant)
     noise = _begin_noise(steps, model)
     fitted = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     kinds = Kinds({name: effect.words() for name, effect in effects.items()})
@@ -84,7 +89,7 @@ def problem_of(plant: Plant) -> JointProblem:
         kinds,
         plant,
         effects,
-        catalogue,
+        model.catalogue,
     )
     for _ in range(ROUNDS):
         noise = flexible_noise(p)

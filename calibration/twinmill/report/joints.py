@@ -12,10 +12,12 @@ from twinmill.joints.compare import WINDOW_S, JointComparison
 from twinmill.joints.diagnose import JointDiagnosis
 from twinmill.joints.explain import JointExplanation
 from twinmill.joints.importers.import_joints import Imported
+from twinmill.joints.next import Excitation, sure
 from twinmill.report import show
 from twinmill.report.inference import percent, sentence
 from twinmill.report.tables import Cell, Table, number
 
+QUESTIONS = 8  # that are listed, those first that stay open; --json has all
 SHOWN = 0.05  # probability of an effect that is listed; --json has all
 
 
@@ -93,6 +95,38 @@ def comparison(found: JointComparison, hook: Path | None) -> RenderableType:
     columns = ["joint", f"windows of {WINDOW_S:g} s", "free run", "unit"]
     note = f"With the forces of {hook}." if hook else ""
     return show.table(Table("RMS errors of positions", columns, rows, note=note))
+
+
+def excitation(found: Excitation, path: Path, then: str) -> RenderableType:
+    """Text of `twinmill next` of an MJCF.
+
+    Args:
+        found: the motion.
+        path: of the script.
+        then: the command that judges what it was for.
+    """
+    rows = [
+        [Cell(a), Cell(b or "nothing"), Cell(percent(sure(found.before[a, b]))),
+         Cell(percent(sure(odds)))]
+        for (a, b), odds in sorted(found.odds.items(), key=lambda item: item[1])
+    ]  # fmt: skip
+    columns = ["effect", "instead of", "these logs", "this run"]
+    note = (
+        "Expected probability of the right one. Of the questions not shown this run is surer."
+        if len(rows) > QUESTIONS
+        else "Expected probability of the right one."
+    )
+    table = Table("Told apart by", columns, rows[:QUESTIONS], note=note, words=(0, 1))
+    pose = zip(found.mjcf.joints, found.log.qpos[0], found.mjcf.units, strict=True)
+    begin = ", ".join(f"{joint} {number(float(q))} {unit}" for joint, q, unit in pose)
+    lines = [
+        f"Written: {path}, the best of {found.kept} motions within the limits ({found.tried} "
+        f"tried). It begins at rest at {begin}.",
+        "ctrl.* is what to command; where actuators are told forces let a controller follow "
+        "qpos.*, and record what it commands.",
+        f"then: {then}",
+    ]
+    return Group(show.table(table), Text(), *map(Text, lines))
 
 
 def _effects(found: JointDiagnosis) -> Table:
