@@ -94,7 +94,7 @@ def plant_of(logs: Logs, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
     each = [log if isinstance(log, JointLog) else read_joint_log(Path(log)) for log in given]
     log = joined([one.ordered(mjcf.joints, mjcf.actuators) for one in each])
     check_units(log, mjcf)
-    series = series_of(log, mjcf.fed_back)
+    series = series_of(log)
     return Plant(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
 
 

@@ -115,11 +115,6 @@ class Mjcf:
         return np.asarray(self.model.actuator_biasprm[:, 1] < 0)
 
     @cached_property
-    def fed_back(self) -> bool:
-        """True if an actuator's force depends on the state, as a servo's does."""
-        return bool(np.any(self.model.actuator_biasprm[:, 1:3]))
-
-    @cached_property
     def told(self) -> tuple[str, ...]:
         """Kind of command of each actuator: "position", "velocity" or "effort"."""
         speed = (self.model.actuator_biasprm[:, 1] == 0) & (self.model.actuator_biasprm[:, 2] < 0)

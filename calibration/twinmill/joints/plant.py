@@ -29,7 +29,6 @@ SHARE = 0.1  # default strength of what adds to a force or scales a number: a te
 SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
 SLOW = 0.02  # of a joint's usual speed, below which its direction is soft
 CLOCK_NUDGE_S = 1e-3
-WINDOW_S = 2.0  # in which a servo's model does not go far from its robot
 KEPT = 200  # predictions that are kept, since searches ask for them again
 HELD = 0.98  # share of a push that a joint takes, below which friction holds it
 NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether it gives way
@@ -76,10 +75,7 @@ class Usual:
     """Motion and forces of the base in a log.
 
     Attributes:
-        torque: (n, J) forces of its actuators; where these are fed back, as the model moves by
-            itself from a measured state on each WINDOW_S: the noise of measured positions is in the
-            errors, and must not be in what they are explained by (instrumental variables; Young
-            2011, Recursive Estimation and Time-Series Analysis, ch. 6).
+        torque: (n, J) forces of its actuators.
         load: (J,) root mean square of the force on each joint.
         speed, reach: (J,) root mean square velocity, and range of positions.
         command: (U,) root mean square command, about a servo's position.
@@ -217,9 +213,6 @@ class Plant:
             mujoco.mj_forward(model, data)
             torque[k] = data.qfrc_actuator
             inertial[k] = data.qfrc_bias
-        if self.mjcf.fed_back:
-            own = self._servos(ctrl)
-            torque = np.where(np.isfinite(own), own, torque)
         load = np.sqrt((torque**2).mean(axis=0))
         load = np.where(load > 0, load, np.sqrt((inertial**2).mean(axis=0)))
         lead = ctrl - np.where(self.mjcf.servo, s.q[:, self.mjcf.moves], 0.0)
@@ -233,26 +226,6 @@ class Plant:
             self._gives(load, 0.0),
             self._slides(load),
         )
-
-    def _servos(self, ctrl: np.ndarray) -> np.ndarray:
-        """(n, J) forces of actuators as commands (n, U) alone move the model."""
-        model, s = copy(self.mjcf.model), self.series
-        width_s = float(s.width_s[0])
-        half = max(round(width_s / 2 / float(model.opt.timestep)), 1)
-        model.opt.timestep = width_s / (2 * half)
-        model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
-        data, out = mujoco.MjData(model), np.empty_like(s.q)
-        begin_s = -np.inf
-        for k, t_s in enumerate(s.t_s):
-            if t_s - begin_s >= WINDOW_S or t_s - s.t_s[k - 1] > 1.5 * width_s:
-                data.qpos[:], data.qvel[:], begin_s = s.q[k], s.v[k], t_s
-            data.ctrl[:] = ctrl[k]
-            mujoco.mj_forward(model, data)
-            out[k] = data.qfrc_actuator
-            mujoco.mj_step(model, data, half)
-            data.ctrl[:] = ctrl[min(k + 1, len(ctrl) - 1)]
-            mujoco.mj_step(model, data, half)
-        return out
 
     def _slides(self, load: np.ndarray) -> np.ndarray:
         """(W, J), see `Usual`."""

@@ -20,12 +20,10 @@ from twinmill.joints.log import JointLog
 
 STEP_S = 0.05  # about the time in which a servo settles
 FEWEST = 8  # samples of a step: fewer give no slope
-FINE, DEGREE = 5, 3  # states within a step at which the acceleration is predicted, and the degree
-# of the polynomial through the positions about each
-FINE_FED_BACK, DEGREE_FED_BACK = 10, 5  # of servos: their gains make a force of its error, which
-# with the former was a tenth of the noise of a good encoder, by a simulation without noise
+FINE = 5  # states within a step at which the acceleration is predicted
 FEWEST_STEPS = 10  # of a stretch, and of a log
 BLOCK_S, FEWEST_BLOCKS = 8.0, 6  # blocks of time counted as independent
+DEGREE = 3  # of the polynomial through the positions about a state
 
 
 @dataclass(frozen=True)
@@ -83,20 +81,15 @@ class Series:
         return found + np.maximum(t_s - stamps[-1], 0) * ctrl[-1]
 
 
-def series_of(log: JointLog, fed_back: bool = False) -> Series:
+def series_of(log: JointLog) -> Series:
     """The states and steps of a log.
-
-    Args:
-        log: of the robot.
-        fed_back: its actuators' forces depend on its state, as those of servos do.
 
     Raises:
         LogError: it is too short.
     """
     step_s = max(STEP_S, FEWEST * log.period_s)
-    fine = step_s / (FINE_FED_BACK if fed_back else FINE)
-    degree = DEGREE_FED_BACK if fed_back else DEGREE
-    parts = [_part(log, part, step_s, fine_s=fine, degree=degree) for part in log.stretches]
+    fine = step_s / FINE
+    parts = [_part(log, part, step_s, fine) for part in log.stretches]
     found = [part for part in parts if part is not None]
     if sum(len(p.changes) for p in found) < FEWEST_STEPS:
         raise LogError(
@@ -141,7 +134,7 @@ class _Part:
     at: np.ndarray
 
 
-def _part(log: JointLog, part: slice, step_s: float, *, fine_s: float, degree: int) -> _Part | None:
+def _part(log: JointLog, part: slice, step_s: float, fine_s: float) -> _Part | None:
     """The steps of a stretch; None where it is too short for any."""
     stamps, qpos = log.t_s[part], log.qpos[part]
     edges_s = np.arange(stamps[0] + step_s / 2, stamps[-1] - step_s / 2, step_s)
@@ -151,7 +144,7 @@ def _part(log: JointLog, part: slice, step_s: float, *, fine_s: float, degree: i
     within = np.column_stack([edges_s - step_s / 2, edges_s + step_s / 2])
     slopes, before = zip(*(_edge(stamps, qpos, t_s, w) for w in within), strict=True)
     mid_s = (edges_s[1:] + edges_s[:-1]) / 2
-    q, v = _states(stamps, qpos, t_s, step_s, degree=degree)
+    q, v = _states(stamps, qpos, t_s, step_s)
     return _Part(
         t_s, q, v, mid_s, np.diff(slopes, axis=0), -np.diff(before, axis=0) * fine_s,
         np.searchsorted(t_s, mid_s),
@@ -173,14 +166,14 @@ def _edge(
 
 
 def _states(
-    stamps: np.ndarray, qpos: np.ndarray, t_s: np.ndarray, step_s: float, *, degree: int
+    stamps: np.ndarray, qpos: np.ndarray, t_s: np.ndarray, step_s: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n, J) positions and velocities at some times, by polynomials through a step's samples."""
     count = min(int(np.round(step_s / np.median(np.diff(stamps)))) + 1, len(stamps))
     first = np.clip(np.searchsorted(stamps, t_s) - count // 2, 0, len(stamps) - count)
     index = first[:, None] + np.arange(count)
     away = (stamps[index] - t_s[:, None]) / step_s
-    powers = away[:, :, None] ** np.arange(degree + 1)
+    powers = away[:, :, None] ** np.arange(DEGREE + 1)
     gram = np.einsum("nik,nil->nkl", powers, powers)
     push = np.einsum("nik,nij->nkj", powers, qpos[index])
     found = np.linalg.solve(gram, push)
