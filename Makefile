@@ -12,7 +12,7 @@ CTEST := ctest --test-dir build --output-on-failure --no-tests=error \
 # told to write no bytecode, it would compile a hundred modules at each start.
 PACKAGES = $$($(PYTHON) -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
 INSTALL = cmake --install build --component python --prefix "$(PACKAGES)" >/dev/null && \
-	    $(PYTHON) -m compileall -q calibration tools "$(PACKAGES)/turbopi"
+	    $(PYTHON) -m compileall -q calibration lab tools "$(PACKAGES)/turbopi"
 
 build:
 	@scripts/setup build
@@ -83,7 +83,8 @@ docs: build
 	    --requirement docs/requirements.lock && cp docs/requirements.lock .deps/docs; }
 	@PYTHONPATH=.deps/docs NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs --quiet build
 
-# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for glibc 2.28 and later ones.
+# One file to install with pip where there is no compiler: dist/twinmill-*.whl, for glibc 2.28 and later ones;
+# and dist/twinmill_lab-*.whl, which an article needs beside it.
 # What it is compiled with goes into .deps/wheel-root (150 MB fetched). `scripts/wheel dist` alone makes
 # one for this machine's glibc and Python.
 wheel: build

@@ -20,12 +20,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from twinmill.challenge.drives import drive
-from twinmill.challenge.physics import Hidden, catalogue_forms
-from twinmill.challenge.robots import Robot, draw_robot
-from twinmill.challenge.run import Plan, play, write_log
 from twinmill.data.measurement import load_measurements
 from twinmill.defaults import ALARM_RATE
+from twinmill.experiment.drives import drive
 from twinmill.files import plain
 from twinmill.fitting.opening import Opened
 from twinmill.model.model_file import ModelFile
@@ -34,6 +31,9 @@ from twinmill.runs.changes import kinds_of
 from twinmill.runs.compare import may_alarm, open_run, second_half
 from twinmill.runs.difference import Difference, difference
 from twinmill.runs.reference import Day, day_of, steadier
+from twinmill_lab.challenge.physics import Hidden, catalogue_forms
+from twinmill_lab.challenge.robots import Robot, draw_robot
+from twinmill_lab.challenge.run import Plan, play, write_log
 
 HEALTHY = 19  # runs that calibrate the alarm, the first one included
 TESTS, WEAK_TESTS = 12, 6  # of each robot

@@ -14,10 +14,10 @@ import numpy as np
 import sysid_fit
 from ratio import Ratio, single
 
-from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.data.track import command_at
 from twinmill.diagnosis.diagnose import diagnose
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
 

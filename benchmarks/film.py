@@ -24,16 +24,16 @@ import numpy as np
 import turbopi
 
 import twinmill as tm
-from twinmill.challenge.cases import Case, draw, draw_robots
-from twinmill.challenge.run import EPOCH_US, ROBOT_ID, STEP_S, Motion, play, write_log
-from twinmill.challenge.scoring import scored
 from twinmill.data.lcm_log import log_file
 from twinmill.model.model_file import write_whole
 from twinmill.track.camera import Camera
 from twinmill.track.detect import Detector, gather
 from twinmill.track.floor import Floor, View, look
 from twinmill.track.paths import RobotPath, Tags, follow
-from twinmill_cli.challenge import base_of
+from twinmill_lab.challenge.cases import Case, draw, draw_robots
+from twinmill_lab.challenge.command import base_of
+from twinmill_lab.challenge.run import EPOCH_US, ROBOT_ID, STEP_S, Motion, play, write_log
+from twinmill_lab.challenge.scoring import scored
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests/python/track"))
 from rendering import Lens, Scene, Tag, still

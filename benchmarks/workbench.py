@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from ratio import Ratio, single, skipped
 
-from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.fitting.add import add
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile

@@ -8,7 +8,7 @@ does not know. Put your own two files in their place.
 from pathlib import Path
 
 import twinmill as tm
-from twinmill.challenge.script import write_rich_script
+from twinmill.experiment.rich_script import write_rich_script
 
 COASTING = '\n[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\nviscous_per_s = 0.5\n'
 

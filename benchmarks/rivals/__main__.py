@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
 
 import twinmill
+import twinmill_lab
 from rivals import (
     exam,
     lisdd,
@@ -34,10 +35,10 @@ from rivals import (
 )
 from rivals.protocol import DOCUMENTED, Answer, Problem, Rival, predicted_by
 from rivals.scoring import judged, middle, row
-from twinmill.challenge.cases import CASES, Case, draw, draw_robots, make_log, seal
 from twinmill.files import check_new_folder
 from twinmill.model.model_file import write_whole
-from twinmill_cli.challenge import base_of
+from twinmill_lab.challenge.cases import CASES, Case, draw, draw_robots, make_log, seal
+from twinmill_lab.challenge.command import base_of
 
 RESERVED = {1, *range(100, 121), *range(901, 921)}  # seeds on which Twinmill was developed
 
@@ -61,7 +62,7 @@ def _texts(*files: Path) -> str:
 # What answers come of, as it was when this began.
 SHARED = _texts(
     *(Path(m.__file__) for m in (exam, protocol, residual, scoring)),
-    *sorted(Path(twinmill.__file__).parent.rglob("*.py")),
+    *(f for p in (twinmill, twinmill_lab) for f in sorted(Path(p.__file__).parent.rglob("*.py"))),
 )
 OWN = {m.RIVAL.name: _texts(Path(m.__file__)) for m in MODULES} | {UNCHANGED.name: ""}
 OWN[mujoco_sysid.RIVAL.name] += _texts(Path(sysid_fit.__file__))

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from twinmill.challenge.cases import Case
-from twinmill.challenge.drives import drive
-from twinmill.challenge.physics import STEP_S
-from twinmill.challenge.run import EPOCH_US, Plan, play, write_log
 from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.experiment.drives import drive
 from twinmill.predict.residual import rotate
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
+from twinmill_lab.challenge.cases import Case
+from twinmill_lab.challenge.physics import STEP_S
+from twinmill_lab.challenge.run import EPOCH_US, Plan, play, write_log
 
 AHEAD_S = (0.5, 2.0)
 UNSEEN_S = 45.0  # of a log that is predicted

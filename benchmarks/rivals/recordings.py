@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rivals.protocol import Answer, Problem
-from twinmill.challenge.scoring import said
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
+from twinmill_lab.challenge.scoring import said
 
 DATA = Path(os.environ.get("TWINMILL_DATA", Path(__file__).parents[2] / ".." / "shared" / "data"))
 HIDDEN = {

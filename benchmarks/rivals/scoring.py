@@ -13,8 +13,8 @@ from scipy.stats import binom
 
 from rivals.exam import AHEAD_S, Unseen
 from rivals.protocol import Answer
-from twinmill.challenge.cases import Case
-from twinmill.challenge.scoring import rate, scored
+from twinmill_lab.challenge.cases import Case
+from twinmill_lab.challenge.scoring import rate, scored
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from twinmill.version import __version__
+
 # Modules that are imported here, by the extra of pyproject.toml that brings them; where several do,
 # the task that is most often meant.
 EXTRAS = {
@@ -19,6 +21,7 @@ EXTRAS = {
     "watch": ("rerun",),
     "workbench": ("fastapi", "nicegui"),
 }
+LAB = "twinmill_lab"  # the package of blind tests and published claims
 
 
 def missing(module: str, extra: str | None = None) -> str:
@@ -29,6 +32,12 @@ def missing(module: str, extra: str | None = None) -> str:
         extra: that brings it; looked up unless given.
     """
     package = module.partition(".")[0]
+    if package == LAB:
+        wheel = installing(f"{LAB}-{__version__}-py3-none-any.whl")
+        return (
+            "blind tests and published claims are a package of their own, which is not installed; "
+            f"its file comes beside Twinmill's: {wheel}"
+        )
     extra = extra or next((name for name, of in EXTRAS.items() if package in of), None)
     return f"the Python package of '{package}' is not installed; install it with: {command(extra)}"
 

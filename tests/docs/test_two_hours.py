@@ -10,7 +10,7 @@ import pytest
 import twinmill_native as native
 
 from twinmill_cli.guide import ANSWERS
-from twinmill_cli.main import COMMANDS, LazyCommand
+from twinmill_cli.main import BELOW, COMMANDS, LazyCommand
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -25,8 +25,9 @@ LONG = (" compare ", " diagnose ", " explain ", " plot ", "better.toml")
 @pytest.mark.parametrize("line", SHOWN)
 def test_each_command_and_its_options_exist(line):
     words = shlex.split(line)[1:]
-    module = {name: module for name, module, _ in COMMANDS}[words[0]]
-    command = LazyCommand(words[0], f"twinmill_cli.{module}", "").command()
+    name = BELOW.get(words[0], {}).get(words[1], words[0])
+    module = {name: module for name, module, _ in COMMANDS}[name]
+    command = LazyCommand(name, module, "").command()
     known = {option for p in command.params for option in p.opts}
     assert [w for w in words[1:] if w.startswith("-") and w not in known] == []
 

@@ -26,6 +26,7 @@ FOLDERS = (
     "firmware",
     "twin",
     "calibration",
+    "lab",
     "tools",
     "scripts",
     "examples",

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from twinmill.challenge.drives import drive
-from twinmill.challenge.physics import STEP_S, Hidden, catalogue_forms
-from twinmill.challenge.robots import draw_robot
-from twinmill.challenge.run import Plan, play, write_log
+from twinmill.experiment.drives import drive
+from twinmill_lab.challenge.physics import STEP_S, Hidden, catalogue_forms
+from twinmill_lab.challenge.robots import draw_robot
+from twinmill_lab.challenge.run import Plan, play, write_log
 
 DRIVEN_S, MOMENT_S = 40.0, 20.0
 WEAKER, MUCH_WEAKER = 0.06, 0.15

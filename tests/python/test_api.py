@@ -23,8 +23,8 @@ from matplotlib import pyplot
 
 import twinmill as tm
 from twinmill import api, results
-from twinmill.challenge.script import write_rich_script
 from twinmill.data.log import read_log
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.model.parameters import catalogue
 from twinmill_cli.main import run
 

@@ -16,16 +16,16 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill.challenge.cases import CASES, LEAST, Floors, draw, draw_robots, seal
-from twinmill.challenge.drives import drive
-from twinmill.challenge.intervals import SETS, coverage, draw_known, errors
-from twinmill.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms, slow
-from twinmill.challenge.robots import KINDS
-from twinmill.challenge.rollers import drive_by_forces
-from twinmill.challenge.run import Plan, play
-from twinmill.challenge.scoring import BARS, rate, scored, summary
+from twinmill.experiment.drives import drive
 from twinmill.model.parameters import catalogue
-from twinmill_cli import challenge as command
+from twinmill_lab.challenge import command
+from twinmill_lab.challenge.cases import CASES, LEAST, Floors, draw, draw_robots, seal
+from twinmill_lab.challenge.intervals import SETS, coverage, draw_known, errors
+from twinmill_lab.challenge.physics import STEP_S, Signals, catalogue_forms, outside_forms, slow
+from twinmill_lab.challenge.robots import KINDS
+from twinmill_lab.challenge.rollers import drive_by_forces
+from twinmill_lab.challenge.run import Plan, play
+from twinmill_lab.challenge.scoring import BARS, rate, scored, summary
 
 SEED, SECONDS = 7, 40
 ROBOTS = draw_robots(SEED)

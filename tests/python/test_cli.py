@@ -408,7 +408,7 @@ def test_version_and_help(twinmill):
 @pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
 def test_help_says_what_one_value_is_and_keeps_its_lines(name, module, summary):
     """In 80 columns: lines of a paragraph are kept as they are, so that longer ones would break."""
-    command = LazyCommand(name, f"twinmill_cli.{module}", summary).command()
+    command = LazyCommand(name, module, summary).command()
     context = typer.Context(command)
     for parameter in command.params:
         assert not re.search(r"list|range|bool", parameter.display_type_rich(ctx=context) or "")
@@ -438,7 +438,7 @@ def test_numbers_are_shown_to_three_digits(value):
 
 @pytest.mark.parametrize(("name", "module", "summary"), cli.COMMANDS)
 def test_the_list_of_commands_says_what_each_says_of_itself(name, module, summary):
-    command = LazyCommand(name, f"twinmill_cli.{module}", summary).command()
+    command = LazyCommand(name, module, summary).command()
     assert " ".join((command.short_help or command.help).split("\n\n")[0].split()) == summary
 
 

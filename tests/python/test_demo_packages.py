@@ -39,7 +39,8 @@ try:
 except ImportError as error:
     print(error)
 """
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+PROJECT = SETTINGS["project"]
 BUILDS = {"nanobind", "scikit-build-core"}  # beside what a wheel needs
 MOST = 10  # packages that everybody gets
 
@@ -125,7 +126,6 @@ def test_the_rest_of_the_loop_has_what_it_imports(program, name):
     ("export-model turbopi.toml --to ros2_control", "ros"),
     ("import --bag no.bag", "ros"),
     ("discover --out found", "discover"),
-    ("claims --out claims", "paper"),
     ("tags --out tags.pdf", "camera"),
     ("optitrack --server 127.0.0.1", "optitrack"),
     ("watch swarm.lcmlog --save shown.rrd", "watch"),
@@ -138,6 +138,15 @@ def test_a_task_whose_extra_is_missing_names_it_in_one_sentence(program, folder,
         rf"install 'twinmill\[{extra}\]'\n",
         done.stderr,
     ), done.stderr
+
+
+@pytest.mark.parametrize("name", ["challenge", "claims"])
+def test_what_only_an_article_needs_is_no_part_of_the_wheel_and_says_what_to_install(folder, name):
+    done = told(WITHOUT.format(absent={"twinmill_lab"}), folder, f"lab {name}")
+    assert done.returncode == 1
+    assert re.fullmatch(r"twinmill: .* pip install twinmill_lab-\S+-any\.whl\n", done.stderr)
+    of_wheel = SETTINGS["tool"]["scikit-build"]["wheel"]["packages"]
+    assert of_wheel == ["calibration/twinmill", "tools/twinmill_cli"]
 
 
 def test_a_sweep_without_its_extra_names_it(program, folder):

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, norm
 
-from twinmill.claims.prediction import AXES, LABS, MODEL, SECONDS, STD, reliability, trial
 from twinmill.programs import find_program
 from twinmill.swarm.forecast.choose import choose
 from twinmill.swarm.forecast.draws import OUTCOMES, Forecast, out_of_bounds
@@ -19,6 +18,7 @@ from twinmill.swarm.forecast.plan import read_plan
 from twinmill.swarm.forecast.score import score
 from twinmill.swarm.sweep import make_request, sweep
 from twinmill_cli.main import run
+from twinmill_lab.claims.prediction import AXES, LABS, MODEL, SECONDS, STD, reliability, trial
 
 
 @pytest.fixture(scope="module")

@@ -79,7 +79,7 @@ def test_each_plan_has_a_model_that_loads_and_commands_that_exist(case):
     for words in map(shlex.split, commands):
         if words[0] == "twinmill":
             name = BELOW.get(words[1], {}).get(words[2], words[1])
-            command = LazyCommand(name, f"twinmill_cli.{modules[name]}", "").command()
+            command = LazyCommand(name, modules[name], "").command()
             known = {option for p in command.params for option in p.opts}
             assert [w for w in words[2:] if w.startswith("--") and w not in known] == []
     assert "{" not in text and "\n\n\n" not in text

@@ -218,7 +218,7 @@ ANYWHERE = {"--force", "--json"}
 
 def options_of_the_command() -> set[str]:
     module = next(m for name, m, _ in COMMANDS if name == "import")
-    known = LazyCommand("import", f"twinmill_cli.{module}", "").command().params
+    known = LazyCommand("import", module, "").command().params
     return {p.opts[0] for p in known if p.opts[0].startswith("--")} - FILES - ANYWHERE - {"--help"}
 
 

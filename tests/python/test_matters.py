@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
-from twinmill.claims.published import Points
 from twinmill.model.model_file import ModelFile
 from twinmill.swarm.matters.changes import Change, Factor, factors
 from twinmill.swarm.matters.differences import median_difference, share_difference
@@ -17,6 +16,7 @@ from twinmill.swarm.matters.sensitivity import MATTERS, NOTHING, Sensitivity, ra
 from twinmill.swarm.matters.sentences import sentence
 from twinmill.swarm.sweep import make_request
 from twinmill_cli.main import run
+from twinmill_lab.claims.published import Points
 
 # The published robot, its camera's cone 75 degrees wide on paper and 49 as it is; and five more.
 PLANTED = """

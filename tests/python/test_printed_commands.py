@@ -18,8 +18,8 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
-from twinmill.challenge.script import write_rich_script
 from twinmill.experiment.played import Rows, csv_text
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.programs import find_program
 from twinmill.workbench.next_run import then_commands
 from twinmill_cli import main as cli
@@ -35,6 +35,7 @@ PARTS = (
     "docs",
     "examples",
     "firmware",
+    "lab",
     "scripts",
     "tests",
     "tools",
@@ -48,11 +49,11 @@ PAGES = [
 KINDS = {".py", ".j2", ".js", ".sh", ".in", ".c", ".cpp", ".h", ""}  # the last: scripts
 SOURCES = [
     path
-    for part in ("calibration/twinmill", "tools", "twin", "firmware", "scripts")
+    for part in ("calibration/twinmill", "lab", "tools", "twin", "firmware", "scripts")
     for path in sorted((ROOT / part).rglob("*"))
     if path.is_file() and path.suffix in KINDS and "__pycache__" not in path.parts
 ]
-COMMANDS = {name: cli.LazyCommand(name, f"twinmill_cli.{m}", "") for name, m, _ in cli.COMMANDS}
+COMMANDS = {name: cli.LazyCommand(name, m, "") for name, m, _ in cli.COMMANDS}
 PROGRAM = r"(?:build/bin/|\.venv/bin/)?((?:twinmill|twin_run|twin_sweep|make) "
 LINE = re.compile(rf"^(?:    |\$ ){PROGRAM}.*)", re.M)
 FENCED = re.compile(r"^```\w*\n(.*?)^```", re.M | re.S)

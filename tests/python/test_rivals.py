@@ -19,12 +19,12 @@ from rivals.scoring import judged, middle, row
 from rivals.stepwise import f_test, selected
 from rivals.trees import OPTIONS, _held_out
 
-from twinmill.challenge.cases import Case
-from twinmill.challenge.drives import drive
-from twinmill.challenge.physics import catalogue_forms
-from twinmill.challenge.robots import draw_robot
-from twinmill.challenge.run import Plan, play, write_log
+from twinmill.experiment.drives import drive
 from twinmill.predict.windows import HORIZONS_S
+from twinmill_lab.challenge.cases import Case
+from twinmill_lab.challenge.physics import catalogue_forms
+from twinmill_lab.challenge.robots import draw_robot
+from twinmill_lab.challenge.run import Plan, play, write_log
 
 SECONDS = 40.0
 STEPS = 900

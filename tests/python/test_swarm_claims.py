@@ -12,14 +12,23 @@ import twinmill_native as native
 import typer
 from scipy.stats import chi2
 
-from twinmill.claims import bodies, claims, fidelity, last_figure, paper, pivot, prediction, rows
-from twinmill.claims.actuation import _spread_interval, actuation
-from twinmill.claims.claims import CLAIMS
-from twinmill.claims.swarms import KINDS, run, run_kept
 from twinmill.data.steady_table import read_steady_tables
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli
 from twinmill_cli import process
+from twinmill_lab.claims import (
+    bodies,
+    claims,
+    fidelity,
+    last_figure,
+    paper,
+    pivot,
+    prediction,
+    rows,
+)
+from twinmill_lab.claims.actuation import _spread_interval, actuation
+from twinmill_lab.claims.claims import CLAIMS
+from twinmill_lab.claims.swarms import KINDS, run, run_kept
 
 SEEDS = 100
 

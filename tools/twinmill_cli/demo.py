@@ -27,8 +27,8 @@ if working():  # not for --help
     import tomlkit
     from rich.text import Text
 
-    from twinmill.challenge.script import write_rich_script
     from twinmill.diagnosis.explain import Explanation
+    from twinmill.experiment.rich_script import write_rich_script
     from twinmill.extras import command
     from twinmill.model.model_file import ModelFile
     from twinmill.model.parameters import ParameterEstimate

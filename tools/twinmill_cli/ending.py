@@ -13,7 +13,7 @@ from typing import Any, NoReturn
 
 import typer
 
-from twinmill.extras import MissingExtra, missing
+from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill_cli.output import (
     STOPPED,
@@ -101,7 +101,7 @@ def _told(error: Exception) -> tuple[int, str]:
         more = " (--help lists what can be given)" if sentence and code == 2 else ""
         return code, _short(sentence + more)
     if isinstance(error, ModuleNotFoundError) and not isinstance(error, MissingExtra):
-        if (error.name or "twinmill").startswith("twinmill"):
+        if error.name != LAB and (error.name or "twinmill").startswith("twinmill"):
             raise error
         return 1, missing(error.name)
     if isinstance(error, OSError) and error.errno in NO_ROOM:

@@ -25,8 +25,8 @@ if working():  # not for --help
     from rich.prompt import Prompt
     from rich.text import Text
 
-    from twinmill.challenge.drives import drive as plan
     from twinmill.data.checks.words import COLUMNS
+    from twinmill.experiment.drives import drive as plan
     from twinmill.experiment.wheel_signs import csv_text, script
     from twinmill.export.script import TwistScript, write_publisher
     from twinmill.files import replacing_folder

@@ -40,7 +40,8 @@ class LazyCommand(TyperCommand):
 
     Args:
         name: as the user types it.
-        module: whose function `register` adds it to an application.
+        module: whose function `register` adds it to an application; of this package, unless the
+            name of another stands before it.
         summary: first sentence of its help.
         registered: its name there, if another.
         renamed: its name in the list of commands, which leaves this one out.
@@ -50,7 +51,8 @@ class LazyCommand(TyperCommand):
         self, name: str, module: str, summary: str, *, registered: str = "", renamed: str = ""
     ) -> None:
         super().__init__(name, help=summary, hidden=bool(renamed))
-        self.module, self.registered, self.renamed = module, registered or name, renamed
+        self.module = module if "." in module else f"twinmill_cli.{module}"
+        self.registered, self.renamed = registered or name, renamed
         self.below: dict[str, LazyCommand] = {}  # commands whose first word is this one's name
 
     def command(self) -> TyperCommand | TyperGroup:

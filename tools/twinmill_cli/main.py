@@ -13,7 +13,8 @@ from twinmill_cli.ending import leave
 from twinmill_cli.lazy import LazyCommand
 from twinmill_cli.spelling import typed
 
-# Name, module and what it does. The modules are imported when called.
+# Name, module (of this package unless another is named) and what it does. The modules are imported
+# when called.
 COMMANDS = (
     (
         "demo",
@@ -134,7 +135,7 @@ COMMANDS = (
     ),
     (
         "challenge",
-        "challenge",
+        "twinmill_lab.challenge.command",
         "Blind tests: simulate robots with hidden effects, diagnose their logs, and score "
         "the answers.",
     ),
@@ -186,7 +187,7 @@ COMMANDS = (
     ("ask", "ask", "Answer a design question (how many robots, how fast) by simulation."),
     (
         "claims",
-        "claims",
+        "twinmill_lab.claims.command",
         "Check published claims about these swarms, with a figure of each.",
     ),
     (
@@ -259,7 +260,7 @@ class Commands(TyperGroup):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        told = {name: (f"twinmill_cli.{module}", summary) for name, module, summary in COMMANDS}
+        told = {name: (module, summary) for name, module, summary in COMMANDS}
         for name in TOP:
             below = {
                 new: LazyCommand(new, *told[old], registered=old)

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 import turbopi
 
-from twinmill.challenge.cases import calibration
-from twinmill.challenge.drives import drive
-from twinmill.challenge.physics import catalogue_forms
-from twinmill.challenge.robots import Robot, draw_robot
-from twinmill.challenge.run import Plan, play, write_log
 from twinmill.data.measurement import Measurement, load_measurements
+from twinmill.experiment.drives import drive
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
+from twinmill_lab.challenge.cases import calibration
+from twinmill_lab.challenge.physics import catalogue_forms
+from twinmill_lab.challenge.robots import Robot, draw_robot
+from twinmill_lab.challenge.run import Plan, play, write_log
 
 STEP_S = 1 / 480
 POSE_EVERY, COMMAND_EVERY = 4, 10  # 120 Hz and 48 Hz

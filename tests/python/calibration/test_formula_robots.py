@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from twinmill.challenge.cases import Case, draw, draw_robots, make_log
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.explain import Explanation, explain
 from twinmill.diagnosis.formula import Number
@@ -19,7 +18,8 @@ from twinmill.fitting.compare import compare
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, effect_parameters
-from twinmill_cli.challenge import base_of
+from twinmill_lab.challenge.cases import Case, draw, draw_robots, make_log
+from twinmill_lab.challenge.command import base_of
 
 STEP_S = 1 / 480  # of the robot
 

@@ -6,10 +6,10 @@ import subprocess
 
 import pytest
 
-from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.resolution import Resolution, resolutions
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 

@@ -10,11 +10,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from twinmill.challenge.script import write_rich_script
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.outliers import _stands_out, in_words
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.fitting.compare import MISSING, compare, of_others
 from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements

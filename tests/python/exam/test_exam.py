@@ -11,9 +11,9 @@ import warnings
 
 import pytest
 
-from twinmill.challenge.cases import draw, draw_robots
-from twinmill.challenge.scoring import lost
-from twinmill_cli.challenge import Judge, base_of, diagnosed
+from twinmill_lab.challenge.cases import draw, draw_robots
+from twinmill_lab.challenge.command import Judge, base_of, diagnosed
+from twinmill_lab.challenge.scoring import lost
 
 SEED, SECONDS, CASES = 1, 45, 30
 LOST = {2, 14, 15}

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from twinmill.arguments import option
-from twinmill.claims.rows import Claim, Row
 from twinmill.data.steady_table import SteadyTable
+from twinmill_lab.claims.rows import Claim, Row
 
 # Of the paper: each robot's mean speed over the group's, by speed input, and the same computed once
 # more from the means in its table.

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from twinmill.challenge.drives import drive
-from twinmill.challenge.physics import Hidden, catalogue_forms
-from twinmill.challenge.robots import draw_robot
-from twinmill.challenge.run import Plan
-from twinmill.challenge.scoring import WITHIN, rate
+from twinmill.experiment.drives import drive
 from twinmill.model.parameters import catalogue
+from twinmill_lab.challenge.physics import Hidden, catalogue_forms
+from twinmill_lab.challenge.robots import draw_robot
+from twinmill_lab.challenge.run import Plan
+from twinmill_lab.challenge.scoring import WITHIN, rate
 
 # Fitted together; in turn. All can be told from a mixed drive.
 SETS = (

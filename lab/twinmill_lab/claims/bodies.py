@@ -8,13 +8,13 @@ import numpy as np
 import pyarrow as pa
 from scipy.stats import fisher_exact
 
-from twinmill.claims.rows import Claim, Row, share
-from twinmill.claims.swarms import KINDS, MAP, Runs, place, run
 from twinmill.report.phase_figures import maps_figure
 from twinmill.swarm.phase import phase_of
 from twinmill.swarm.request import Request
 from twinmill.swarm.store import read_sweep
 from twinmill.swarm.sweep import make_request
+from twinmill_lab.claims.rows import Claim, Row, share
+from twinmill_lab.claims.swarms import KINDS, MAP, Runs, place, run
 
 PLANAR_SEEDS = 50
 # Seeds of each cell that are run before the next kind, so that what is stopped has whole maps.

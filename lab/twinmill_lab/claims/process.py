@@ -17,13 +17,13 @@ import numpy as np
 import pandas as pd
 import tomlkit
 
-from twinmill.challenge.script import write_rich_script
-from twinmill.claims.rows import SIGMAS, Claim, Row
+from twinmill.experiment.rich_script import write_rich_script
 from twinmill.model.model_file import ModelFile
 from twinmill.programs import find_program
 from twinmill.swarm.axes import Axis
 from twinmill.swarm.forecast.plan import FORM, read_plan
 from twinmill.swarm.request import run_part
+from twinmill_lab.claims.rows import SIGMAS, Claim, Row
 
 DRIVE_S, DECELERATION_MPS2 = 60.0, 0.6
 COASTING = f'\n[[effect]]\nname = "coasting"\ndeceleration_mps2 = {DECELERATION_MPS2}\n'

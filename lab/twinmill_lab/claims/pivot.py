@@ -9,11 +9,11 @@ printed, z + (v/w)(+sin, +cos), is off by (2 v/w) sin(theta) in x.
 
 import numpy as np
 
-from twinmill.claims.rows import Claim, Row, mean
-from twinmill.claims.swarms import ROUND, run
 from twinmill.report import Figure
 from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
 from twinmill.report.phase_figures import around, paint_paths
+from twinmill_lab.claims.rows import Claim, Row, mean
+from twinmill_lab.claims.swarms import ROUND, run
 
 RIGHT = "(-sin, +cos)"
 SIGNS = {RIGHT: -1.0, "(+sin, +cos), as printed": 1.0}

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The four questions of a design, asked as `twinmill swarm ask` asks them."""
 
-from twinmill.claims.rows import Claim, Row
 from twinmill.defaults import Question
 from twinmill.report.questions import curve_figure
 from twinmill.swarm.questions import axes_for, curve_of
 from twinmill.swarm.sweep import make_request
+from twinmill_lab.claims.rows import Claim, Row
 
 GOAL, WANTED, RADIUS_M = "milling", 0.9, 0.1
 

@@ -17,8 +17,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from twinmill.claims.published import Points
-from twinmill.claims.rows import Claim, Row, mean
 from twinmill.programs import available_cores
 from twinmill.report import Figure
 from twinmill.report.canvas import FLOOR, MEASURED, draw
@@ -29,6 +27,8 @@ from twinmill.swarm.model_text import with_values
 from twinmill.swarm.request import Request, run_part
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.sweep import make_request, run_missing
+from twinmill_lab.claims.published import Points
+from twinmill_lab.claims.rows import Claim, Row, mean
 
 STD, SPREAD, SECONDS, LABS, CELLS = 0.2, 0.02, 45.0, 100, 9
 MODEL = f"""

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from rich.console import Group, RenderableType
 
-from twinmill.challenge.intervals import GOAL
-from twinmill.challenge.scoring import BARS, BINS, LARGEST_GROUP
 from twinmill.report import Figure, Provenance, Section, show, write_report
 from twinmill.report.canvas import BEFORE, draw
 from twinmill.report.tables import Cell, Table
 from twinmill.version import __version__
+from twinmill_lab.challenge.intervals import GOAL
+from twinmill_lab.challenge.scoring import BARS, BINS, LARGEST_GROUP
 
 
 def shown(found: dict, times_s: list[float]) -> RenderableType:

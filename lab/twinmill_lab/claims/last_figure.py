@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from twinmill.claims.rows import Claim, Row, median, share
-from twinmill.claims.swarms import BODIES, Runs, place
 from twinmill.report import Figure
 from twinmill.report.canvas import BEFORE, FLOOR, draw
 from twinmill.report.phase_figures import around, paint_paths
 from twinmill.swarm.request import Request
 from twinmill.swarm.store import read_sweep
 from twinmill.swarm.sweep import make_request
+from twinmill_lab.claims.rows import Claim, Row, median, share
+from twinmill_lab.claims.swarms import BODIES, Runs, place
 
 
 @dataclass(frozen=True)

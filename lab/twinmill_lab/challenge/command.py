@@ -29,17 +29,17 @@ if working():  # not for --help
     from rich.text import Text
 
     import twinmill as tm
-    from twinmill.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
-    from twinmill.challenge.intervals import coverage, draw_known, errors
-    from twinmill.challenge.robots import Robot
-    from twinmill.challenge.run import play, write_log
-    from twinmill.challenge.scoring import scored, summary
     from twinmill.files import alone_in, check_holds, check_report
     from twinmill.model.model_file import write_whole
-    from twinmill.report import challenge as page
     from twinmill.terminal import PlainConsole, progress_bar
     from twinmill.version import __version__
     from twinmill_cli.main import run
+    from twinmill_lab.challenge import page
+    from twinmill_lab.challenge.cases import Case, calibration, draw, draw_robots, make_log, seal
+    from twinmill_lab.challenge.intervals import coverage, draw_known, errors
+    from twinmill_lab.challenge.robots import Robot
+    from twinmill_lab.challenge.run import play, write_log
+    from twinmill_lab.challenge.scoring import scored, summary
 
 
 class Judge(StrEnum):

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from twinmill.challenge.drives import STYLES, drive
-from twinmill.challenge.physics import STEP_S, Hidden, catalogue_forms, outside_forms, slow
-from twinmill.challenge.robots import KINDS, Robot, draw_robot
-from twinmill.challenge.run import Plan, path_of, play, write_log
+from twinmill.experiment.drives import STYLES, drive
+from twinmill_lab.challenge.physics import STEP_S, Hidden, catalogue_forms, outside_forms, slow
+from twinmill_lab.challenge.robots import KINDS, Robot, draw_robot
+from twinmill_lab.challenge.run import Plan, path_of, play, write_log
 
 CASES = ("none", "one", "cousin", "two", "outside", "one", "cousin", "none", "one", "outside")
 AHEAD_S = 2.0

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from twinmill.claims import figures
-from twinmill.claims.cuts import sensor, steps
-from twinmill.claims.fidelity import fidelity
-from twinmill.claims.pivot import pivot
-from twinmill.claims.prediction import prediction
-from twinmill.claims.published import Points
-from twinmill.claims.questions import questions
-from twinmill.claims.rows import Claim, Row, length, mean, median, share
-from twinmill.claims.swarms import KINDS, MAP, ROUND, Runs, run
+from twinmill_lab.claims import figures
+from twinmill_lab.claims.cuts import sensor, steps
+from twinmill_lab.claims.fidelity import fidelity
+from twinmill_lab.claims.pivot import pivot
+from twinmill_lab.claims.prediction import prediction
+from twinmill_lab.claims.published import Points
+from twinmill_lab.claims.questions import questions
+from twinmill_lab.claims.rows import Claim, Row, length, mean, median, share
+from twinmill_lab.claims.swarms import KINDS, MAP, ROUND, Runs, run
 
 V_MPS = (0.10, 0.15, 0.20, 0.25, 0.30, 0.35)
 RING_RANGE = 2.534  # mean range of six standard normal numbers (Tippett 1925)

@@ -3,10 +3,10 @@
 
 import numpy as np
 
-from twinmill.claims import figures
-from twinmill.claims.published import Points
-from twinmill.claims.rows import Claim, Row, share
-from twinmill.claims.swarms import KINDS, ROUND, run
+from twinmill_lab.claims import figures
+from twinmill_lab.claims.published import Points
+from twinmill_lab.claims.rows import Claim, Row, share
+from twinmill_lab.claims.swarms import KINDS, ROUND, run
 
 AT = ["v_mps=0.25", "omega_degps=45"]
 TO_EDGE_M = 0.1  # a disc's nearest part, by which the reference counts, is so much nearer

@@ -4,12 +4,12 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from twinmill.claims.rows import Row
-from twinmill.claims.swarms import ROUND, Runs
 from twinmill.report import Figure
 from twinmill.report.canvas import BEFORE, FLOOR, MEASURED, PREDICTED, draw, legend_above
 from twinmill.report.phase_figures import map_figure, paint_paths
 from twinmill.swarm.phase import phase_of
+from twinmill_lab.claims.rows import Row
+from twinmill_lab.claims.swarms import ROUND, Runs
 
 COLORS = (FLOOR, BEFORE, PREDICTED, "#cc79a7", "#e69f00", MEASURED, "#56b4e9", "#8c6d31", "#999999")
 LAST_S = 8.0

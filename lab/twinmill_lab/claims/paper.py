@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from twinmill.arguments import option
-from twinmill.claims.rows import Claim, Row
+from twinmill_lab.claims.rows import Claim, Row
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import sys
 import mujoco
 import numpy as np
 
-from twinmill.challenge.physics import STEP_S
-from twinmill.challenge.robots import Robot
+from twinmill_lab.challenge.physics import STEP_S
+from twinmill_lab.challenge.robots import Robot
 
 SIDE, AHEAD, LEFT = (-1, 1, 1, -1), (1, 1, -1, -1), (1, -1, 1, -1)
 ROTOR_KGM2 = 1.5e-4

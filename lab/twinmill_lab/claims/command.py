@@ -22,24 +22,21 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.data.steady_table import read_steady_tables
-    from twinmill.extras import needing
     from twinmill.files import check_report, plain
     from twinmill.model.model_file import ModelFile, write_whole
     from twinmill.report import Provenance, Section, show, write_report
     from twinmill.report.tables import Cell, Table, number
     from twinmill.terminal import progress_bar
     from twinmill.version import __version__
-
-    with needing("paper"):
-        from twinmill.claims.actuation import actuation
-        from twinmill.claims.bodies import bodies, layers
-        from twinmill.claims.claims import CLAIMS, ODD_TURNS
-        from twinmill.claims.last_figure import last_figure, requests
-        from twinmill.claims.paper import Answer, answers
-        from twinmill.claims.prediction import prediction_in_mujoco
-        from twinmill.claims.rows import Claim, Row
-        from twinmill.claims.swarms import run_kept
-        from twinmill_cli.process import process
+    from twinmill_lab.claims.actuation import actuation
+    from twinmill_lab.claims.bodies import bodies, layers
+    from twinmill_lab.claims.claims import CLAIMS, ODD_TURNS
+    from twinmill_lab.claims.last_figure import last_figure, requests
+    from twinmill_lab.claims.paper import Answer, answers
+    from twinmill_lab.claims.prediction import prediction_in_mujoco
+    from twinmill_lab.claims.process import process
+    from twinmill_lab.claims.rows import Claim, Row
+    from twinmill_lab.claims.swarms import run_kept
 
     CHECKED = {**CLAIMS, "process": process}
 

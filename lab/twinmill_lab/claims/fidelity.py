@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from twinmill.claims.rows import Claim, Row, mean
 from twinmill.data.measurement import load_measurements
 from twinmill.fitting.add import add
 from twinmill.fitting.fit import fit
@@ -27,6 +26,7 @@ from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
 from twinmill.swarm.model_text import with_values
 from twinmill.swarm.request import Request, run_part
 from twinmill.swarm.sweep import make_request
+from twinmill_lab.claims.rows import Claim, Row, mean
 
 COASTING = '\n[[effect]]\nname = "coasting"\ndeceleration_mps2 = 1.5\n'
 DRIVE_S, SWARM_S, SEEDS = 60.0, 60.0, 24

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.signal import lfilter
 
-from twinmill.challenge.robots import Robot
+from twinmill_lab.challenge.robots import Robot
 
 STEP_S = 1 / 500
 NOMINAL_V = 7.4

@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
-from twinmill.challenge.cases import Case
-from twinmill.challenge.physics import Hidden
 from twinmill.model.parameters import catalogue, key_of
+from twinmill_lab.challenge.cases import Case
+from twinmill_lab.challenge.physics import Hidden
 
 LARGEST_GROUP = 4
 WITHIN = 1.96  # standard errors: 95 %

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import turbopi
 
-from twinmill.challenge.drives import Leg, sampled
-from twinmill.challenge.physics import STEP_S, Hidden, Signals, slow
-from twinmill.challenge.robots import Robot
-from twinmill.challenge.rollers import drive_by_forces
 from twinmill.data.lcm_log import log_file
+from twinmill.experiment.drives import Leg, sampled
+from twinmill_lab.challenge.physics import STEP_S, Hidden, Signals, slow
+from twinmill_lab.challenge.robots import Robot
+from twinmill_lab.challenge.rollers import drive_by_forces
 
 EPOCH_US = 1_700_000_000_000_000
 ROBOT_ID = 1
