@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of the standard streams that say which of them failed."""
+"""Standard streams: which of them failed, and which lead nowhere."""
 
+import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,5 +15,26 @@ def naming(stream: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        error.filename = error.filename or stream
+        error.filename = error.filename or file_of(stream)
         raise
+
+
+def leads_nowhere(handle: int) -> bool:
+    """An open file, as 2 for stderr, is closed, or is /dev/null: nobody reads what it gets."""
+    try:
+        file = os.fstat(handle)
+    except OSError:
+        return True
+    return stat.S_ISCHR(file.st_mode) and file.st_rdev == os.stat(os.devnull).st_rdev
+
+
+def file_of(stream: str) -> str:
+    """A standard stream with the file that it was sent to, if any, as a user can find it."""
+    handle = {STDOUT_NAME: 1, STDERR_NAME: 2}[stream]
+    try:
+        file = os.fstat(handle)
+        if not stat.S_ISREG(file.st_mode) or not file.st_nlink:
+            return stream
+        return f"{stream} ({os.readlink(f'/proc/self/fd/{handle}')})"
+    except OSError:
+        return stream

@@ -43,6 +43,8 @@ CTRL_C, CTRL_S, CTRL_Z = b"\x03", b"\x13", b"\x1a"
 LINK_TIMEOUT_S = 2.0
 TRIES = 3  # to start
 STAYS_S = 0.5  # a robot that was stopped
+SIGNALLED = 128  # and the number of the signal by which a program ended, in a shell
+HELD = "they stop by themselves"  # said once robots drive
 AT_THE_INSTANT_S = 0.3  # before it: who falls silent then is not missed before it
 HALTED_S = 0.5  # in which the held table wants to be drawn twice
 BUS_PORT = f":{7667:04X} "  # as /proc/net/udp has it
@@ -104,7 +106,9 @@ class Operator:
         os.close(self.keyboard)
 
     def end(self, timeout_s: float = 20) -> int:
+        """The exit code, as a shell has it."""
         code = self.process.wait(timeout_s)
+        code = code if code >= 0 else SIGNALLED - code
         if self._ear and not self._closed:
             self._reader.join(2)
         return code
@@ -159,7 +163,7 @@ class Field:
     def held(self, **options) -> Operator:
         """The same, and said so."""
         operator = self.start(**options)
-        if not wait_until(lambda: "Ctrl-C stops them" in operator.plain, 10):
+        if not wait_until(lambda: HELD in operator.plain, 10):
             raise RuntimeError(operator.plain)
         time.sleep(0.3)
         return operator
@@ -275,7 +279,7 @@ class Field:
         self.operator = operator = Operator(
             self.key_file, "start", "--arm", "--robots", "1,3", terminal=False
         )
-        assert wait_until(lambda: "Ctrl-C stops them" in operator.plain, 20), operator.plain
+        assert wait_until(lambda: HELD in operator.plain, 20), operator.plain
         time.sleep(0.5)
         fault_s = time.monotonic()
         machine.cut("wlan0")
@@ -472,7 +476,7 @@ class Field:
         words = ("start", "--arm", "--robots", "1")
         for _ in range(TRIES):
             second = Operator(self.key_file, *words, terminal=False)
-            wait_until(lambda s=second: s.has_ended or "Ctrl-C stops them" in s.plain, 20)
+            wait_until(lambda s=second: s.has_ended or HELD in s.plain, 20)
             if not second.has_ended:
                 break
         assert wait_until(lambda: "taken over" in first.plain, 10), second.plain + first.plain
@@ -590,7 +594,7 @@ class Field:
         second = Operator(self.key_file, *START, "--in-s", "3", terminal=False)
         code = first.end()
         stood = not any(self.moved(i, begin_s) for i in IDS)
-        wait_until(lambda: second.has_ended or "Ctrl-C stops them" in second.plain, 20)
+        wait_until(lambda: second.has_ended or HELD in second.plain, 20)
         drove = all(robot.duties() != ZERO for robot in self.robots.values())
         fault_s = time.monotonic()
         second.process.send_signal(signal.SIGINT)

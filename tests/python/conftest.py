@@ -20,7 +20,7 @@ import twinmill_native as native
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import RobotLog
 from twinmill.robots.key import load_or_make
-from twinmill_cli import main
+from twinmill_cli import ending, main
 
 sys.path.insert(0, str(Path(__file__).parent))
 from same_robot import make_days
@@ -177,6 +177,7 @@ def twinmill(monkeypatch, capsys):
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["twinmill", *map(str, arguments)])
+        monkeypatch.setattr(ending, "exit_now", sys.exit)  # else by a signal, after Ctrl-C
         with pytest.raises(SystemExit) as stopped:
             main.main()
         return stopped.value.code, *capsys.readouterr()

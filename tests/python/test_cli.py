@@ -5,6 +5,7 @@ import io
 import json
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -382,6 +383,20 @@ def test_a_stream_that_takes_no_more_is_named(cause, why, stream):
     assert code == 1 and sentence.startswith(f"{name}: ") and why in sentence
 
 
+def test_a_file_that_takes_no_more_is_named_behind_its_stream(tmp_path):
+    """Of a full quota: it says which disk is meant."""
+    file, limit = tmp_path / "said.txt", resource.RLIMIT_FSIZE
+    with file.open("w") as out:
+        ended = subprocess.run(
+            [sys.executable, "-m", "twinmill_cli.main", "effects", "--json"],
+            stdout=out,
+            stderr=subprocess.PIPE,
+            text=True,
+            preexec_fn=lambda: resource.setrlimit(limit, (0, 0)),
+        )
+    assert ended.returncode == 1 and f"standard output ({file}): no file may" in ended.stderr
+
+
 def test_an_option_for_one_value_is_not_given_twice(twinmill, tmp_path):
     """The first of two files was dropped without a word."""
     files = [tmp_path / "a.csv", tmp_path / "b.csv"]
@@ -645,7 +660,7 @@ def test_ctrl_c_while_it_starts_is_one_sentence(module):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     sentence = "twinmill: Stopped before it began: nothing was done, and nothing was sent.\n"
-    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", sentence)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", sentence)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -666,5 +681,5 @@ def test_no_start_begins_that_was_asked_to_end(module, number):
         preexec_fn=lambda: signal.signal(number, signal.SIG_IGN),
     )
     told = strict(ended.stdout)
-    assert ended.returncode == 130 and (told["verb"], told["ok"]) == ("start", False)
+    assert ended.returncode == -signal.SIGINT and (told["verb"], told["ok"]) == ("start", False)
     assert "nothing was sent" in told["sentence"] and told["sentence"] in ended.stderr

@@ -193,6 +193,15 @@ def test_what_became_of_a_robot_that_was_taken_over_is_not_laid_to_the_first(hel
     assert "taken over" in said and reason in said and robots.is_over
 
 
+def test_one_in_a_fault_is_told_to_be_anothers_as_soon_as_it_is(held):
+    """It stood without its camera, and was named at the end alone."""
+    robots, robot, words = held
+    hear(robot, VERBS.VERB_START, "start at 12:00:01")
+    said = words(FAULT, counter=OWN + 1, flags=TELEMETRY.STATUS_CAMERA_LOST)
+    assert "taken over by another operator (start at 12:00:01)" in said
+    assert robots._fleet.held == set() and not robots.is_over
+
+
 def test_one_that_was_started_anew_by_another_operator_has_no_autostart(held):
     _, robot, words = held
     hear(robot, VERBS.VERB_START, "start at 12:00:01", session=SESSION + 1)

@@ -2,6 +2,7 @@
 """`twinmill swarm`: sentence, exit code and JSON say one thing, whatever robots answered."""
 
 import json
+import signal
 from dataclasses import replace
 
 import pytest
@@ -81,7 +82,7 @@ SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
     (
         of_stop([LOST, STANDS], Saying(to_all=True)),
-        "All stand. Those are all that were heard: R08, R02. R08 stood before:",
+        "All stand. 2 robots were heard: R08, R02; --robots says who is to answer. R08 stood",
         0,
     ),
     (
@@ -410,3 +411,20 @@ def test_a_stop_says_that_a_robot_has_another_key():
     assert "R04: signs nothing with this operator's key" in told.sentence
     assert "R04: by its word, which nobody can check, it stands." in told.sentence
     assert "R02: signs" not in told.sentence
+
+
+@pytest.mark.parametrize(
+    ("ended", "signals", "code"),
+    [
+        (of_end(WELL, {"R01": DRIVES}, WELL), [signal.SIGINT], 130),
+        (of_end(None, {}, WELL), [signal.SIGTSTP], 130),
+        (of_end(WELL, {"R01": DRIVES}, WELL), [signal.SIGTERM], 0),
+        (of_end(None, {}, WELL), [signal.SIGTERM], 1),
+        (of_end(WELL, {"R01": DRIVES}, ILL), [signal.SIGINT], 1),
+        (of_end(WELL, {"R01": RESTARTED}, WELL), [signal.SIGINT], 1),
+        (of_start(begun(LOOSE, link_timeout_ms=0)), [signal.SIGINT], 0),
+    ],
+)
+def test_a_key_ends_a_shells_loop_and_hides_nothing_that_is_wrong(ended, signals, code):
+    """130 means that all stand: who drives on without an operator was not stopped by a late key."""
+    assert ended.more("R01's clock is odd.").beside(["R05"]).code_after(signals) == code

@@ -3,7 +3,11 @@
 
 import io
 import os
+import pty
 import signal
+import subprocess
+import sys
+import termios
 import time
 
 import pytest
@@ -160,3 +164,58 @@ def test_a_name_that_is_looked_up_for_long_keeps_no_stop_waiting(monkeypatch):
     begin_s = time.monotonic()
     tell.stop(fleet, {1}, timeout_s=0.5, hosts=tell.Hosts(["robot03.local"]))
     assert time.monotonic() - begin_s < 1.5 and fleet.bus.said > 5
+
+
+@pytest.mark.parametrize(
+    ("words", "out", "err"),
+    [
+        ("Voice(); os.close(9)", "", "twinmill: NOT ALL STAND.\n"),
+        ("Voice(); os.dup2(9, 2)", "twinmill: NOT ALL STAND.\n", ""),
+        ("Voice(as_json=True); os.dup2(9, 2)", "", ""),
+    ],
+)
+def test_what_stderr_would_lose_is_said_on_stdout_unless_an_object_is_there(words, out, err):
+    """As `2>/dev/null`, which a script has for other words."""
+    make, before = words.split("; ")
+    code = (
+        "import os\nfrom twinmill_cli.voice import Voice\n"
+        f"os.dup2(os.open(os.devnull, os.O_WRONLY), 9)\n{before}\n"
+        f"voice = {make}\nvoice.say('NOT ALL STAND.')\nvoice.end(0)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (ended.stdout, ended.stderr) == (out, err)
+
+
+WHAT_ENDS = (
+    "from twinmill_cli.swarm_signals import what_ends; "
+    "print(what_ends('udpm://239.255.76.67:7668?ttl=1', 'TWIN_'), flush=True)"
+)
+
+
+def _asked_at_a_terminal(change) -> str:
+    """What is said to stop robots, at a terminal of its own that was changed before."""
+    keyboard, far = pty.openpty()
+    change(far)
+    command = ["setsid", "--ctty", sys.executable, "-c", WHAT_ENDS]
+    ended = subprocess.run(command, stdin=far, stdout=subprocess.PIPE, text=True)
+    os.close(far)
+    os.close(keyboard)
+    return ended.stdout
+
+
+def _take_keys(far) -> None:
+    modes = termios.tcgetattr(far)
+    modes[3] &= ~termios.ISIG
+    termios.tcsetattr(far, termios.TCSANOW, modes)
+
+
+def test_ctrl_c_is_named_only_where_it_comes_to_the_program():
+    """By setsid(2) there is no terminal; by ISIG, of termios(3), its keys end nothing."""
+    assert _asked_at_a_terminal(lambda _: None).startswith("Ctrl-C stops them")
+    ended = subprocess.run(
+        [sys.executable, "-c", WHAT_ENDS], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    for said in (_asked_at_a_terminal(_take_keys), ended.stdout):
+        assert "No Ctrl-C reaches this command" in said and "`kill " in said
+        url = "--lcm-url 'udpm://239.255.76.67:7668?ttl=1' --channel-prefix TWIN_"
+        assert f"`twinmill swarm stop {url}`" in said

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from twinmill.defaults import DEFAULT_MODEL
+from twinmill_cli.exit_now import STOPPED
 from twinmill_cli.lazy import working
 from twinmill_cli.options import Force, Logs, Model, NewModel, Out
-from twinmill_cli.output import STOPPED, AsJson, deliver, say, telling
+from twinmill_cli.output import AsJson, deliver, say, telling
 
 if working():  # not for --help
     import twinmill_native as native

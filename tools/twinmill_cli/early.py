@@ -11,9 +11,9 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, NoReturn
 
+from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.own_path import PROGRAMS, is_program
 
-STOPPED = 130  # as a shell has it
 MOVING = ("start", "arm", "select")  # below `swarm`: they begin only if nobody has asked for an end
 # As a background job of a script has SIGINT, and `nohup` SIGHUP, these are ignored at first.
 ENDING = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
@@ -35,18 +35,22 @@ def _leave(*_: Any) -> NoReturn:
         told = f'"verb": "{_verb()}", "ok": false, "sentence": "{sentence}", "robots": []'
         os.write(1, f"{{{told}}}\n".encode())
     os.write(2, f"{_name()}: {sentence}\n".encode(errors="replace"))
+    if _verb():
+        exit_now(STOPPED)
     os._exit(STOPPED)
 
 
 def begin() -> None:
     """From now on Ctrl-C leaves, unless something else was made of it.
 
-    Where robots are to move, so does each signal that asks for the end, be it ignored until now.
+    Where robots are to move, so does each signal that asks for the end, be it ignored or held back
+    until now.
     """
     with suppress(ValueError):  # not in the main thread
         if is_program() and _verb() in MOVING:
             for number in ENDING:
                 _signal.signal(number, _leave)
+            _signal.pthread_sigmask(_signal.SIG_UNBLOCK, ENDING)
         elif _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
             _signal.signal(_signal.SIGINT, _leave)
 

@@ -15,14 +15,8 @@ import typer
 
 from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill_cli.output import (
-    STOPPED,
-    begin_telling,
-    decided_or,
-    has_told,
-    print_object,
-    say,
-)
+from twinmill_cli.exit_now import STOPPED, exit_now
+from twinmill_cli.output import begin_telling, decided_or, has_told, print_object, say
 
 STDOUT, STDERR = 1, 2
 QUOTED = 80  # letters of what a sentence quotes
@@ -64,6 +58,11 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
         say(stopped, program)
+    if code == STOPPED and words[0] == "swarm":
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        exit_now(code)
     sys.exit(code)
 
 

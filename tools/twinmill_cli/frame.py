@@ -16,7 +16,8 @@ from twinmill.files import check_report
 from twinmill.model.model_file import ModelFile
 from twinmill.provenance import Provenance
 from twinmill.version import __version__
-from twinmill_cli.output import CHANGED, STOPPED, deliver, say
+from twinmill_cli.exit_now import STOPPED
+from twinmill_cli.output import CHANGED, deliver, say
 
 if TYPE_CHECKING:  # slow to import, and JSON needs none of it
     from types import ModuleType

@@ -25,7 +25,6 @@ AsJson = Annotated[
 
 
 CHANGED = 3  # exit code where something changed, for scripts
-STOPPED = 130  # exit code after Ctrl-C, as a shell has it
 
 
 @contextmanager

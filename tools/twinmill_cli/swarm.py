@@ -6,6 +6,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Annotated
 
@@ -30,7 +31,7 @@ from twinmill_cli.swarm_door import (
     refuse_stopped,
     refuse_unheard,
 )
-from twinmill_cli.swarm_signals import commanding, ended_by_signals
+from twinmill_cli.swarm_signals import commanding, ended_by_signals, what_ends
 from twinmill_cli.swarm_stop import StopCommand, stop
 
 if working():  # not for --help
@@ -48,6 +49,7 @@ if working():  # not for --help
         of_arm,
         of_busy,
         of_end,
+        of_heard,
         of_select,
         of_start,
         of_stop,
@@ -114,8 +116,9 @@ def _start(
     check_bus(lcm_url, channel_prefix)
     timeout_ms = 0 if untethered else round(1e3 * (link_timeout_s or LINK_TIMEOUT_MS / 1e3))
     options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
+
     with commanding("start", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
-        asked = tell.find(fleet, asked)
+        is_named, asked = bool(asked), tell.find(fleet, asked)
         if not partial:
             refuse_unheard(fleet, asked)
         refuse_doubles(fleet, asked)
@@ -130,13 +133,26 @@ def _start(
             "drove_before": [robot.robot_id for robot in busy if robot.drives],
             "link_timeout_s": timeout_ms / 1e3,
         }
-        code, voice = 1, Voice()
+        code, voice = 1, Voice(as_json=as_json)
+        heard = "" if is_named else of_heard(sorted(asked))
+
+        def ends() -> str:
+            return what_ends(lcm_url, channel_prefix)
+
         with ended_by_signals(fleet, voice.check_listener) as asked_to_end:
             try:
                 verdict = _drive(
-                    fleet, asked, behavior, voice, data=data, as_json=as_json, **options
+                    fleet,
+                    asked,
+                    behavior,
+                    voice,
+                    data=data,
+                    as_json=as_json,
+                    heard=heard,
+                    ends=ends,
+                    **options,
                 )
-                code = verdict.code
+                code = verdict.code_after(asked_to_end)
             finally:
                 voice.end(code, asked_to_end)
                 decide(code)
@@ -152,6 +168,8 @@ def _drive(
     *,
     data: dict,
     as_json: bool,
+    heard: str,
+    ends: Callable[[], str],
     **options,
 ) -> Verdict:
     """Starts robots and holds them. Whatever ends that stops them before a word is said of it.
@@ -163,13 +181,15 @@ def _drive(
         voice: what tells it.
         data: printed besides.
         as_json: how it is printed.
+        heard: words on who is there, where nobody said who is meant.
+        ends: gives words on what stops robots that are held.
         options: of tell.start().
     """
     begun, held, odd = None, None, ""
     try:
         started = tell.start(fleet, asked, behavior, **options)
         odd = clocks(fleet, asked)
-        begun, held = of_start(started).more(odd), Held(fleet, started)
+        begun, held = of_start(started, ends()).more(heard).more(odd), Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
         voice.tell(lambda: finish("start", started.answers, begun, data, as_json=as_json))
         if started.called_off or not held.robots:
@@ -180,7 +200,7 @@ def _drive(
             fleet.watch()  # the last that ends it, while robots drive on
             return begun
         _hold(fleet, held, voice)
-        ended = of_end(begun, held.states, None).beside(driving(fleet, asked))
+        ended = of_end(begun, held.states, None).more(heard).beside(driving(fleet, asked))
         ended = ended.more("" if odd else clocks(fleet, asked))
     except BaseException as error:
         if held:
@@ -189,7 +209,11 @@ def _drive(
         states, known = held.ends() if held else {}, tell.have_confirmed(fleet, asked)
         stopped = of_stop(given, Saying(reach=fleet.reach))
         ended = of_end(begun, states, stopped, was_confirmed=known)
-        ended = ended.beside(driving(fleet, asked)).more("" if odd else clocks(fleet, asked))
+        ended = (
+            ended.more(heard)
+            .beside(driving(fleet, asked))
+            .more("" if odd else clocks(fleet, asked))
+        )
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
             voice.tell(lambda: finish("start", given, ended, data, as_json=as_json))

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 
 from twinmill.robots.tell import DRIVING
+from twinmill.streams import leads_nowhere
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_screen import answer_table
 from twinmill_cli.swarm_verdict import of_clocks_now
+from twinmill_cli.voice import STDOUT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -33,7 +35,10 @@ def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
 
 
 def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_json: bool) -> int:
-    """Prints what came of a command, if need be on stderr alone. Returns its exit code."""
+    """Prints what came of a command. Returns its exit code.
+
+    If need be on stderr alone; there, too, what is wrong where stdout leads nowhere.
+    """
     robots = [answer.to_json() for answer in given]
     data = {"verb": verb, "ok": verdict.ok, "sentence": verdict.sentence, **data, "robots": robots}
     text = Group(*([answer_table(given)] if given else []), verdict.sentence)
@@ -42,4 +47,6 @@ def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_j
     except OSError:
         say(verdict.sentence)
         raise
+    if not verdict.ok and leads_nowhere(STDOUT):
+        say(verdict.sentence)
     return verdict.code

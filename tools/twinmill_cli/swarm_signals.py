@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import os
 import select
+import shlex
 import signal
+import termios
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
+from twinmill.defaults import URL
 from twinmill_cli.output import print_object, say
 
 if TYPE_CHECKING:
@@ -23,6 +26,38 @@ BECAME = {
     "arm": "robots were told that they may be started, and not all had answered; nothing moves",
     "select": "robots were told what to do, and not all had answered; those that drive drive on",
 }
+
+
+INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
+
+
+def key_reaches() -> bool:
+    """Ctrl-C comes to this program: it is in the foreground of its terminal, where that key ends.
+
+    Not so behind `&`, under cron, over ssh without `-t`, or below `timeout` in a script.
+    """
+    try:
+        terminal = os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
+    except OSError:
+        return False
+    try:
+        *_, local, _, _, keys = termios.tcgetattr(terminal)
+        is_set = bool(local & termios.ISIG) and keys[termios.VINTR] == INTERRUPT_KEY
+        return is_set and os.tcgetpgrp(terminal) == os.getpgrp()
+    except (OSError, termios.error):
+        return False
+    finally:
+        os.close(terminal)
+
+
+def what_ends(lcm_url: str, channel_prefix: str | None) -> str:
+    """Words on what stops robots that this program holds on a bus."""
+    if key_reaches():
+        return "Ctrl-C stops them"
+    bus = ["--lcm-url", lcm_url] if lcm_url != URL else []
+    bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
+    stop = shlex.join(["twinmill", "swarm", "stop", *bus])
+    return f"No Ctrl-C reaches this command: `{stop}`, or here `kill {os.getpid()}`, stops them"
 
 
 @contextmanager

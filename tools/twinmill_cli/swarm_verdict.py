@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import signal
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from twinmill.data.bus import Reach
@@ -22,9 +23,12 @@ from twinmill.robots.tell import (
     Answer,
     Start,
 )
+from twinmill_cli import exit_now
 
+BY_KEY = "Ctrl-C stops them"
 BY_HAND = "SWITCH OFF BY HAND what still drives."
 CLOCK_WARN_S = 0.05
+KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 
 
 @dataclass(frozen=True)
@@ -34,15 +38,24 @@ class Verdict:
     Attributes:
         ok: it did, and exit code and JSON say so.
         sentence: what a person reads of it.
+        ends_well: all stand, and nothing is wrong but that, it may be, a signal ended their start.
     """
 
     ok: bool
     sentence: str
+    ends_well: bool = False
 
     @property
     def code(self) -> int:
         """The command's exit code."""
         return 0 if self.ok else 1
+
+    def code_after(self, signals: Sequence[int]) -> int:
+        """The exit code where signals came: after a key a shell's loop ends with it.
+
+        Not where something is wrong: the code tells that.
+        """
+        return exit_now.STOPPED if self.ends_well and KEYS & {*signals} else self.code
 
     def beside(self, driving: list[str]) -> Verdict:
         """This outcome with a word on robots that were not asked, and that drive."""
@@ -50,11 +63,11 @@ class Verdict:
             return self
         verb = "drives, and was" if len(driving) == 1 else "drive, and were"
         told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
-        return Verdict(self.ok, told).more(f"{', '.join(driving)} {verb} not asked.")
+        return replace(self, sentence=told).more(f"{', '.join(driving)} {verb} not asked.")
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""
-        return Verdict(self.ok, _joined(self.sentence, words))
+        return replace(self, sentence=_joined(self.sentence, words))
 
 
 @dataclass(frozen=True)
@@ -182,9 +195,16 @@ def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdi
     if too_short and not is_of_some:
         words = f"{names}; others may not have been heard yet."
         return Verdict(False, _joined(words, more, how.cut))
-    heard = f"Those are all that were heard: {_names(given)}." if how.to_all else ""
+    heard = of_heard([a.robot_id for a in given]) if how.to_all else ""
     words = f"{names}." if is_of_some else _joined("All stand.", heard)
     return Verdict(True, _joined(words, more))
+
+
+def of_heard(robots: Iterable[int]) -> str:
+    """Sentence on how many were heard, where nobody said how many there are."""
+    names = [f"R{i:02d}" for i in robots]
+    were = "robot was" if len(names) == 1 else "robots were"
+    return f"{len(names)} {were} heard: {', '.join(names)}; --robots says who is to answer."
 
 
 def _besides(given: list[Answer]) -> str:
@@ -295,8 +315,13 @@ def _wrong(given: list[Answer]) -> str:
     return "; ".join(told)
 
 
-def of_start(begun: Start) -> Verdict:
-    """Who drives."""
+def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
+    """Who drives.
+
+    Args:
+        begun: what became of it.
+        ends: what stops those that are held.
+    """
     given = begun.answers
     if begun.called_off:
         return _of_called_off(begun)
@@ -304,7 +329,7 @@ def of_start(begun: Start) -> Verdict:
     faulty = [a for a in given if a.mode == "fault"]
     standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
     if len(standing) == len(given):
-        return Verdict(False, _of_nobody(begun, at))
+        return Verdict(False, _of_nobody(begun, at, ends))
     going = [a for a in given if a.accepted is False and a.mode in DRIVING]
     if all(a.accepted is False for a in given):
         words = f"NOBODY STARTED: {_why(given)}. {_as_before(going or faulty)}."
@@ -324,9 +349,9 @@ def of_start(begun: Start) -> Verdict:
         *_odd_links(begun),
     ]
     if not any(told):
-        return Verdict(True, f"Started at {at}. {_going_on(begun)}")
+        return Verdict(True, f"Started at {at}. {_going_on(begun, ends)}")
     missing = "; ".join(filter(None, told))
-    words = f"Started at {at}, but not all: {missing}. {_going_on(begun)}"
+    words = f"Started at {at}, but not all: {missing}. {_going_on(begun, ends)}"
     if begun.late:
         words = f"{words} {of_stop(begun.late, is_of_some=True).sentence}"
     return Verdict(False, words)
@@ -351,12 +376,12 @@ def _as_before(given: list[Answer]) -> str:
     return f"{_names(given)} {'goes' if len(given) == 1 else 'go'} on as before this start"
 
 
-def _going_on(begun: Start) -> str:
+def _going_on(begun: Start, ends: str) -> str:
     """How robots that drive stop, as was asked for, and who has not signed that yet."""
     if begun.link_timeout_ms == 0:
         words = "They drive on by themselves"
     else:
-        words = "Ctrl-C stops them; they stop by themselves "
+        words = f"{ends}; they stop by themselves "
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
     taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
     waiting = [a for a in taken if a.link_timeout_s is None]
@@ -403,7 +428,7 @@ def _who_stopped(begun: Start) -> str:
     return "Ask who stopped them before you start them again."
 
 
-def _of_nobody(begun: Start, at: str) -> str:
+def _of_nobody(begun: Start, at: str, ends: str) -> str:
     """Why none drives though its instant has come."""
     if begun.late:
         stopped = of_stop(begun.late, is_of_some=True).sentence
@@ -412,7 +437,7 @@ def _of_nobody(begun: Start, at: str) -> str:
         return f"NOBODY STARTED: {_why(begun.answers)}."
     waiting = [a for a in begun.answers if a.accepted and a.signed]
     words = f"{_names(waiting)} accepted the start, and may begin late by a clock that is behind"
-    return f"NOBODY DRIVES, though it is {at}: {words}. Ctrl-C stops them."
+    return f"NOBODY DRIVES, though it is {at}: {words}. {ends}."
 
 
 def of_end(
@@ -442,10 +467,13 @@ def of_end(
         told.append(f"the start was ended before it was known to have begun; {known}")
     elif not begun.ok:
         told.append("not all had started")
-    ok = begun is not None and begun.ok and all(state.is_meant for state in early)
+    is_meant = all(state.is_meant for state in early)
+    ok = begun is not None and begun.ok and is_meant
+    ends_well = is_meant and (begun is None or begun.ok)
     if not told:
-        return Verdict(ok, "All stand.")
-    return Verdict(ok, f"All stand{';' if stopped else ':'} {'; '.join(told)}.")
+        return Verdict(ok, "All stand.", ends_well)
+    words = f"All stand{';' if stopped else ':'} {'; '.join(told)}."
+    return Verdict(ok, words, ends_well)
 
 
 def _told_early(names: list[str], state: State, is_stopped: bool) -> str:

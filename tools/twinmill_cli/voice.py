@@ -8,7 +8,6 @@ robots hear their operator, and his stop, all the same.
 from __future__ import annotations
 
 import errno
-import os
 import select
 import threading
 import time
@@ -20,7 +19,9 @@ from rich.live import Live
 from rich.text import Text
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill.streams import leads_nowhere
 from twinmill.terminal import PlainConsole
+from twinmill_cli.exit_now import exit_now
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -30,7 +31,7 @@ JOIN_S = 0.05
 LAST_WORD_S = 0.5  # in which a terminal that takes anything has taken the last sentence
 
 
-STREAMS = (1, 2)  # stdout and stderr
+STDOUT, STDERR = STREAMS = (1, 2)
 NOBODY = "nobody reads any more what is told, so nobody could be told of a fault"
 
 
@@ -49,14 +50,20 @@ def can_be_heard() -> bool:
 class Voice:
     """A thread that writes, in order, what it is given.
 
+    Sentences go to stderr; where that leads nowhere (`2>/dev/null`) to stdout, unless this is to
+    have an object alone.
+
+    Args:
+        as_json: it is.
+
     Attributes:
         failure: why something could not be written, as a disk that is full; None: all was.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, as_json: bool = False) -> None:
         self.failure: Exception | None = None
         self._waiting: Queue[Callable[[], None] | None] = Queue()
-        self._console = PlainConsole(stderr=True)
+        self._console = PlainConsole(stderr=as_json or not leads_nowhere(STDERR))
         self._live: Live | None = None
         self._newest: RenderableType = ""
         self._shown_s = 0.0
@@ -68,7 +75,7 @@ class Voice:
         self._waiting.put(write)
 
     def say(self, sentence: str) -> None:
-        """A sentence on stderr, above what is shown there."""
+        """A sentence, above what is shown there."""
         words = Text(f"twinmill: {plain_line(sentence, MESSAGE_MAX)}")
         self.tell(lambda: self._console.print(words, soft_wrap=True))
 
@@ -148,4 +155,4 @@ class Voice:
             pass
         self._thread.join(LAST_WORD_S)
         if self._thread.is_alive():
-            os._exit(code)  # it may hold what the interpreter would wait for
+            exit_now(code)  # it may hold what the interpreter would wait for

@@ -35,7 +35,7 @@ class State:
         """A sentence without its full stop."""
         if self.stands:
             return f"{name} stands: {self.words}"
-        more = ", and is not held from here any more; Ctrl-C stops it all the same"
+        more = ", and is not held from here any more; the end of this command stops it all the same"
         return f"{name} {self.words}{more if self.is_taken else ''}"
 
 
@@ -116,6 +116,8 @@ class Held:
             return self._told[robot.robot_id]
         taken = self._taken(robot)
         is_anew = link.session != self._sessions[robot.robot_id]
+        if taken and link.mode == TELEMETRY.MODE_FAULT:
+            return of_taken(taken)
         if link.mode == TELEMETRY.MODE_FAULT:
             is_blind = link.status_flags & TELEMETRY.STATUS_FRAME_STALE
             blind = "no new picture of its camera" if is_blind else "a part of it does not answer"

@@ -15,8 +15,9 @@ from typing import Annotated
 
 import typer
 
+from twinmill_cli.exit_now import STOPPED
 from twinmill_cli.lazy import working
-from twinmill_cli.output import STOPPED, AsJson, deliver, unstopped
+from twinmill_cli.output import AsJson, deliver, unstopped
 
 if working():  # not for --help
     import hashlib
