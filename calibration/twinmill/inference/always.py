@@ -11,7 +11,7 @@ probability of each size, so that a wander too small to be sure of here is half 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -20,6 +20,7 @@ from scipy.special import logsumexp
 from twinmill.data.measurement import Measurement
 from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
+from twinmill.inference.hidden import Hidden
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
 from twinmill.inference.planar import PlanarProblem, problem_of
@@ -65,7 +66,7 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     beside = [size * kernel.columns for kernel, size in each[0].kernels]
     if beside:
         each.append(_grown(p, h, p.view(noise_of(h, p, np.concatenate(beside)))))
-    words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
+    words = dict.fromkeys(k.depends_on for k in p.kernels)
     wander = {word: _sizes(p, h, each, word) for word in words}
     return _conditioned(p, h, max(each, key=lambda g: g.log_evidence), wander)
 
@@ -121,7 +122,7 @@ def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -
     at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
     for grown in each:
         view = grown.view
-        rest = [(k, size) for k, size in grown.kernels if k.depends_on != word]
+        rest = [(k, size) for k, size in grown.kernels if k.lasting or k.depends_on != word]
         linear = h.linear(view.fitter.whiten).with_columns(_white(view, rest))
         own = evidence(h, view, linear)
         prior = sum(float(np.log(_odds(p, k)[size == SIZES][0])) for k, size in rest)
@@ -147,6 +148,7 @@ def _conditioned(
     mean = np.r_[h.mean, np.zeros(weights)] + root @ linear.mean
     mean[: len(h.labels)] = np.clip(mean[: len(h.labels)], h.low, h.high)
     cov = root @ linear.covariance @ root.T
+    hidden = Hidden.of(p.columns(h), linear, view.fitter.whiten, root)
     kept = [k for k, n in enumerate(labels) if k < len(h.labels) or n in lasting]
     return Always(
         effects=h.effects,
@@ -159,4 +161,5 @@ def _conditioned(
         usual=p.motion.usual,
         top=p.motion.top,
         noise=np.exp(view.fitter.noise.logs),
+        hidden=replace(hidden, shift=hidden.shift[kept]),
     )

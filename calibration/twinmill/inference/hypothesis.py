@@ -151,10 +151,11 @@ class Fitter:
         precision = np.linalg.inv(h.cov)
         value, damping = np.clip(h.value, h.low, h.high), 1e-3
         errors, cost = self._cost(h, value, precision)
-        slopes = h.slopes
+        slopes, white = h.slopes, self.whiten(h.slopes[:known]) if known else None
         for _ in range(rounds):
             slopes = self._slopes(replace(h, value=value), slopes, known)
-            white = self.whiten(slopes)
+            fresh = self.whiten(slopes[known:])
+            white = fresh if white is None else np.concatenate([white[:known], fresh])
             gram = white @ white.T + precision
             pull = white @ self.whiten(errors) - precision @ (value - h.mean)
             fell = 0.0
