@@ -15,7 +15,6 @@ from scipy.stats import chi2
 from twinmill.data.steady_table import read_steady_tables
 from twinmill.model.model_file import ModelFile
 from twinmill_cli import main as cli
-from twinmill_cli import process
 from twinmill_lab.claims import (
     bodies,
     claims,
@@ -24,6 +23,7 @@ from twinmill_lab.claims import (
     paper,
     pivot,
     prediction,
+    process,
     rows,
 )
 from twinmill_lab.claims.actuation import _spread_interval, actuation

@@ -66,7 +66,7 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     beside = [size * kernel.columns for kernel, size in each[0].kernels]
     if beside:
         each.append(_grown(p, h, p.view(noise_of(h, p, np.concatenate(beside)))))
-    words = dict.fromkeys(k.depends_on for k in p.kernels)
+    words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
     wander = {word: _sizes(p, h, each, word) for word in words}
     return _conditioned(p, h, max(each, key=lambda g: g.log_evidence), wander)
 
@@ -122,7 +122,7 @@ def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -
     at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
     for grown in each:
         view = grown.view
-        rest = [(k, size) for k, size in grown.kernels if k.lasting or k.depends_on != word]
+        rest = [(k, size) for k, size in grown.kernels if k.depends_on != word]
         linear = h.linear(view.fitter.whiten).with_columns(_white(view, rest))
         own = evidence(h, view, linear)
         prior = sum(float(np.log(_odds(p, k)[size == SIZES][0])) for k, size in rest)

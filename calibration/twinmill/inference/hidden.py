@@ -72,7 +72,7 @@ class Hidden:
     def explained(
         self, h: "Hypothesis", effects: Sequence[str], known: np.ndarray
     ) -> tuple["Hypothesis", float]:
-        """A hypothesis with some of its effects always there, and their Bayes factor in the own log.
+        """A hypothesis with some effects always there, and their Bayes factor in the own log.
 
         Args:
             h: of a later log.

@@ -81,7 +81,7 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
 
 
 def _hidden(table: dict, numbers: int) -> Hidden:
-    """What is told of effects that the base may have lacked; `numbers` of the base and beside it."""
+    """Effects that the base may have lacked; `numbers` of the base and beside it."""
     count = len(table["names"])
     gram = np.zeros((count, count))
     for k, row in enumerate(table["gram"]):
