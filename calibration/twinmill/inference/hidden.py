@@ -10,7 +10,7 @@ for (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63; Bishop 2006, ch. 3.3).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,6 @@ from twinmill.inference.candidate import Candidate
 from twinmill.inference.evidence import Linear
 from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import catalogue_name, key_of
-
-if TYPE_CHECKING:  # its prior holds what is told here
-    from twinmill.inference.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True)
@@ -69,13 +66,11 @@ class Hidden:
         """Whether the own log tells of all of these; of a second of a kind it does not."""
         return set(effects) <= set(map(catalogue_name, self.names))
 
-    def explained(
-        self, h: "Hypothesis", effects: Sequence[str], known: np.ndarray
-    ) -> tuple["Hypothesis", float]:
+    def explained(self, h: Any, effects: Sequence[str], known: np.ndarray) -> tuple[Any, float]:
         """A hypothesis with some effects always there, and their Bayes factor in the own log.
 
         Args:
-            h: of a later log.
+            h: `Hypothesis` of a later log.
             effects: of it.
             known: (N,) places of the own log's numbers among its own; -1 where it has them not.
         """
@@ -102,7 +97,7 @@ class Hidden:
         )
 
 
-def _place(h: "Hypothesis", name: str) -> int:
+def _place(h: Any, name: str) -> int:
     """Where a number of an effect that the hypothesis adds stands."""
     labels = [
         (catalogue_name(n), key_of(n)) if of_effect else None
