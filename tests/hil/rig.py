@@ -26,6 +26,7 @@ SUITE = os.environ.get("HIL_SUITE", "bookworm")
 SETUP_LIMIT_S, BOOT_LIMIT_S, CALL_LIMIT_S = 600, 300, 60
 # An emulated systemd has much to do, and the machine may be busy.
 SYSTEM_LIMIT_S = 300
+PATIENCE_S = 120.0  # ends what hangs: a busy machine runs the guest several times slower
 CANNOT = 77  # exit code of a script that says why it cannot
 
 HEADER = struct.Struct("<B3xI")
@@ -259,7 +260,7 @@ class Rig:
         """Returns what the console has shown so far."""
         return self.console.read_text(errors="replace")
 
-    def wait(self, condition: Callable[[], bool], limit_s: float = 30.0, what: str = "it"):
+    def wait(self, condition: Callable[[], bool], limit_s: float = PATIENCE_S, what: str = "it"):
         """Waits for a condition. Raises TimeoutError."""
         end_s = time.monotonic() + limit_s
         while not condition():

@@ -5,7 +5,7 @@ import signal
 import time
 from collections.abc import Callable
 
-from rig import BUTTON_LINE, PRESSED, RELEASED, ZERO, Duties, End, Rig
+from rig import BUTTON_LINE, PATIENCE_S, PRESSED, RELEASED, ZERO, Duties, End, Rig
 
 PROGRAM = "/usr/bin/turbopi"
 WIDTH_PX, HEIGHT_PX = 160, 120
@@ -59,7 +59,7 @@ class Watched:
         assert result == len(frame)
         return t_s
 
-    def show_until(self, condition: Callable[[], bool], limit_s: float = 30.0):
+    def show_until(self, condition: Callable[[], bool], limit_s: float = PATIENCE_S):
         """Shows self.view thirty times a second until a condition holds."""
         end_s = time.monotonic() + limit_s
         while not condition():
