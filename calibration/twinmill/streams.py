@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 STDOUT_NAME, STDERR_NAME = "standard output", "standard error"
+STDOUT, STDERR = 1, 2  # their handles
 
 
 @contextmanager
@@ -20,7 +21,7 @@ def naming(stream: str) -> Iterator[None]:
 
 
 def leads_nowhere(handle: int) -> bool:
-    """An open file, as 2 for stderr, is closed, or is /dev/null: nobody reads what it gets."""
+    """An open file, as STDERR, is closed, or is /dev/null: nobody reads what it gets."""
     try:
         file = os.fstat(handle)
     except OSError:
@@ -30,7 +31,7 @@ def leads_nowhere(handle: int) -> bool:
 
 def file_of(stream: str) -> str:
     """A standard stream with the file that it was sent to, if any, as a user can find it."""
-    handle = {STDOUT_NAME: 1, STDERR_NAME: 2}[stream]
+    handle = {STDOUT_NAME: STDOUT, STDERR_NAME: STDERR}[stream]
     try:
         file = os.fstat(handle)
         if not stat.S_ISREG(file.st_mode) or not file.st_nlink:

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import turbopi
 from robot_process import ZERO, wait_until
-from told_session import CTRL_C, IDS, LINK_TIMEOUT_S, Field
+from told_session import CTRL_C, IDS, LINK_TIMEOUT_S, Field, main
 
 from twinmill.robots.fleet import GONE_S
 
@@ -270,15 +270,5 @@ class Laboratory(Field):
         return self.told(shell, fault_s, code, [1])
 
 
-def main(folder: Path, cases: list[str]) -> dict:
-    result = {}
-    with ExitStack() as stack:
-        laboratory = Laboratory(folder, stack)
-        time.sleep(1)
-        for case in cases:
-            result[case] = getattr(laboratory, case)()
-    return result
-
-
 if __name__ == "__main__":
-    print(json.dumps(main(Path(sys.argv[1]), sys.argv[2:])))
+    print(json.dumps(main(Path(sys.argv[1]), sys.argv[2:], Laboratory)))

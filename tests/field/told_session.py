@@ -836,10 +836,10 @@ class Field:
         return self._unmoved(begin_s, code)
 
 
-def main(folder: Path, faults: list[str]) -> dict:
+def main(folder: Path, faults: list[str], kind: type[Field] = Field) -> dict:
     result = {}
     with ExitStack() as stack:
-        field = Field(folder, stack)
+        field = kind(folder, stack)
         time.sleep(1)
         for fault in faults:
             result[fault] = getattr(field, fault)()

@@ -15,10 +15,10 @@ import typer
 
 from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill.streams import STDERR, STDOUT
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.output import begin_telling, decided_or, has_told, print_object, say
 
-STDOUT, STDERR = 1, 2
 QUOTED = 80  # letters of what a sentence quotes
 TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
 NO_ROOM = {  # why a file takes no more, and what to do

@@ -116,7 +116,6 @@ def _start(
     check_bus(lcm_url, channel_prefix)
     timeout_ms = 0 if untethered else round(1e3 * (link_timeout_s or LINK_TIMEOUT_MS / 1e3))
     options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
-
     with commanding("start", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
         is_named, asked = bool(asked), tell.find(fleet, asked)
         if not partial:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 from rich.console import Group
 
 from twinmill.robots.tell import DRIVING
-from twinmill.streams import leads_nowhere
+from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_screen import answer_table
 from twinmill_cli.swarm_verdict import of_clocks_now
-from twinmill_cli.voice import STDOUT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -28,6 +28,7 @@ BECAME = {
 }
 
 
+BY_KEY = "Ctrl-C stops them"
 INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
 
 
@@ -53,7 +54,7 @@ def key_reaches() -> bool:
 def what_ends(lcm_url: str, channel_prefix: str | None) -> str:
     """Words on what stops robots that this program holds on a bus."""
     if key_reaches():
-        return "Ctrl-C stops them"
+        return BY_KEY
     bus = ["--lcm-url", lcm_url] if lcm_url != URL else []
     bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
     stop = shlex.join(["twinmill", "swarm", "stop", *bus])

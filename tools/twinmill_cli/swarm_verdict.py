@@ -24,8 +24,8 @@ from twinmill.robots.tell import (
     Start,
 )
 from twinmill_cli import exit_now
+from twinmill_cli.swarm_signals import BY_KEY
 
-BY_KEY = "Ctrl-C stops them"
 BY_HAND = "SWITCH OFF BY HAND what still drives."
 CLOCK_WARN_S = 0.05
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z

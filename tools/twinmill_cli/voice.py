@@ -19,7 +19,7 @@ from rich.live import Live
 from rich.text import Text
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import leads_nowhere
+from twinmill.streams import STDERR, STDOUT, leads_nowhere
 from twinmill.terminal import PlainConsole
 from twinmill_cli.exit_now import exit_now
 
@@ -31,7 +31,7 @@ JOIN_S = 0.05
 LAST_WORD_S = 0.5  # in which a terminal that takes anything has taken the last sentence
 
 
-STDOUT, STDERR = STREAMS = (1, 2)
+STREAMS = (STDOUT, STDERR)
 NOBODY = "nobody reads any more what is told, so nobody could be told of a fault"
 
 

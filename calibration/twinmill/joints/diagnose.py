@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from twinmill.data.lcm_log import LogError
 from twinmill.inference.answer import Answer, answer
 from twinmill.inference.search import Evidence, Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
+from twinmill.joints.checks import check_units, warnings_of
 from twinmill.joints.files import read_joint_log
 from twinmill.joints.log import JointLog, joined
 from twinmill.joints.mjcf import Mjcf
@@ -21,7 +21,6 @@ from twinmill.joints.problem import JointProblem, problem_of
 from twinmill.joints.series import Series, series_of
 
 Logs = JointLog | Path | str | Sequence[JointLog | Path | str]
-TOO_FAR = 1.05  # times a joint's range, in which a position is the range's own softness
 
 
 @dataclass(frozen=True)
@@ -96,48 +95,6 @@ def plant_of(logs: Logs, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
     check_units(log, mjcf)
     series = series_of(log)
     return Plant(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
-
-
-def check_units(log: JointLog, mjcf: Mjcf) -> None:
-    """Raises LogError where hinges are in degrees: beyond their ranges, which degrees would fit."""
-    model = mjcf.model
-    for d, name in enumerate(mjcf.joints):
-        if mjcf.units[d] != "rad" or not model.jnt_limited[d]:
-            continue
-        middle, half = model.jnt_range[d].mean(), TOO_FAR * np.ptp(model.jnt_range[d]) / 2
-        far = np.abs(log.qpos[:, d] - middle).max()
-        if far > half and np.abs(np.radians(log.qpos[:, d]) - middle).max() <= half and far > np.pi:
-            raise LogError(
-                f"{log.name}: joint '{name}' reaches {np.abs(log.qpos[:, d]).max():.4g}, beyond "
-                f"its range of {model.jnt_range[d][0]:.3g} to {model.jnt_range[d][1]:.3g} rad: "
-                "these are degrees; give radians, as "
-                "`twinmill import joints --degrees` does."
-            )
-
-
-def warnings_of(log: JointLog, mjcf: Mjcf) -> list[str]:
-    """Sentences on positions and commands beyond ranges, and gaps."""
-    model, found = mjcf.model, []
-    for d, name in enumerate(mjcf.joints):
-        low, high = model.jnt_range[d]
-        over = ((log.qpos[:, d] < low) | (log.qpos[:, d] > high)).mean()
-        if model.jnt_limited[d] and over > 0:
-            found.append(
-                f"joint '{name}' is beyond its range of {low:.4g} to {high:.4g} "
-                f"{mjcf.units[d]} in {100 * over:.2g} % of the samples; is its zero the model's?"
-            )
-    for a, name in enumerate(mjcf.actuators):
-        low, high = model.actuator_ctrlrange[a]
-        over = ((log.ctrl[:, a] < low) | (log.ctrl[:, a] > high)).mean()
-        if model.actuator_ctrllimited[a] and over > 0:
-            found.append(
-                f"commands to '{name}' are beyond its ctrlrange of {low:.4g} to {high:.4g} in "
-                f"{100 * over:.2g} % of the samples; MuJoCo clips them."
-            )
-    gaps = len(log.stretches) - len(log.begins)
-    if gaps:
-        found.append(f"{gaps} gaps; steps across them are left out.")
-    return found
 
 
 def _of_speeds(log: JointLog, series: Series, mjcf: Mjcf) -> list[str]:

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from twinmill.data.lcm_log import LogError
+from twinmill.inference.evidence import log_evidence
 from twinmill.inference.settings import PRIORS
 from twinmill.joints import dependences
 from twinmill.joints.diagnose import JointDiagnosis, Logs, diagnose_joints
@@ -160,14 +161,6 @@ def _refusal(runs: Sequence[Motion], duration_s: float) -> str:
     )
 
 
-def _log_evidence(y: np.ndarray, columns: np.ndarray) -> float:
-    """Log density of white data whose mean is a sum of columns with standard normal weights."""
-    gram = np.eye(len(columns)) + columns @ columns.T
-    push = columns @ y
-    fall = push @ np.linalg.solve(gram, push)
-    return float(-(y @ y - fall) / 2 - np.linalg.slogdet(gram)[1] / 2)
-
-
 @dataclass(frozen=True)
 class _Asked:
     """Questions of a diagnosis, with what has to be the same in each motion.
@@ -227,7 +220,7 @@ class _Asked:
         found = {}
         for a, b in pairs:
             y = self._white(change[a][None])[0]
-            found[a, b] = _log_evidence(y, spread[a]) - _log_evidence(y, spread[b])
+            found[a, b] = log_evidence(y, spread[a]) - log_evidence(y, spread[b])
         return found
 
     def _around(self, plant: Plant, change: np.ndarray) -> np.ndarray:

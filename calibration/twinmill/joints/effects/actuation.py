@@ -6,12 +6,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from twinmill.joints.effects.effect import (
-    SHARE,
     ActuatorEffect,
     Effect,
     Number,
 )
-from twinmill.joints.plant import Action, Plant
+from twinmill.joints.plant import SHARE, Action, Plant
 
 LATE_S = 0.01  # default of a delay or a lag: some periods of a control loop
 LONGEST_S = 0.5

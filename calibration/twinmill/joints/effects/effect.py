@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from twinmill.joints.plant import SHARE as SHARE
 from twinmill.joints.plant import SLOW, Action, Plant
 
 

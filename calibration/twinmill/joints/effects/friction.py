@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from twinmill.joints.effects.effect import SHARE, JointEffect, Number
-from twinmill.joints.plant import Action
+from twinmill.joints.effects.effect import JointEffect, Number
+from twinmill.joints.plant import SHARE, Action
 
 
 class Coulomb(JointEffect):

@@ -3,8 +3,8 @@
 
 from collections.abc import Mapping
 
-from twinmill.joints.effects.effect import SHARE, Effect, JointEffect, Number
-from twinmill.joints.plant import Action, Plant
+from twinmill.joints.effects.effect import Effect, JointEffect, Number
+from twinmill.joints.plant import SHARE, Action, Plant
 
 
 class Armature(JointEffect):

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from twinmill.joints.effects.effect import (
-    SHARE,
     Effect,
     JointEffect,
     Number,
 )
-from twinmill.joints.plant import Action, Plant
+from twinmill.joints.plant import SHARE, Action, Plant
 
 
 class ForceOffset(JointEffect):

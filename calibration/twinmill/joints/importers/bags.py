@@ -15,14 +15,13 @@ import numpy as np
 from twinmill.arguments import option
 from twinmill.data.importers.ros_bag import open_bag
 from twinmill.data.lcm_log import LogError
-from twinmill.joints.files import COMMAND, POSITION, VELOCITY
+from twinmill.joints.files import COMMAND, NS, POSITION, VELOCITY
 from twinmill.joints.importers.signals import Recording, Signal
 
 STATE = "sensor_msgs/msg/JointState"
 ARRAYS = tuple(f"std_msgs/msg/{kind}MultiArray" for kind in ("Float64", "Float32"))
 FIELDS = ("position", "velocity", "effort")  # of a JointState
 USUAL = "joint_states"  # what a topic of states ends in, by ROS's convention
-NS = 1e9
 SLOW_CLOCK_S = 1.0  # between header and receipt, from which they are clocks of their own
 
 
@@ -105,7 +104,7 @@ def _by_header(
 ) -> tuple[np.ndarray, list[str]]:
     """Stamps in s by the recorder's clock, and what is told about them."""
     received = np.array([at for at, _ in rows], dtype=np.int64)
-    sent = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for _, m in rows],
+    sent = np.array([m.header.stamp.sec * NS + m.header.stamp.nanosec for _, m in rows],
                     dtype=np.int64)  # fmt: skip
     if not sent.all():
         return (received - zero_ns) / NS, [f"{topic} has no stamps; the times of receipt are used."]

@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.arguments import option
 from twinmill.data.lcm_log import LogError
-from twinmill.joints.diagnose import check_units, warnings_of
+from twinmill.joints.checks import check_units, warnings_of
 from twinmill.joints.files import COMMAND, POSITION, TIME, VELOCITY
 from twinmill.joints.importers.bags import is_bag, read_bag
 from twinmill.joints.importers.names import Given, resolved
