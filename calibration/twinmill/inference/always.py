@@ -11,7 +11,7 @@ probability of each size, so that a wander too small to be sure of here is half 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -20,6 +20,7 @@ from scipy.special import logsumexp
 from twinmill.data.measurement import Measurement
 from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
+from twinmill.inference.hidden import Hidden
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
 from twinmill.inference.planar import PlanarProblem, problem_of
@@ -147,6 +148,7 @@ def _conditioned(
     mean = np.r_[h.mean, np.zeros(weights)] + root @ linear.mean
     mean[: len(h.labels)] = np.clip(mean[: len(h.labels)], h.low, h.high)
     cov = root @ linear.covariance @ root.T
+    hidden = Hidden.of(p.columns(h), linear, view.fitter.whiten, root)
     kept = [k for k, n in enumerate(labels) if k < len(h.labels) or n in lasting]
     return Always(
         effects=h.effects,
@@ -159,4 +161,5 @@ def _conditioned(
         usual=p.motion.usual,
         top=p.motion.top,
         noise=np.exp(view.fitter.noise.logs),
+        hidden=replace(hidden, shift=hidden.shift[kept]),
     )

@@ -38,13 +38,13 @@ def candidates(
         model: of the base.
         tracks: of the logs; what begins or ends at a moment is looked for in a single one.
         same_clock: the offset of the clocks is known, so that a delay shows.
-        declared: one clock stamps all, so that no offset can be missing.
+        declared: one clock stamps all, so that neither offset nor rate can be missing.
     """
     excluded: set[str] = set()
     if not same_clock:
         excluded |= {*needing("clocks"), *making_late("delay")}
     elif declared:
-        excluded |= set(making_late("clock"))
+        excluded |= set(needing("clocks"))
     if model.get(LAG) == 0:
         excluded |= set(making_late("lag"))
     if any(np.isnan(track.battery_V).all() for track in tracks):

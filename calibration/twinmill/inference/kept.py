@@ -8,6 +8,7 @@ import tomlkit
 import twinmill_native as native
 
 from twinmill.arguments import option
+from twinmill.inference.hidden import Hidden
 from twinmill.inference.moments import Rate
 from twinmill.inference.prior import Always
 from twinmill.model.model_file import ModelError, ModelFile
@@ -41,6 +42,7 @@ def kept(model_file: ModelFile) -> Always | None:
             usual=np.array(table["usual"], float),
             top=np.array(table["top"], float),
             noise=np.array(table["noise"], float),
+            hidden=_hidden(table["hidden"], len(low)),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(
@@ -66,9 +68,31 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
         "labels": list(always.labels),
         "mean": _short(always.mean),
         "cholesky": [_short(row[: k + 1]) for k, row in enumerate(low)],
+        "hidden": {
+            "names": list(always.hidden.names),
+            "unit": _short(always.hidden.unit),
+            "gram": [_short(row[: k + 1]) for k, row in enumerate(always.hidden.gram)],
+            "push": _short(always.hidden.push),
+            "shift": [_short(row) for row in always.hidden.shift],
+        },
     }
     text = tomlkit.dumps(document)
     return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+
+
+def _hidden(table: dict, numbers: int) -> Hidden:
+    """Effects that the base may have lacked; `numbers` of the base and beside it."""
+    count = len(table["names"])
+    gram = np.zeros((count, count))
+    for k, row in enumerate(table["gram"]):
+        gram[k, : k + 1] = gram[: k + 1, k] = row
+    return Hidden(
+        tuple(map(str, table["names"])),
+        np.array(table["unit"], float),
+        gram,
+        np.array(table["push"], float),
+        np.array(table["shift"], float).reshape(numbers, count),
+    )
 
 
 def _short(values) -> list[float]:

@@ -13,7 +13,7 @@ from twinmill.inference.candidate import Candidate
 from twinmill.inference.duties import refined
 from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.noise import Course, Noise, first_noise
-from twinmill.inference.prior import Always, Prior, base_prior, with_always
+from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
 from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
 from twinmill.model.model_file import ModelFile
@@ -42,10 +42,12 @@ class PlanarProblem(Problem):
 
     Attributes:
         motion: as the base predicts it.
+        always: what the base misses in its own log; None where that is not known.
     """
 
     steps: Steps
     motion: Motion
+    always: Always | None
 
     def candidate(self, name: str, model: native.Model) -> Candidate:
         """What an effect of the twin's catalogue would change beside a model."""
@@ -54,6 +56,16 @@ class PlanarProblem(Problem):
     def forms(self, change: np.ndarray) -> tuple[np.ndarray, ...]:
         """What an effect's formula may miss, by speed, time, place and heading."""
         return discrepancy.forms_of(change, self.motion)
+
+    def always_there(
+        self, h: Hypothesis, effects: Sequence[str]
+    ) -> tuple[Hypothesis, float] | None:
+        """With the numbers that the base's own log gives."""
+        if self.always is None or not self.always.hidden.knows(effects):
+            return None
+        labels = labels_of(self.prior, self.always, self.kernels)
+        known = np.array([labels.index(n) if n in labels else -1 for n in self.always.labels])
+        return self.always.hidden.explained(h, effects, known)
 
     def of_moments(self) -> np.ndarray:
         """Gains of travel and turning, and two pushes, up to each of the bins."""
@@ -129,7 +141,7 @@ def problem_of(
     rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
     wander = {w: discrepancy.in_another_log(p) for w, p in always.wander.items()} if always else {}
     rough = PlanarProblem(
-        steps, prior, base, found, names, rate, noise, noise, wander, planar_kinds(), motion
+        steps, prior, base, found, names, rate, noise, noise, wander, planar_kinds(), motion, always
     )
     noise = flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)

@@ -27,6 +27,7 @@ class Belief:
 
     Attributes:
         effects: of the catalogue that are missing, each kind once.
+        always: effects that the base always lacked, which is no news.
         mimicked: effects in whose place one unnamed thing is; empty if none is.
         entry: of the table.
         stale: the base is known no better than a data sheet.
@@ -35,6 +36,7 @@ class Belief:
     """
 
     effects: tuple[str, ...]
+    always: tuple[str, ...]
     mimicked: tuple[str, ...]
     words: tuple[str, ...]
     entry: Entry
@@ -64,9 +66,9 @@ def beliefs(table: Table) -> list[Belief]:
     2018, Bayesian Analysis 13): what few blocks speak for, or some against, is not sure.
     """
     rows = [row for entry in table.entries for row in _rows(entry, table)]
-    logs = np.array([log for _, log, _ in rows])
-    nothing = np.array([not (entry.effects or entry.words) for _, _, entry in rows])
-    blocks = np.array([e.blocks for _, _, e in rows])
+    logs = np.array([row.log for row in rows])
+    nothing = np.array([set(r.entry.effects) == set(r.always) and not r.entry.words for r in rows])
+    blocks = np.array([row.entry.blocks for row in rows])
     rest = logs - blocks.sum(axis=1)
     count = blocks.shape[1]
     drawn = np.random.default_rng(0).dirichlet(np.ones(count), DRAWS) * count
@@ -74,16 +76,25 @@ def beliefs(table: Table) -> list[Belief]:
     p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
     some = np.exp(logs - logsumexp(logs[~nothing]))
     p[~nothing] = some[~nothing] * (1 - p[nothing].sum())
-    return [
-        _belief(mimicked, e, float(v), table) for (mimicked, _, e), v in zip(rows, p, strict=True)
-    ]
+    return [_belief(row, float(v), table) for row, v in zip(rows, p, strict=True)]
 
 
-def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float, table: Table) -> Belief:
+@dataclass(frozen=True)
+class _Row:
+    """An entry with one meaning of its effects, and its log posterior up to a constant."""
+
+    entry: Entry
+    log: float
+    mimicked: tuple[str, ...] = ()
+    always: tuple[str, ...] = ()
+
+
+def _belief(row: _Row, probability: float, table: Table) -> Belief:
     """What begins or ends several times is no effect of the catalogue, but depends on time.
 
     What comes and goes once, in several steps, is one thing of a kind.
     """
+    entry = row.entry
     at_moments = [n for n in map(catalogue_name, entry.effects) if n in table.kinds.at_moments]
     swells = table.swells.get(entry.effects)
     steps = [n for n in at_moments if n != swells] if len(at_moments) > 1 else []
@@ -93,25 +104,28 @@ def _belief(mimicked: tuple[str, ...], entry: Entry, probability: float, table: 
 
     again = steps and swells is None and AGAIN not in entry.words
     words = (AGAIN, *entry.words) if again else entry.words
-    real = once(n for n in entry.effects if n not in mimicked)
-    like = tuple(n for n in once(mimicked) if n not in real)
-    return Belief(real, like, words, entry, probability)
+    real = once(n for n in entry.effects if n not in (*row.mimicked, *row.always))
+    like = tuple(n for n in once(row.mimicked) if n not in real)
+    return Belief(real, once(row.always), like, words, entry, probability)
 
 
-def _rows(entry: Entry, table: Table) -> list[tuple[tuple[str, ...], float, Entry]]:
-    """Effects that are mimicked, log posterior up to a constant, and the entry."""
+def _rows(entry: Entry, table: Table) -> list[_Row]:
+    """All meanings of an entry."""
     count = len(entry.effects)
     stale = np.log(PRIORS.stale if entry.stale else 1 - PRIORS.stale)
     each = np.log(PRIORS.outside / len(table.words))
     other = len(entry.words) * each if entry.words else np.log(1 - PRIORS.outside)
     real = stale + other + log_prior_of_effects(count, len(table.candidates)) + entry.log_evidence
-    rows = [((), float(real), entry)]
+    rows = [_Row(entry, float(real))]
+    for names, log_odds in table.always.get(entry.effects, []):
+        rows.append(_Row(entry, float(real + log_odds), always=names))
     for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
         if np.isfinite(log_evidence):
             # the first word is no further thing, but the part that the effects' forms do not take
             like = sum(_log_likeness(catalogue_name(n), entry.words, table) for n in names)
             rest = log_prior_of_effects(count - len(names), len(table.candidates))
-            rows.append((names, float(stale + other + like + rest + log_evidence), entry))
+            log = float(stale + other + like + rest + log_evidence)
+            rows.append(_Row(entry, log, mimicked=names))
     return rows
 
 

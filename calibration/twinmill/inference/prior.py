@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 from twinmill.inference.candidate import size_std
 from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.duties import refined
+from twinmill.inference.hidden import Hidden
 from twinmill.inference.moments import Rate
 from twinmill.inference.settings import PRIORS
 from twinmill.model.model_file import ModelFile
@@ -48,6 +49,7 @@ class Always:
         rate: of moments.
         usual, top: scale of the kernels, see `Motion`.
         noise: (4, 3) sensor, drive, gain, memory of each channel, see `Noise`.
+        hidden: what its own log tells of other effects.
     """
 
     effects: tuple[str, ...]
@@ -60,6 +62,7 @@ class Always:
     usual: np.ndarray
     top: np.ndarray
     noise: np.ndarray
+    hidden: Hidden
 
 
 @dataclass(frozen=True)
@@ -189,7 +192,7 @@ def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
     """
     size = dict(always.kernels)
     there = [k for k in found if k.name in size]
-    labels = [*prior.names, *(label for k in there for label in weight_labels(k))]
+    labels = labels_of(prior, always, found)
     columns = [size[k.name] * k.columns for k in there]
     count = len(prior.names)
     mean = np.r_[prior.mean, np.zeros(len(labels) - count)]
@@ -208,6 +211,13 @@ def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
     return replace(
         prior, mean=mean, cov=cov, columns=np.concatenate(columns) if columns else prior.columns
     )
+
+
+def labels_of(prior: Prior, always: Always, found: Sequence[Kernel]) -> list[str]:
+    """Names of the numbers of a later log's prior: of the base, then weights of its discrepancy."""
+    names = {name for name, _ in always.kernels}
+    there = [k for k in found if k.name in names]
+    return [*prior.names, *(label for k in there for label in weight_labels(k))]
 
 
 def _is_base(name: str) -> bool:

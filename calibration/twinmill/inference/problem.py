@@ -6,7 +6,7 @@ floor, `twinmill.joints.problem` those that MuJoCo can load.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Protocol
@@ -134,6 +134,15 @@ class Problem(ABC):
         Args:
             change: (W, C) of the prediction by the effect.
         """
+
+    def always_there(
+        self, h: Hypothesis, effects: Sequence[str]
+    ) -> tuple[Hypothesis, float] | None:
+        """A hypothesis some of whose effects the base always lacked, and their Bayes factor.
+
+        None where no log that the base was fitted to tells of them.
+        """
+        return None
 
     @abstractmethod
     def of_moments(self) -> np.ndarray:

@@ -63,6 +63,8 @@ class Table:
         excess: squares that the base leaves over those of noise.
         candidates: effects that compete.
         words: dependences that compete.
+        always: of sets, effects of theirs that the base may always have lacked, with the log
+            evidence of that over their being new, its own log taken in.
         swells: of sets in which several effects act from moments on, the kind of the one thing
             that they are steps of, where what they change together comes and goes once.
         kinds: of effects.
@@ -73,6 +75,7 @@ class Table:
     excess: float
     candidates: tuple[str, ...]
     words: tuple[str, ...]
+    always: dict[tuple[str, ...], list[tuple[tuple[str, ...], float]]]
     swells: dict[tuple[str, ...], str]
     kinds: Kinds
 
@@ -127,6 +130,7 @@ def table_of(search: Search) -> Table:
         max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
         tuple(p.names),
         search.words,
+        {names: own.always() for names, (_, own) in best.items()},
         {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
         p.kinds,
     )
@@ -258,6 +262,16 @@ class _Comparison:
         mean = np.clip(mean, self.h.low, self.h.high)
         own = range(len(self.problem.prior.mean), count)
         return {self.h.labels[k]: (float(mean[k]), float(std[k])) for k in own}
+
+    def always(self) -> list[tuple[tuple[str, ...], float]]:
+        """Of each of `subsets` how much likelier it always was there than that it is new, log."""
+        found, whiten = [], self.view.fitter.whiten
+        for names in subsets(self.h.effects):
+            if there := self.problem.always_there(self.h, names):
+                told, log_factor = there
+                then = told.log_evidence(told.linear(whiten)) + log_factor
+                found.append((names, then - self.h.log_evidence(self._known)))
+        return found
 
     def _moments(self, cov: np.ndarray | None) -> tuple[_Beside, _Beside]:
         """Moments as often as the base's own log had them, and as news."""

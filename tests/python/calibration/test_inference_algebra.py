@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise, evidence and prior odds of the inference against dense algebra and other libraries."""
 
+from dataclasses import replace
 from itertools import product
 from math import comb, log
 
@@ -10,7 +11,8 @@ from scipy.linalg import block_diag, toeplitz
 from scipy.special import logsumexp
 from scipy.stats import expon, multivariate_normal
 
-from twinmill.inference import moments
+from twinmill.inference import hidden, moments
+from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import (
     OF_FORM,
     SIZES,
@@ -22,6 +24,7 @@ from twinmill.inference.discrepancy import (
     kernels,
 )
 from twinmill.inference.evidence import Linear, gains_by_size
+from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise
 from twinmill.inference.planar import planar_kinds
@@ -30,6 +33,7 @@ from twinmill.inference.screening import _products, _products_of_whiles, gains_o
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 from twinmill.inference.table import Entry, Table, swells_once
+from twinmill.model.parameters import Parameter
 
 STEP_S = 0.1
 
@@ -196,6 +200,55 @@ def test_products_of_whiles_are_those_of_their_columns():
         assert found == pytest.approx(wanted)
 
 
+class OneAdded(Hypothesis):
+    """Three numbers of a base, and one of an effect."""
+
+    of_effects = property(lambda self: np.arange(4) == 3)
+
+
+def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_logs(monkeypatch):
+    """Two logs share a base; an effect is in both, or in the later one alone."""
+    monkeypatch.setattr(hidden, "PRIORS", replace(PRIORS, sheet=0.0))
+    random = np.random.default_rng(11)
+    own, later = random.normal(size=(4, 30)), random.normal(size=(4, 40))
+    truth = np.array([0.3, -1.0, 0.5, 0.8])
+    y_own, y_later = (truth @ x + random.normal(size=x.shape[1]) for x in (own, later))
+
+    def joint(effect_in_own: bool) -> float:
+        first = own * np.array([1, 1, 1, effect_in_own])[:, None]
+        x = np.concatenate([first, later], axis=1)
+        prior = np.array([1, 1, 1, PRIORS.size**2])
+        cov = (x.T * prior) @ x + np.eye(x.shape[1])
+        return multivariate_normal(cov=cov).logpdf(np.r_[y_own, y_later])
+
+    def flat(rows: np.ndarray) -> np.ndarray:
+        return rows.reshape(*rows.shape[:-2], -1)
+
+    base = Linear.of(y_own, own[:3])
+    parameter = Parameter("motor_lag.extra_s", "s", 1.0, -9.0, 9.0, 0.0, 1.0, 0.1)
+    columns = {"motor_lag": Candidate("motor_lag", [parameter], own[None, 3:, :].swapaxes(1, 2))}
+    told = hidden.Hidden.of(columns, base, flat, np.eye(3))
+    prior = block_diag(base.covariance, PRIORS.size**2)
+    h = OneAdded(
+        effects=("motor_lag",),
+        model=None,
+        labels=("base.a", "base.b", "base.c", "motor_lag.extra_s"),
+        named=np.ones(4, bool),
+        mean=np.r_[base.mean, 0.0],
+        cov=prior,
+        low=np.full(4, -np.inf),
+        high=np.full(4, np.inf),
+        step=np.ones(4),
+        value=np.zeros(4),
+        one_sided=np.zeros(4, bool),
+        slopes=later[:, :, None],
+        errors=y_later[:, None],
+    )
+    always, log_factor = told.explained(h, ("motor_lag",), np.arange(3))
+    found = always.linear(flat).log_evidence + log_factor - h.linear(flat).log_evidence
+    assert found == pytest.approx(joint(True) - joint(False))
+
+
 OF_TIME = ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss")
 OF_OTHERS = ("wheel_gain", "dead_zone", "motor_lag", "marker_offset", "floor_patch", "yaw_lag")
 
@@ -203,7 +256,8 @@ OF_OTHERS = ("wheel_gain", "dead_zone", "motor_lag", "marker_offset", "floor_pat
 def table(entries, swells=()):
     """Of ten effects, four of which act with time."""
     kinds = planar_kinds()
-    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, ("time", "place"), dict(swells), kinds)
+    words = ("time", "place")
+    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, words, {}, dict(swells), kinds)
 
 
 def entry(effects, words, log_evidence, mimicked=None):
