@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import explain as explain
     from twinmill.api import fit as fit
     from twinmill.api import import_log as import_log
+    from twinmill.api import improved as improved
     from twinmill.api import infer as infer
     from twinmill.api import infer_robots as infer_robots
     from twinmill.api import load as load
@@ -88,7 +89,7 @@ _HOME = {
                 "fit",
                 "import_log",
             ),
-            *("infer", "infer_robots", "load", "next_run", "simulate"),
+            *("improved", "infer", "infer_robots", "load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),

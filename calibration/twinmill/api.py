@@ -77,6 +77,7 @@ from twinmill.fitting import fit as _fit
 from twinmill.fitting import model_comparison as _models
 from twinmill.fitting.equations import EQUATION
 from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
+from twinmill.inference import better as _better
 from twinmill.inference import infer as _infer
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
@@ -1805,6 +1806,30 @@ def infer(
     before = _log(own).measurements(model) if own is not None else ()
     result = _infer.infer(measurements, model.file, before, _progress(progress))
     return _told(Inference(result), measurements)
+
+
+@_one_thread
+def improved(found: Inference, model: Model | str | Path | None = None) -> Model:
+    """Model with the likeliest set of missing effects, all numbers at their posterior mean.
+
+    Args:
+        found: by `infer`.
+        model: the one that was judged; None is TurboPi's.
+
+    Returns:
+        The new model, not written yet; it keeps what it misses in the logs that were judged, so
+        that `infer` does not report that of a later log.
+
+    Raises:
+        ModelError: the model gives the robot numbers of its own.
+
+    Examples:
+        >>> tm.improved(inferred, "fitted.toml").effects
+        ['coasting']
+    """
+    file = _model(model).file
+    path = Path(f"{file.path.stem}_improved.toml")
+    return Model(_better.better(found._result, file, path, "twinmill.improved").file)
 
 
 @_one_thread

@@ -21,6 +21,7 @@ if working():  # not for --help
 
     from twinmill.files import check_new_file
     from twinmill.inference.answer import Answer
+    from twinmill.inference.better import better
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
     from twinmill.model.parameters import with_role
@@ -63,6 +64,17 @@ def _infer(
             help="Write the model with what it misses in --own, which later logs then do without.",
         ),
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="M2",
+            show_default=False,
+            help="Write the likeliest model: with the effects that are missing, all numbers "
+            "fitted, and what it misses in these logs.",
+        ),
+    ] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> list[Inference]:
@@ -74,57 +86,64 @@ def _infer(
 
     Example: twinmill lab infer run.lcmlog --model fitted.toml --own calibration.lcmlog
 
-    With --keep known.toml the model is written with what it misses in its own
-    log: later, `twinmill lab infer other.lcmlog --model known.toml` is enough.
+    With -o better.toml the model is written with what was missing: later,
+    `twinmill lab infer other.lcmlog --model better.toml` is enough. With
+    --keep known.toml the model as given is written with what it misses in --own.
     """
     native.keep_memory()  # what the work frees it wants again
     words = [word for path in own or () for word in ("--own", str(path))]
-    verb = shlex.join(["lab", "infer", *words, *(["--keep", str(keep)] if keep else [])])
-    source = provenance(command_line(verb, logs, model), model_file := open_model(model, None))
+    if keep is not None:
+        words += ["--keep", str(keep)]
+    typed = command_line(shlex.join(["lab", "infer", *words]), logs, model, output)
+    source = provenance(typed, model_file := open_model(model, None))
     if keep is not None and not own:
         raise ValueError("infer: --keep stores what --own shows; give the model's own log, too.")
-    if keep is not None:
-        check_new_file(keep, force, [model_file.path, *logs, *own])
+    for path in filter(None, (keep, output)):
+        check_new_file(path, force, [model_file.path, *logs, *(own or ())])
+    if keep is not None and keep == output:
+        raise ValueError(f"infer: --keep and -o are both {keep}; give each a file of its own.")
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
         measurements = load(logs, model_file)
         robots = {track.robot_id for _, track in measurements.tracks}
-        if keep is not None and len(robots) > 1:
+        if (keep or output) and len(robots) > 1:
             raise ValueError(
-                f"infer: --keep writes what one robot's log tells, and these are {len(robots)} "
-                "robots; give logs of the one that the model was fitted to."
+                f"infer: {'--keep' if keep else '-o'} writes what one robot's log tells, and "
+                f"these are {len(robots)} robots; give logs of one robot."
             )
         before = load(own, model_file) if own else ()
         results = infer_robots(measurements, model_file, before, progress)
+        written = None
+        if output is not None:
+            progress("what the new model still misses in these logs")
+            written = better(results[0], model_file, output, source.command)
     if keep is not None:
         with_kept(model_file, results[0].always, keep, source.command).write(force)
+    if written:
+        written.file.write(force)
     each = [result.to_json() for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
-    commands = _mending(results[0].answer, logs, model) if len(results) == 1 else []
-    lines = [command for _, command in commands]
-    data = {**data, "commands": lines, **told(measurements), **source.to_json()}
+    verb = shlex.join(["lab", "infer", *words])
+    commands = [] if written or len(results) > 1 else _mending(results[0].answer, verb, logs, model)
+    data = {**data, **(written.to_json() if written else {})}
+    data |= {"commands": [command for _, command in commands]}
+    data |= {**told(measurements), **source.to_json()}
     if as_json:
         deliver(data, None, as_json)
     else:
         from twinmill.report.inference import terminal_of_robots  # slow, and JSON needs none
 
-        deliver(data, terminal_of_robots(results, commands), as_json)
+        deliver(data, terminal_of_robots(results, commands, written), as_json)
     return results
 
 
-def _mending(answer: Answer, logs: list[Path], model: str) -> list[tuple[str, str]]:
-    """Reason and command for each step to the model that has what is missing beyond doubt.
+def _mending(answer: Answer, verb: str, logs: list[Path], model: str) -> list[tuple[str, str]]:
+    """Reason and command for the model that has what is missing.
 
     What is of a moment of these logs is added to none.
     """
-    if answer.verdict == "refit_enough":
-        fitted = Path(f"{Path(model).stem}_fitted.toml")
-        return [("To refit the base", command_line("fit", logs, model, fitted))]
-    steps, given = [], model
-    for found in answer.findings:
-        if found.certainty == "doubtful" or with_role(found.effect, "moment"):
-            continue
-        better = Path(f"{Path(given).stem}_{found.effect}.toml")
-        why = "Then" if steps else "To add it, and see by how much the error falls"
-        steps.append((why, command_line(f"twin add {found.effect}", logs, given, better)))
-        given = str(better)
-    return steps
+    lasting = [name for name in answer.added if not with_role(name, "moment")]
+    if not lasting and answer.verdict != "refit_enough":
+        return []
+    why = f"To add {' and '.join(lasting)}" if lasting else "To refit the base"
+    new = Path(f"{Path(model).stem}_{'_'.join(lasting) or 'fitted'}.toml")
+    return [(f"{why}, and see by how much the error falls", command_line(verb, logs, model, new))]

@@ -9,7 +9,7 @@ from twinmill.defaults import Certainty, Verdict
 from twinmill.inference.discrepancy import NODES
 from twinmill.inference.posterior import Belief, beliefs
 from twinmill.inference.settings import PRIORS
-from twinmill.inference.table import Table
+from twinmill.inference.table import Numbers, Table
 from twinmill.model.parameters import catalogue_name, instance_of
 
 LARGEST_GROUP = 4  # names: more help nobody
@@ -64,6 +64,8 @@ class Answer:
         effects: probability of each effect that was fitted, likeliest first.
         depends_on: what is left depends on, likeliest first, each with its probability.
         share: of the excess squared error that the likeliest dependence takes.
+        added: the likeliest set of effects of the catalogue that are missing, each kind once.
+        numbers: of the likeliest model that has these.
     """
 
     verdict: Verdict
@@ -74,6 +76,8 @@ class Answer:
     effects: dict[str, float]
     depends_on: dict[str, float]
     share: float
+    added: tuple[str, ...]
+    numbers: Numbers
 
     def to_json(self) -> dict:
         """Fields of the interface."""
@@ -115,7 +119,20 @@ def answer(table: Table) -> Answer:
     else:
         verdict = "ambiguous" if findings[0].certainty == "group" else "effect_missing"
     words, share = _rest(best, every, table) if something else ({}, 0.0)
-    return Answer(verdict, findings, nothing, outside, stale, _of_each(every), words, share)
+    added = _likeliest(every, lambda b: tuple(sorted(b.effects)))
+    own = max((b for b in every if tuple(sorted(b.effects)) == added), key=lambda b: b.probability)
+    return Answer(
+        verdict,
+        findings,
+        nothing,
+        outside,
+        stale,
+        _of_each(every),
+        words,
+        share,
+        added,
+        table.numbers[own.entry.effects],
+    )
 
 
 def _of_each(every: list[Belief]) -> dict[str, float]:
@@ -175,11 +192,12 @@ def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[f
             weight[b.entry.effects] = weight.get(b.entry.effects, 0.0) + b.probability
     sets = list(weight)
     shares = np.array(list(weight.values())) / sum(weight.values())
-    own = [k for k in table.numbers[sets[0]] if catalogue_name(k) == name]
+    each = [table.numbers[e].of_effects() for e in sets]
+    own = [k for k in each[0] if catalogue_name(k) == name]
     own = [k for k in own if instance_of(k) == instance_of(own[0])]
     found = {}
     for label in own:
-        values, stds = np.array([table.numbers[e][label] for e in sets]).T
+        values, stds = np.array([numbers[label] for numbers in each]).T
         mean = float(shares @ values)
         spread = float(np.hypot(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)), OF_SIZE * mean))
         found[label.split(".", 1)[1]] = mean, spread

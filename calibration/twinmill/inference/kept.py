@@ -2,6 +2,7 @@
 """What a model misses in its own logs, kept in its file as [fit.always]."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomlkit
@@ -56,8 +57,15 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
     document = tomlkit.parse(model_file.text)
     document["parent"] = model_file.hash
     document["created_by"] = command
+    document.setdefault("fit", tomlkit.table())["always"] = as_table(always)
+    text = tomlkit.dumps(document)
+    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+
+
+def as_table(always: Always) -> dict[str, Any]:
+    """What a model misses in its own logs, as [fit.always] holds it."""
     low = np.linalg.cholesky(always.cov)
-    document.setdefault("fit", tomlkit.table())["always"] = {
+    return {
         "effects": list(always.effects),
         "kernels": dict(always.kernels),
         "wander": {word: _short(p) for word, p in always.wander.items()},
@@ -76,8 +84,6 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
             "shift": [_short(row) for row in always.hidden.shift],
         },
     }
-    text = tomlkit.dumps(document)
-    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
 
 
 def _hidden(table: dict, numbers: int) -> Hidden:

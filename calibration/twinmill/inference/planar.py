@@ -124,7 +124,7 @@ def problem_of(
         effects=always.effects if always else (),
     )
     if sheet:
-        prior = replace(prior, cov=prior.stale)
+        prior = replace(prior, cov=prior.stale, known=False)
     if not same_clock:
         prior, logs = _with_clock(prior, model, logs)
     steps = Steps(logs)

@@ -76,6 +76,7 @@ class Prior:
         columns: (K, W, C) of the discrepancy.
         sheet: (P,) how much less well than others each is known from a data sheet alone; 0 where
             no data sheet tells it.
+        known: other logs told the base; in its own log its numbers are what they are fitted to.
     """
 
     names: list[str]
@@ -86,6 +87,7 @@ class Prior:
     high: np.ndarray
     columns: np.ndarray = field(repr=False)
     sheet: np.ndarray
+    known: bool = True
 
     @property
     def stale(self) -> np.ndarray:

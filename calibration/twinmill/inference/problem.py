@@ -170,12 +170,13 @@ class Problem(ABC):
         )
 
     def told(self, h: Hypothesis) -> Hypothesis:
-        """A hypothesis with the base's numbers at the prior's mean, which hardly knows clocks.
+        """A hypothesis with the base's numbers where other logs told them, which is no clock.
 
         Without an effect they may have gone far to stand in for it: what it would change, and what
-        they would, are compared where neither has yet.
+        they would, are compared where neither has yet. In the base's own log nothing told them.
         """
         known = np.array([not n.startswith("clock.") for n in h.labels]) & ~h.of_effects
+        known &= self.prior.known
         value = np.where(known, np.clip(h.mean, h.low, h.high), h.value)
         fitter = Fitter(self.steps, self.noise, self.prior.columns)
         return fitter.at(replace(h, value=value, slopes=None))

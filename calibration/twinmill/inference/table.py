@@ -4,6 +4,7 @@
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp
@@ -54,12 +55,39 @@ class Entry:
 
 
 @dataclass(frozen=True)
+class Numbers:
+    """Posterior of all numbers of one set of effects, with the likeliest dependence beside it.
+
+    Attributes:
+        model: with the effects, where and when they act as fitted.
+        labels: the base's numbers, weights of its discrepancy, then those of effects, N of them.
+        mean, cov: (N,), (N, N).
+        own: how many of the last are of the effects.
+        alone: (N, N) of these, what they are in a model without the discrepancy.
+    """
+
+    model: Any
+    labels: tuple[str, ...]
+    mean: np.ndarray
+    cov: np.ndarray
+    own: int
+    alone: np.ndarray
+
+    def of_effects(self) -> dict[str, tuple[float, float]]:
+        """Name -> (value, standard deviation) of the effects' numbers."""
+        first = len(self.labels) - self.own
+        std = np.sqrt(np.diag(self.cov))
+        rows = zip(self.labels, self.mean.tolist(), std.tolist(), strict=True)
+        return {name: (value, spread) for name, value, spread in [*rows][first:]}
+
+
+@dataclass(frozen=True)
 class Table:
     """All that an answer is made of.
 
     Attributes:
         entries: hypotheses.
-        numbers: of each set of effects, name -> (value, standard deviation).
+        numbers: of each set of effects.
         excess: squares that the base leaves over those of noise.
         candidates: effects that compete.
         words: dependences that compete.
@@ -71,7 +99,7 @@ class Table:
     """
 
     entries: list[Entry]
-    numbers: dict[tuple[str, ...], dict[str, tuple[float, float]]]
+    numbers: dict[tuple[str, ...], Numbers]
     excess: float
     candidates: tuple[str, ...]
     words: tuple[str, ...]
@@ -121,7 +149,7 @@ def table_of(search: Search) -> Table:
                 if key not in entries or entry.log_evidence > entries[key].log_evidence:
                     entries[key] = entry
             likely = max(entry.log_evidence for entry in of_noise)
-            if names and likely > best.get(names, (-np.inf,))[0]:
+            if likely > best.get(names, (-np.inf,))[0]:
                 best[names] = likely, own
     rows = len(p.steps) * int(p.steps.observed.sum())
     return Table(
@@ -236,8 +264,8 @@ class _Comparison:
                     out += self._with_words(first, self._evidence(first))
         return _as_without_moments(out)
 
-    def numbers(self) -> dict[str, tuple[float, float]]:
-        """Estimates of the effects and their standard deviations, with the likeliest dependence.
+    def numbers(self) -> Numbers:
+        """Estimates and their covariance.
 
         As wide as the posterior, and as blocks of time drawn again and again let them scatter,
         which is wider where the form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
@@ -258,10 +286,30 @@ class _Comparison:
             @ np.linalg.solve(np.tensordot(w, grams, 1) + np.eye(len(linear.x)), w @ pushes)[:count]
             for w in draws
         ]
-        std = np.sqrt(np.maximum(np.diag(spread), np.var(drawn, axis=0)))
-        mean = np.clip(mean, self.h.low, self.h.high)
-        own = range(len(self.problem.prior.mean), count)
-        return {self.h.labels[k]: (float(mean[k]), float(std[k])) for k in own}
+        wider = np.sqrt(np.maximum(np.var(drawn, axis=0) / np.diag(spread), 1.0))
+        return Numbers(
+            self.h.model,
+            self.h.labels,
+            np.clip(mean, self.h.low, self.h.high),
+            spread * np.outer(wider, wider),
+            count - len(self.problem.prior.mean),
+            self._without_discrepancy(),
+        )
+
+    def _without_discrepancy(self) -> np.ndarray:
+        """(N, N) of all numbers, those of a model without the base's discrepancy.
+
+        Its prediction is the nearest to that of the whole model, as the noise measures it and as
+        far as a data sheet lets it go; weights become zero (projection of a posterior; Goutis and
+        Robert 1998, Biometrika 85).
+        """
+        h, whiten = self.h, self.view.fitter.whiten
+        named, out = h.named, np.diag(h.named.astype(float))
+        if not named.all():
+            x, beside = whiten(h.slopes[named]), whiten(h.slopes[~named])
+            known = np.linalg.inv(self._stale_cov[np.ix_(named, named)])
+            out[np.ix_(named, ~named)] = np.linalg.solve(x @ x.T + known, x @ beside.T)
+        return out
 
     def always(self) -> list[tuple[tuple[str, ...], float]]:
         """Of each of `subsets` how much likelier it always was there than that it is new, log."""

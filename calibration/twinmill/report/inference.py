@@ -6,6 +6,7 @@ from rich.text import Text
 
 from twinmill.arguments import option
 from twinmill.inference.answer import Answer, Named
+from twinmill.inference.better import Better
 from twinmill.inference.infer import Inference
 from twinmill.model.parameters import catalogue
 from twinmill.report import show
@@ -36,16 +37,28 @@ def sentence(answer: Answer) -> str:
     return f"Missing: {names}{_on(answer)}."
 
 
-def terminal_of_robots(results: list[Inference], commands: show.Commands = ()) -> RenderableType:
+def terminal_of_robots(
+    results: list[Inference], commands: show.Commands = (), written: Better | None = None
+) -> RenderableType:
     """Text of `twinmill lab infer`: of one robot all, of several what is missing of each.
 
     Args:
         results: one for each robot.
         commands: what to type then, each with why.
+        written: the new model of one robot.
     """
     if len(results) > 1:
         return Group(show.table(_robots(results)), Text(ONE_BY_ONE))
-    return Group(terminal(results[0]), *show.typed_next(commands))
+    new = [Text(), Text(_new(written))] if written else []
+    return Group(terminal(results[0]), *new, *show.typed_next(commands))
+
+
+def _new(written: Better) -> str:
+    has = f"has {' and '.join(written.added)}" if written.added else "has the base's new numbers"
+    return (
+        f"{written.file.path} {has}: score {number(written.before.score)} without, "
+        f"{number(written.after.score)} with (1 is as good as the log can tell)."
+    )
 
 
 def _robots(results: list[Inference]) -> Table:

@@ -15,8 +15,11 @@ from scipy.special import logsumexp
 
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
+from twinmill.fitting.compare import comparison
 from twinmill.fitting.fit import fit
+from twinmill.fitting.opening import open_measurements
 from twinmill.inference.always import always_of
+from twinmill.inference.better import better
 from twinmill.inference.infer import infer, infer_robots
 from twinmill.inference.kept import kept, with_kept
 from twinmill.inference.planar import problem_of
@@ -163,6 +166,28 @@ def test_a_loss_is_named_and_one_that_comes_again_depends_on_time(
     else:
         assert found.verdict == "outside_catalogue"
         assert next(iter(found.depends_on)) == "time"
+
+
+def test_the_written_model_predicts_another_log_and_nothing_is_missing_then(
+    measure, tanh_robot, one_clock_base, own, tmp_path
+):
+    """A robot that rolls on: numbers are its own, and a drive that was not fitted is as noise."""
+    robot = tanh_robot(coast_mps2=0.6)
+    path = tmp_path / "rolls_on.toml"
+    written = better(infer([measure(robot, 7)], one_clock_base, [own]), one_clock_base, path, "")
+    written.file.write()
+    known = ModelFile.load(str(path))
+    std = dict(zip(known.covariance.names, np.sqrt(np.diag(known.covariance.values)), strict=True))
+    rolls = "coasting.deceleration_mps2"
+    assert written.added == ("coasting",)
+    assert known.model.get(rolls) == pytest.approx(0.6, abs=3 * std[rolls])
+    later = measure(robot, 8)
+    scores = [
+        comparison(model, open_measurements([later], model)).score
+        for model in (one_clock_base, known)
+    ]
+    assert scores[0] > 1.3 > scores[1]  # docs/glossary.md, score: above it something is missing
+    assert infer([later], known).answer.verdict == "model_adequate"
 
 
 def test_what_the_base_misses_in_its_own_log_is_no_news(
