@@ -109,7 +109,13 @@ def nearby(
                 points[:, n, k] = c.parameters[k].value
             errors = steps.errors(model, names, points.reshape(-1, len(names)))
             white = PRIORS.size * whiten(nothing - errors).reshape(*points.shape[:2], -1)
-            seen.update(zip(fresh, zip(*_gains(*_products(white, linear), c.one_sided), strict=True), strict=True))
+            seen.update(
+                zip(
+                    fresh,
+                    zip(*_gains(*_products(white, linear), c.one_sided), strict=True),
+                    strict=True,
+                )
+            )
         gains, weights = zip(*map(seen.__getitem__, rounded), strict=True)
         return np.array(gains), np.array(weights)
 
@@ -134,9 +140,10 @@ def nearby(
 
 def _products(white: np.ndarray, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
     """(G, k, k) Gram matrices of (G, k, R) white columns, and (G, k) products with what is left."""
-    cross = white @ linear.basis.T
+    cross, push = linear.taken(white.reshape(-1, white.shape[-1]))
+    cross = cross.reshape(*white.shape[:2], -1)
     gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2)
-    return gram, white @ (linear.y - linear.half @ linear.basis)
+    return gram, push.reshape(white.shape[:2])
 
 
 def _products_of_whiles(
@@ -199,7 +206,7 @@ def _start(c: Candidate, weights: np.ndarray, at: np.ndarray, where: list[int]) 
 def _fixed(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
     """An effect of limits, which has no size."""
     white = whiten(c.fixed)
-    cross, left = white @ linear.basis.T, linear.y - linear.half @ linear.basis
-    gains = white @ left - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
+    cross, push = linear.taken(white)
+    gains = push - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
     best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
     return Screened(total, c.at[[best]], total - float(gains[best]), white[[best]])

@@ -124,7 +124,7 @@ def table_of(search: Search) -> Table:
     return Table(
         [replace(entry, fall=falls[key]) for key, entry in entries.items()],
         {names: own.numbers() for names, (_, own) in best.items()},
-        max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
+        max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
         tuple(p.names),
         search.words,
         {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
@@ -218,11 +218,11 @@ class _Comparison:
 
     def entries(self, whole: bool) -> list[Entry]:
         """Alone and with each dependence; if `whole`, also of a stale base, and with two."""
-        usual, news = self._moments(None)
-        own = self._evidence(usual)
+        (usual, own), *others = self._plain
+        news = self._usual_and_news[1]
         out = [self._alone(usual), *self._with_words(usual, own), self._alone(news)]
-        for other in self._others(usual):
-            out += [self._alone(other), *self._with_words(other, self._evidence(other))]
+        for other, of_other in others:
+            out += [self._alone(other), *self._with_words(other, of_other)]
         if whole:
             stale, _ = self._moments(self._stale_cov)
             of_stale = self._evidence(stale)
@@ -238,26 +238,34 @@ class _Comparison:
         As wide as the posterior, and as blocks of time drawn again and again let them scatter,
         which is wider where the form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
         """
-        usual, news = self._moments(None)
-        plain = (usual, *self._others(usual))
-        likely = [self._likeliest(b, self._evidence(b)) for b in plain]
-        every = [(b, self._linear(b)) for b in (*plain, news, *likely)]
+        likely = [self._likeliest(b, own) for b, own in self._plain]
+        plain = [(b, own.linear) for b, own in self._plain]
+        every = plain + [(b, self._linear(b)) for b in (self._usual_and_news[1], *likely)]
         linear = max(every, key=lambda b: b[1].log_evidence + b[0].log_chance)[1]
         mean, spread = self.h.posterior(linear)
-        root, count = np.linalg.cholesky(self.h.cov), len(self.h.mean)
-        parts = [linear.x[:, self.view.block == b] for b in range(self.view.block.max() + 1)]
+        root, count, x = np.linalg.cholesky(self.h.cov), len(self.h.mean), linear.x
+        parts = [x[:, self.view.block == b] for b in range(self.view.block.max() + 1)]
         grams = np.array([part @ part.T for part in parts])
         pushes = np.array([part @ linear.y[self.view.block == b] for b, part in enumerate(parts)])
         draws = np.random.default_rng(0).dirichlet(np.ones(len(parts)), DRAWS) * len(parts)
         drawn = [
-            root
-            @ np.linalg.solve(np.tensordot(w, grams, 1) + np.eye(len(linear.x)), w @ pushes)[:count]
+            root @ np.linalg.solve(np.tensordot(w, grams, 1) + np.eye(len(x)), w @ pushes)[:count]
             for w in draws
         ]
         std = np.sqrt(np.maximum(np.diag(spread), np.var(drawn, axis=0)))
         mean = np.clip(mean, self.h.low, self.h.high)
         own = range(len(self.problem.prior.mean), count)
         return {self.h.labels[k]: (float(mean[k]), float(std[k])) for k in own}
+
+    @cached_property
+    def _usual_and_news(self) -> tuple[_Beside, _Beside]:
+        return self._moments(None)
+
+    @cached_property
+    def _plain(self) -> list[tuple[_Beside, Evidence]]:
+        """Usual moments and each of what may be in their place, with its evidence."""
+        usual = self._usual_and_news[0]
+        return [(beside, self._evidence(beside)) for beside in (usual, *self._others(usual))]
 
     def _moments(self, cov: np.ndarray | None) -> tuple[_Beside, _Beside]:
         """Moments as often as the base's own log had them, and as news."""
@@ -283,7 +291,7 @@ class _Comparison:
         return [*none, *self._of_form(none[0] if none else usual)]
 
     def _without_moments(self, usual: _Beside) -> _Beside:
-        rate, count = self.problem.rate, self.view.moments[0].shape[0] - 1
+        rate, count = self.problem.rate, len(self.view.moments[0].columns) - 1
         chance = float(rate.log_chance(np.array(0), count)) if rate else 0.0
         nothing = np.zeros(())
         return replace(
@@ -350,11 +358,12 @@ class _Comparison:
 
     @cached_property
     def _known(self) -> Linear:
-        return self.h.linear(self.view.fitter.whiten)
+        return self.h.linear(self.view.fitter)
 
     @cached_property
     def _stale(self) -> Linear:
-        return self.h.linear(self.view.fitter.whiten, self._stale_cov)
+        known = self._known.parts[0].rows[0]
+        return self.h.linear(self.view.fitter, self._stale_cov, known)
 
     @cached_property
     def _stale_cov(self) -> np.ndarray:
@@ -405,7 +414,7 @@ class _Comparison:
             each = (gains + relative).reshape(len(relative), gains.size)
             mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
-        linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
+        linear = own.with_kernel(self.view, at[f], SIZES[s])
         return self._entry(
             beside,
             linear,
