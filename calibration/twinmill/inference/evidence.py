@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import twinmill_native as native
 from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpotrs
 
 KEPT = 8  # blocks of rows whose products are kept: those of one hypothesis
 
@@ -105,7 +105,7 @@ class Linear:
 
     @classmethod
     def of_products(cls, columns: Columns, gram: np.ndarray, push: np.ndarray) -> "Linear":
-        """Conditions a model whose columns have these (P, P) and (P,) products, with the data too."""
+        """Conditions a model whose columns have these products (P, P), and (P,) with y."""
         low = _root(gram, lambda: columns.whole)
         return cls((columns,), low, solve_triangular(low, push, lower=True))
 
@@ -206,11 +206,5 @@ def gains_by_size(gram: np.ndarray, push: np.ndarray, sizes) -> tuple[np.ndarray
         push: (K,) their products with y.
         sizes: (S,).
     """
-    size2, diagonal = np.square(sizes), np.diag_indices(len(gram))
-    each = size2[:, None, None] * gram
-    each[:, *diagonal] += 1.0
-    low = np.linalg.cholesky(each)
-    solved = np.array([dpotrs(factor.T, push)[0] for factor in low])
-    along = solved @ push
-    gains = 0.5 * size2 * along - np.log(np.diagonal(low, axis1=1, axis2=2)).sum(axis=1)
-    return gains, size2 * (along + (solved**2).sum(axis=1))
+    gains, falls = native.gains_by_size([gram], push, sizes)
+    return gains[0], falls[0]

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import CHANCE, SIZES
-from twinmill.inference.evidence import Columns, Linear, gains_by_size
+from twinmill.inference.evidence import Columns, Linear
 from twinmill.inference.hypothesis import Hypothesis, next_of_kind
 from twinmill.inference.moments import MOMENTS
 from twinmill.inference.problem import Problem, View
@@ -47,8 +48,8 @@ class Evidence:
         span: (Q, R) orthonormal rows that span what the effects change: a dependence is the part
             that they do not take.
         inside: (K, Q) products of all kernels' white columns with these.
-        cross, push: (K, P), (K,) what the numbers take of that part, and its products with the data
-            once they have.
+        cross, push, grams: (K, P) what the numbers take of that part, and once they have, its
+            products with the data (K,) and, kernel by kernel, with itself.
     """
 
     hypothesis: Hypothesis
@@ -60,22 +61,18 @@ class Evidence:
     inside: np.ndarray
     cross: np.ndarray
     push: np.ndarray
+    grams: list[np.ndarray]
 
     def white(self, view: View, f: int) -> np.ndarray:
         """(K, R) white columns of a kernel, without what the effects take."""
         return view.white(f) - self.inside[view.parts[f]] @ self.span
-
-    def gram(self, view: View, f: int) -> np.ndarray:
-        """(K, K) their products, once the numbers have taken their part."""
-        own = np.concatenate([self.cross[view.parts[f]], self.inside[view.parts[f]]], axis=1)
-        return view.grams[f] - own @ own.T
 
     def with_kernel(self, view: View, f: int, size: float) -> Linear:
         """The linear model with a kernel of a size more."""
         at = view.parts[f]
         columns = view.white(f), self.span
         more = Columns(columns, (size * np.eye(len(columns[0])), -size * self.inside[at].T))
-        gram, push = size**2 * self.gram(view, f), size * self.push[at]
+        gram, push = size**2 * self.grams[f], size * self.push[at]
         return self.linear.with_projected(more, size * self.cross[at], gram, push)
 
 
@@ -275,11 +272,8 @@ def evidence(h: Hypothesis, view: View, linear: Linear, cov: np.ndarray | None =
     cross, push = linear.taken(view.stacked)
     of_span, push_of_span = linear.taken(span)
     cross, push = cross - inside @ of_span, push - inside @ push_of_span
-    own = Evidence(
-        h, linear, h.log_evidence(linear, cov), np.zeros(0), np.zeros(0), span, inside, cross, push
-    )
-    each = [
-        gains_by_size(own.gram(view, f), push[part], SIZES) for f, part in enumerate(view.parts)
-    ]
-    gains, falls = (np.array(found) for found in zip(*each, strict=True))
-    return replace(own, gains=gains, falls=falls)
+    own = np.concatenate([cross, inside], axis=1)
+    grams = [gram - own[at] @ own[at].T for at, gram in zip(view.parts, view.grams, strict=True)]
+    gains, falls = native.gains_by_size(grams, push, SIZES)
+    alone = h.log_evidence(linear, cov)
+    return Evidence(h, linear, alone, gains, falls, span, inside, cross, push, grams)

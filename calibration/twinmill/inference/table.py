@@ -6,7 +6,6 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
 
 from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP
@@ -407,7 +406,7 @@ class _Comparison:
         at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
         gains = own.gains[at] - np.log(len(at))
         likely = gains + np.log(np.maximum(chance, 1e-300))
-        total = float(logsumexp(likely))
+        total = float(np.logaddexp.reduce(likely, axis=None))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
         if words and not beside.words:
             relative = self._log_relative(own.falls[at])
