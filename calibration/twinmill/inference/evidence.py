@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtrtrs
 
 KEPT = 8  # blocks of rows whose products are kept: those of one hypothesis
 
@@ -21,7 +21,7 @@ KEPT = 8  # blocks of rows whose products are kept: those of one hypothesis
 def log_evidence(y: np.ndarray, x: np.ndarray) -> float:
     """Log marginal likelihood of y (R,) with columns x (P, R)."""
     low = _root(x @ x.T, lambda: x)
-    half = solve_triangular(low, x @ y, lower=True)
+    half = _through(low, x @ y)
     return -0.5 * float(y @ y - half @ half) - float(np.log(np.diag(low)).sum())
 
 
@@ -32,6 +32,13 @@ def _root(gram: np.ndarray, x: Callable[[], np.ndarray]) -> np.ndarray:
     except np.linalg.LinAlgError:  # columns so large and alike that squares of them hide the 1
         upper = np.linalg.qr(np.concatenate([np.eye(len(gram)), x().T]), mode="r")
         return (upper * np.sign(np.diag(upper))[:, None]).T
+
+
+def _through(low: np.ndarray, right: np.ndarray, transposed: bool = False) -> np.ndarray:
+    """Solution of triangular equations, by LAPACK itself: most are small."""
+    if not right.size:
+        return right
+    return dtrtrs(low.T, right, lower=0, trans=0 if transposed else 1)[0].reshape(right.shape)
 
 
 class Bank:
@@ -107,7 +114,7 @@ class Linear:
     def of_products(cls, columns: Columns, gram: np.ndarray, push: np.ndarray) -> "Linear":
         """Conditions a model whose columns have these products (P, P), and (P,) with y."""
         low = _root(gram, lambda: columns.whole)
-        return cls((columns,), low, solve_triangular(low, push, lower=True))
+        return cls((columns,), low, _through(low, push))
 
     @property
     def y(self) -> np.ndarray:
@@ -132,7 +139,7 @@ class Linear:
     @cached_property
     def mean(self) -> np.ndarray:
         """(P,) posterior mean of d."""
-        return solve_triangular(self.low, self.half, lower=True, trans=1)
+        return _through(self.low, self.half, transposed=True)
 
     @property
     def covariance(self) -> np.ndarray:
@@ -158,7 +165,7 @@ class Linear:
             sum(own @ root for own, root in zip(dots, part.roots, strict=True))
             for dots, part in zip(each, self.parts, strict=True)
         ]
-        cross = solve_triangular(self.low, np.concatenate(products, axis=1).T, lower=True).T
+        cross = _through(self.low, np.concatenate(products, axis=1).T).T
         return cross, each[0][0][:, -1] - cross @ self.half
 
     def with_columns(self, more: np.ndarray) -> "Linear":
@@ -186,7 +193,7 @@ class Linear:
         except np.linalg.LinAlgError:
             return Linear.of(self.y, np.concatenate([part.whole for part in parts]))
         low = np.block([[self.low, np.zeros_like(cross.T)], [cross, own]])
-        return Linear(parts, low, np.r_[self.half, solve_triangular(own, push, lower=True)])
+        return Linear(parts, low, np.r_[self.half, _through(own, push)])
 
     def projected(self, columns: np.ndarray, gram: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gram matrix (K, K) and products with y (K,) of columns, once d has taken its part."""

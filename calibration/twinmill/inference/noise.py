@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import cholesky_banded
+from scipy.linalg.lapack import dpbtrf
 from scipy.optimize import minimize
 
 from twinmill.inference.evidence import log_evidence
@@ -136,7 +136,10 @@ class Filter:
         band[1, :, :-1] = sensor2 * ((before + last * np.roll(before, 1, axis=1)) * one)[:, 1:]
         band[2, :, :-2] = sensor2 * (last * two)[:, 2:]
         seen = None if course.seen is None else course.seen.ravel()
-        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True), seen)
+        low, failed = dpbtrf(band.reshape(3, -1), lower=1)
+        if failed:
+            raise np.linalg.LinAlgError("a noise of no size has no covariance to divide by")
+        return cls(last.ravel(), np.ascontiguousarray(low), seen)
 
     def white(self, rows: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
         """(..., R) of (..., W, C), each times a weight (C, W)."""

@@ -105,11 +105,12 @@ def table_of(search: Search) -> Table:
         search.progress("comparing hypotheses")
         h = fitted[names]
         changes = _changes(p, h)
+        forms = [p.forms(change) for change in changes]
         within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
         for view in views:
             each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
             squares = np.array([each[index].sum() for index in within])
-            own = _Comparison(p, search.words, h, changes, squares, view)
+            own = _Comparison(p, search.words, h, forms, squares, view)
             of_noise = own.entries(names in whole)
             for entry in of_noise:
                 key = entry.effects, entry.stale, tuple(sorted(entry.words))
@@ -211,7 +212,7 @@ class _Comparison:
     problem: Problem
     words: tuple[str, ...]
     h: Hypothesis
-    changes: np.ndarray  # (E, W, 3) of the prediction by each effect, m and rad
+    forms: list[tuple[np.ndarray, ...]]  # what the formula of each effect may miss
     squares: np.ndarray  # (M,) that each of `subsets` takes
     view: View
 
@@ -305,8 +306,7 @@ class _Comparison:
     def _of_form(self, beside: _Beside) -> list[_Beside]:
         """With what the formula of one effect misses at its likeliest size; none if it is exact."""
         linear, best = self._linear(beside), (0.0, beside)
-        for change in self.changes:
-            forms = self.problem.forms(change)
+        for forms in self.forms:
             for columns in forms:
                 white = self.view.fitter.whiten(columns)
                 gains, _ = gains_by_size(*linear.projected(white, white @ white.T), SIZES)
