@@ -166,8 +166,8 @@ public:
         for (size_t i = 0; i < count_; ++i)
             for (size_t j = 0; j <= i; ++j)
             {
-                const double left = size * size * gram(i, j) + (i == j ? 1 : 0) -
-                                    Product(Row(i), Row(j), j);
+                const double left =
+                    size * size * gram(i, j) + (i == j ? 1 : 0) - Product(Row(i), Row(j), j);
                 if (i == j && !(left > 0))
                     throw std::domain_error("columns have no products like these");
                 low_[i * count_ + j] = i == j ? std::sqrt(left) : left / Row(j)[j];
@@ -236,10 +236,11 @@ void BindProducts(nb::module_ &m)
     m.def("products_beside", &ProductsBeside, "columns"_a, "beside"_a, "weight"_a, "edges"_a,
           "(B, P + 1, T) of columns (R, T) with P columns `beside` (R, P), and at last of their "
           "squares with those of a weight (R,), over the rows between two of `edges` (B + 1,).");
-    m.def("gains_by_size", &GainsBySize, "grams"_a, "push"_a, "sizes"_a,
-          "(2, F, S) gain in log evidence by each of F terms with weights of N(0, size^2), and fall "
-          "of the squares, of (K, K) products of its columns and, one after the other, (K,) those "
-          "with the data.");
+    m.def(
+        "gains_by_size", &GainsBySize, "grams"_a, "push"_a, "sizes"_a,
+        "(2, F, S) gain in log evidence by each of F terms with weights of N(0, size^2), and fall "
+        "of the squares, of (K, K) products of its columns and, one after the other, (K,) those "
+        "with the data.");
     m.def("products_left", &ProductsLeft, "pieces"_a, "places"_a, "weight"_a, "basis"_a, "along"_a,
           "edges"_a,
           "(N, B, k, k) of sets of columns with each other, over the rows between two of `edges` "

@@ -684,8 +684,8 @@ Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
     return ToNumpy(std::move(solved), {matrices, trials, count});
 }
 
-// By row of a channel: the shares of a value, of the one before it, and of the two whitened before it,
-// in a whitened value; and its weight.
+// By row of a channel: the shares of a value, of the one before it, and of the two whitened before
+// it, in a whitened value; and its weight.
 struct Shares
 {
     double own, before, last, one_before_last, weight;
@@ -784,10 +784,11 @@ void BindSeries(nb::module_ &m)
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "turned"_a, "rate"_a, "damping"_a,
           "(2, N) means of s and of ds/dt over each step, from rest, of what swings around each "
           "push, by what it turns over each step; a step of no length leaves both as they are.");
-    m.def("whitened", &Whitened, "rows"_a, "kept"_a, "low"_a, "weight"_a = nb::none(),
-          "(K, C W) columns (K, W, C), channel after channel: each row less the share `kept` (C W,) "
-          "of the one before it, through the lower banded Cholesky factor (3, C W) of the "
-          "covariance of what that leaves, times a weight (C, W).");
+    m.def(
+        "whitened", &Whitened, "rows"_a, "kept"_a, "low"_a, "weight"_a = nb::none(),
+        "(K, C W) columns (K, W, C), channel after channel: each row less the share `kept` (C W,) "
+        "of the one before it, through the lower banded Cholesky factor (3, C W) of the "
+        "covariance of what that leaves, times a weight (C, W).");
     m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
           "direction"_a,
           "(R, F) how far each forward and left velocity leads along a `direction` (R, 2) from "
