@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sums and filters over time of many columns at once, row by row and not value by value.
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
@@ -683,6 +684,68 @@ Array SolvedRisen(Cube grams, Matrix rises, Matrix moments)
     return ToNumpy(std::move(solved), {matrices, trials, count});
 }
 
+// By row of a channel: the shares of a value, of the one before it, and of the two whitened before
+// it, in a whitened value; and its weight.
+struct Shares
+{
+    double own, before, last, one_before_last, weight;
+};
+
+// Whitens channel `rows` of a few columns, so many values apart, each to its own place.
+template <size_t kFew>
+void WhitenFew(std::span<const Shares> shares, const double *rows, size_t channels, size_t apart,
+               double *out, size_t out_apart)
+{
+    double before[kFew] = {}, last[kFew] = {}, one_before_last[kFew] = {};
+    for (const Shares &share : shares)
+    {
+        for (size_t k = 0; k < kFew; ++k)
+        {
+            const double value = rows[k * apart];
+            const double known = share.own * value - share.before * before[k] -
+                                 share.one_before_last * one_before_last[k];
+            before[k] = value;
+            one_before_last[k] = last[k];
+            last[k] = known - share.last * last[k];
+        }
+        for (size_t k = 0; k < kFew; ++k)
+            out[k * out_apart] = share.weight * last[k];
+        rows += channels;
+        ++out;
+    }
+}
+
+// What AR leaves of columns, forward through the banded Cholesky factor of its covariance.
+Array Whitened(Cube rows, Vector kept, Matrix low, const std::optional<Matrix> &weight)
+{
+    constexpr size_t kFew = 8;
+    const size_t columns = rows.shape(0), count = rows.shape(1), channels = rows.shape(2),
+                 width = count * channels;
+    if (kept.size() != width || low.shape(0) != 3 || low.shape(1) != width ||
+        (weight && weight->size() != width))
+        throw std::invalid_argument("filter and weights must be as long as the rows of a column");
+    const double *diagonal = low.data(), *first = diagonal + width, *second = first + width;
+    auto white = std::make_unique_for_overwrite<double[]>(columns * width);
+    std::vector<Shares> shares(count);
+    for (size_t c = 0; c < channels; ++c)
+    {
+        for (size_t n = 0, at = c * count; n < count; ++n, ++at)
+        {
+            const double own = 1 / diagonal[at];
+            shares[n] = {own, n > 0 ? own * kept.data()[at] : 0, n > 0 ? own * first[at - 1] : 0,
+                         n > 1 ? own * second[at - 2] : 0, weight ? weight->data()[at] : 1};
+        }
+        const double *from = rows.data() + c;
+        double *to = white.get() + c * count;
+        size_t k = 0;
+        for (; k + kFew <= columns; k += kFew)
+            WhitenFew<kFew>(shares, from + k * width, channels, width, to + k * width, width);
+        for (; k < columns; ++k)
+            WhitenFew<1>(shares, from + k * width, channels, width, to + k * width, width);
+    }
+    return ToNumpy(std::move(white), {columns, width});
+}
+
 }  // namespace
 
 void BindSeries(nb::module_ &m)
@@ -721,6 +784,11 @@ void BindSeries(nb::module_ &m)
     m.def("swung", &Swung, "pushes"_a, "step_s"_a, "turned"_a, "rate"_a, "damping"_a,
           "(2, N) means of s and of ds/dt over each step, from rest, of what swings around each "
           "push, by what it turns over each step; a step of no length leaves both as they are.");
+    m.def(
+        "whitened", &Whitened, "rows"_a, "kept"_a, "low"_a, "weight"_a = nb::none(),
+        "(K, C W) columns (K, W, C), channel after channel: each row less the share `kept` (C W,) "
+        "of the one before it, through the lower banded Cholesky factor (3, C W) of the "
+        "covariance of what that leaves, times a weight (C, W).");
     m.def("led_between", &LedBetween, "forward"_a, "left"_a, "steps"_a, "starts"_a, "ends"_a,
           "direction"_a,
           "(R, F) how far each forward and left velocity leads along a `direction` (R, 2) from "

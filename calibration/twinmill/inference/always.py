@@ -80,7 +80,7 @@ def _lasts(effects: tuple[str, ...]) -> bool:
 
 
 def _grown(p: PlanarProblem, h: Hypothesis, view: View) -> _Grown:
-    linear = bare = h.linear(view.fitter.whiten)
+    linear = bare = h.linear(view.fitter)
     found: list[tuple[Kernel, float]] = []
     prior, odds = 0.0, np.array([_odds(p, kernel) for kernel in p.kernels])
     while len(found) < MOST:
@@ -113,7 +113,7 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     """(K, R) white columns of kernels at their sizes."""
     size = {k.name: s for k, s in found}
     own = [size[k.name] * view.white(f) for f, k in enumerate(view.kernels) if k.name in size]
-    return np.concatenate([view.stacked[:0], *own])
+    return np.concatenate([view.stacked.columns[:0], *own])
 
 
 def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.ndarray:
@@ -123,7 +123,7 @@ def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -
     for grown in each:
         view = grown.view
         rest = [(k, size) for k, size in grown.kernels if k.depends_on != word]
-        linear = h.linear(view.fitter.whiten).with_columns(_white(view, rest))
+        linear = h.linear(view.fitter).with_columns(_white(view, rest))
         own = evidence(h, view, linear)
         prior = sum(float(np.log(_odds(p, k)[size == SIZES][0])) for k, size in rest)
         none.append(own.alone - view.log_size + prior)
@@ -142,7 +142,7 @@ def _conditioned(
     labels = [*h.labels, *(label for k in there for label in weight_labels(k))]
     lasting = {label for k in there if k.lasting for label in weight_labels(k)}
     view = grown.view
-    linear = h.linear(view.fitter.whiten).with_columns(_white(view, grown.kernels))
+    linear = h.linear(view.fitter).with_columns(_white(view, grown.kernels))
     weights = len(labels) - len(h.labels)
     root = block_diag(np.linalg.cholesky(h.cov), np.eye(weights))
     mean = np.r_[h.mean, np.zeros(weights)] + root @ linear.mean

@@ -7,6 +7,7 @@ table's own second derivative, h^2/8 |v''| (linear interpolation; Stoer and Buli
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import tomlkit
@@ -32,6 +33,7 @@ class Refined:
     std_mps: np.ndarray
 
 
+@lru_cache(maxsize=1)  # a problem asks twice, and its own log's again
 def refined(model_file: ModelFile) -> Refined:
     """The model of a file with the nodes in between; of a robot that is told duties."""
     document = tomlkit.parse(model_file.text)

@@ -2,13 +2,14 @@
 """A hypothesis: a base model with some effects, fitted, and linear about its best numbers."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.special import log_ndtr
 
 from twinmill.inference.candidate import Candidate, size_std
-from twinmill.inference.evidence import Linear
+from twinmill.inference.evidence import Columns, Linear
 from twinmill.inference.noise import Noise
 from twinmill.inference.prior import Prior
 from twinmill.model.parameters import (
@@ -95,12 +96,36 @@ class Hypothesis:
         every = [n for n in effect_names(self.model) if catalogue_name(n) == kind]
         return every[own.index(effect) - len(own)]
 
-    def linear(self, whiten, cov: np.ndarray | None = None) -> Linear:
-        """The linear model about the best numbers; `cov` in the place of the prior's."""
+    def rows(self, fitter: "Fitter") -> np.ndarray:
+        """(M, R) white slopes of named quantities, what the effects' span, and what is to explain.
+
+        The second are orthonormal.
+        """
+        own, away = fitter.whiten(self.slopes[self.named]), self.value - self.mean
+        y = fitter.whiten(self.errors) + away[self.named] @ own + away[~self.named] @ fitter.always
+        span = np.linalg.qr(own[self.of_effects[self.named]].T)[0].T
+        return np.concatenate([own, span, y[None]])
+
+    def linear(
+        self, fitter: "Fitter", cov: np.ndarray | None = None, rows: np.ndarray | None = None
+    ) -> Linear:
+        """The linear model about the best numbers.
+
+        Args:
+            fitter: of the log.
+            cov: in the place of the prior's.
+            rows: as of `rows`, if they are known.
+        """
+        rows = self.rows(fitter) if rows is None else rows
         root = np.linalg.cholesky(self.cov if cov is None else cov)
-        x = whiten(self.slopes)
-        y = whiten(self.errors) + (self.value - self.mean) @ x
-        return Linear.of(y, root.T @ x)
+        roots = np.zeros((len(rows), len(root))), root[~self.named]
+        roots[0][: self.named.sum()] = root[self.named]
+        products, beside = rows @ rows.T, rows @ fitter.always.T
+        across = roots[0].T @ beside @ roots[1]
+        gram = roots[0].T @ products @ roots[0] + roots[1].T @ fitter.gram_always @ roots[1]
+        push = products[-1] @ roots[0] + beside[-1] @ roots[1]
+        columns = Columns((rows, fitter.always), roots)
+        return Linear.of_products(columns, gram + across + across.T, push)
 
     def log_evidence(self, linear: Linear, cov: np.ndarray | None = None) -> float:
         """Log evidence, with what was integrated on grids, and signs that cards demand.
@@ -146,21 +171,42 @@ class Fitter:
         """(..., 3 W) of (..., W, 3)."""
         return self.noise.whiten(rows)
 
+    @cached_property
+    def always(self) -> np.ndarray:
+        """(K, R) white columns of the base's discrepancy."""
+        shape = len(self.discrepancy), len(self.steps), len(self.steps.observed)
+        return self.whiten(self.discrepancy.reshape(shape))
+
+    @cached_property
+    def gram_always(self) -> np.ndarray:
+        """(K, K) their products."""
+        return self.always @ self.always.T
+
     def fit(self, h: Hypothesis, rounds: int = ROUNDS, known: int = 0) -> Hypothesis:
         """Levenberg and Marquardt from its numbers; so many of the first slopes are kept."""
         precision = np.linalg.inv(h.cov)
         value, damping = np.clip(h.value, h.low, h.high), 1e-3
         errors, cost = self._cost(h, value, precision)
-        slopes, white = h.slopes, self.whiten(h.slopes[:known]) if known else None
+        slopes, count = h.slopes, len(value)
+        white, gram = np.zeros((count, self.always.shape[1])), np.zeros((count, count))
+        white[~h.named], gram[np.ix_(~h.named, ~h.named)] = self.always, self.gram_always
+        kept = np.arange(count) < known
+
+        def take(rows: np.ndarray) -> None:
+            white[rows] = self.whiten(slopes[rows])
+            gram[rows] = white[rows] @ white.T
+            gram[:, rows] = gram[rows].T
+
+        if known:
+            take(np.flatnonzero(h.named & kept))
         for _ in range(rounds):
             slopes = self._slopes(replace(h, value=value), slopes, known)
-            fresh = self.whiten(slopes[known:])
-            white = fresh if white is None else np.concatenate([white[:known], fresh])
-            gram = white @ white.T + precision
+            take(np.flatnonzero(h.named & ~kept))
+            curved = gram + precision
             pull = white @ self.whiten(errors) - precision @ (value - h.mean)
             fell = 0.0
             for _ in range(TRIES):
-                step = np.linalg.solve(gram + damping * np.diag(np.diag(gram)), pull)
+                step = np.linalg.solve(curved + damping * np.diag(np.diag(curved)), pull)
                 trial = np.clip(value + step, h.low, h.high)
                 then, cost_then = self._cost(h, trial, precision)
                 if cost_then < cost:
@@ -284,8 +330,9 @@ class Fitter:
         errors = self.steps.errors(h.model, names, points[:, h.named])
         difference = errors[len(fresh) :] - errors[: len(fresh)]
         with np.errstate(over="ignore", invalid="ignore"):
-            out[fresh] = difference / np.where(apart, apart, np.inf)[:, None, None]
-        out[~(np.abs(out).max(axis=(1, 2)) < RUNS_AWAY)] = 0.0
+            found = difference / np.where(apart, apart, np.inf)[:, None, None]
+        found[~(np.abs(found).max(axis=(1, 2)) < RUNS_AWAY)] = 0.0
+        out[fresh] = found
         return out
 
     def _always(self, h: Hypothesis) -> np.ndarray | float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import betaln, expit
 
-from twinmill.inference.evidence import Linear
+from twinmill.inference.evidence import Bank, Linear
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 
@@ -106,25 +106,33 @@ class Found:
         return rate.log_chance(on, self.count) - on * np.log(len(LENGTHS) * WAYS)
 
 
-def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> Found:
+def find(linear: Linear, bank: Bank, gram: np.ndarray, worth: float) -> Found:
     """Greedy search for the moments, one more while it gains more than the chance of one costs.
 
     Args:
         linear: the model beside which they are.
-        white: (B + 1, N, R) whitened columns, as of `columns`, of which the first half are gains.
+        bank: (B + 1, N, R) whitened columns, as of `columns`, of which the first half are gains.
         gram: (N (B + 1), N (B + 1)) their products.
         worth: least gain in log evidence of a further moment.
     """
+    white = bank.columns
     nodes, numbers = white.shape[:2]
     ways = np.repeat([[1.0], [0.0]], numbers // 2, axis=0), np.eye(numbers)
-    gram, push = linear.projected(white.reshape(nodes * numbers, -1), gram)
+    cross, push = linear.taken(bank)
     gram, push = gram.reshape(nodes, numbers, nodes, numbers), push.reshape(nodes, numbers)
-    gains, on = [0.0], []
+    cross = cross.reshape(nodes, numbers, -1)
+    # products of nodes that a moment may lie between, by how far these are apart
+    near = {
+        n: gram[range(nodes - n), :, range(n, nodes)]
+        - cross[: nodes - n] @ cross[n:].swapaxes(1, 2)
+        for n in (0, *(length for length in LENGTHS if length < nodes))
+    }
+    gains, on, done = [0.0], [], []
     for _ in range(MOST):
         each = [
-            (*_best(gram, push, length, way), length, way)
-            for length in LENGTHS
-            if length < nodes
+            (*_best(near, push, length, way), length, way)
+            for length in near
+            if length
             for way in ways
         ]
         gain, begin, length, way = max(each, key=lambda e: e[0])
@@ -133,21 +141,25 @@ def find(linear: Linear, white: np.ndarray, gram: np.ndarray, worth: float) -> F
         end = begin + length
         gains.append(gains[-1] + gain)
         on.append(Moment(begin, end, way.T @ (white[end] - white[begin])))
-        column = (gram[:, :, end] - gram[:, :, begin]) @ way
+        column = gram[:, :, end] - gram[:, :, begin] - cross @ (cross[end] - cross[begin]).T
+        column = (column - sum(s @ (c[end] - c[begin]).T for s, c in done)) @ way
         own = way.T @ (column[end] - column[begin]) + np.eye(way.shape[1])
         spread = column @ np.linalg.inv(own)
         push = push - spread @ (way.T @ (push[end] - push[begin]))
-        gram = gram - np.tensordot(spread, column, (2, 2))
+        for n, products in near.items():
+            products -= spread[: nodes - n] @ column[n:].swapaxes(1, 2)
+        done.append((spread, column))
     return Found(np.array(gains), tuple(on), nodes - 1)
 
 
-def _best(gram: np.ndarray, push: np.ndarray, length: int, way: np.ndarray) -> tuple[float, int]:
+def _best(
+    near: dict[int, np.ndarray], push: np.ndarray, length: int, way: np.ndarray
+) -> tuple[float, int]:
     """Gain in log evidence by the best moment of a length, and its first bin."""
-    a = np.arange(len(push) - length)
-    b = a + length
-    own = gram[b, :, b] - gram[a, :, b] - gram[b, :, a] + gram[a, :, a]
+    across = near[length]
+    own = near[0][length:] - across - across.swapaxes(1, 2) + near[0][:-length]
     own = way.T @ own @ way + np.eye(way.shape[1])
-    pushed = (push[b] - push[a]) @ way
+    pushed = (push[length:] - push[:-length]) @ way
     solved = np.linalg.solve(own, pushed[..., None])[..., 0]
     gains = 0.5 * (pushed * solved).sum(axis=1) - 0.5 * np.linalg.slogdet(own)[1]
     best = int(np.argmax(gains))

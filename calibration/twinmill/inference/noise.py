@@ -11,13 +11,14 @@ stands. What is left of AR has a banded covariance, whose Cholesky factor whiten
 alike (Box, Jenkins and Reinsel 2008, ch. 4).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cholesky_banded
-from scipy.linalg.lapack import dtbtrs
+import twinmill_native as native
+from scipy.linalg.lapack import dpbtrf
 from scipy.optimize import minimize
 
 from twinmill.inference.evidence import log_evidence
@@ -80,11 +81,7 @@ class Noise:
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """(..., C W) white errors or columns of (..., W, C), channel after channel."""
-        *many, count, channels = rows.shape
-        out = self._filter.white(np.moveaxis(rows, -1, -2).reshape(*many, channels * count))
-        if self.weight is not None:
-            out *= self.weight.ravel()
-        return out
+        return self._filter.white(rows, self.weight)
 
     def log_sizes(self, observed: np.ndarray) -> np.ndarray:
         """(C W,) log standard deviations of what is whitened: what the likelihood is divided by."""
@@ -139,16 +136,16 @@ class Filter:
         band[1, :, :-1] = sensor2 * ((before + last * np.roll(before, 1, axis=1)) * one)[:, 1:]
         band[2, :, :-2] = sensor2 * (last * two)[:, 2:]
         seen = None if course.seen is None else course.seen.ravel()
-        return cls(last.ravel(), cholesky_banded(band.reshape(3, -1), lower=True), seen)
+        low, failed = dpbtrf(band.reshape(3, -1), lower=1)
+        if failed:
+            raise np.linalg.LinAlgError("a noise of no size has no covariance to divide by")
+        return cls(last.ravel(), np.ascontiguousarray(low), seen)
 
-    def white(self, rows: np.ndarray) -> np.ndarray:
-        """(..., R) of (..., R)."""
-        left = rows.copy()
-        left[..., 1:] -= self.kept[1:] * rows[..., :-1]
-        if left.size:  # LAPACK's wrapper cannot be given none
-            flat = left.reshape(-1, left.shape[-1])
-            left = dtbtrs(self.low, flat.T, uplo="L", overwrite_b=True)[0].T.reshape(rows.shape)
-        return left
+    def white(self, rows: np.ndarray, weight: np.ndarray | None = None) -> np.ndarray:
+        """(..., R) of (..., W, C), each times a weight (C, W)."""
+        many, column = rows.shape[:-2], rows.shape[-2:]
+        flat = np.ascontiguousarray(rows).reshape(math.prod(many), *column)
+        return native.whitened(flat, self.kept, self.low, weight).reshape(*many, len(self.kept))
 
     @property
     def log_sizes(self) -> np.ndarray:
@@ -196,7 +193,7 @@ def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise) -> Noise:
 
 def _seen(columns: np.ndarray, whitening: Filter) -> np.ndarray:
     """(K', W) directions of (K, W) columns of which a channel tells more than their prior does."""
-    white = whitening.white(columns)
+    white = whitening.white(columns[..., None])
     values, ways = np.linalg.eigh(white @ white.T)
     return ways[:, values > SEEN].T @ columns
 
@@ -206,7 +203,7 @@ def _fit_channel(both: np.ndarray, start: np.ndarray, course: Course) -> np.ndar
 
     def cost(logs: np.ndarray) -> float:
         whitening = Filter.of(logs[:, None], course)
-        white = whitening.white(both)
+        white = whitening.white(both[..., None])
         found = log_evidence(white[0], white[1:]) - whitening.log_sizes.sum()
         return -found + 0.5 * float(np.sum((logs - start) ** 2))
 

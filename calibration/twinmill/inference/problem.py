@@ -15,7 +15,7 @@ import numpy as np
 
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import Kernel
-from twinmill.inference.evidence import Linear
+from twinmill.inference.evidence import Bank, Linear
 from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Noise, fit_noise, weights_of
@@ -74,10 +74,10 @@ class View:
 
     fitter: Fitter
     kernels: list[Kernel]
-    stacked: np.ndarray
+    stacked: Bank
     parts: list[slice]
     grams: list[np.ndarray]
-    moments: tuple[np.ndarray, np.ndarray]
+    moments: tuple[Bank, np.ndarray]
     log_sizes: np.ndarray
     block: np.ndarray
 
@@ -88,7 +88,7 @@ class View:
 
     def white(self, f: int) -> np.ndarray:
         """(K, R) white columns of a kernel."""
-        return self.stacked[self.parts[f]]
+        return self.stacked.columns[self.parts[f]]
 
 
 @dataclass(frozen=True)
@@ -160,10 +160,10 @@ class Problem(ABC):
         return View(
             fitter,
             self.kernels,
-            stacked,
+            Bank(stacked),
             parts,
             [stacked[part] @ stacked[part].T for part in parts],
-            (at_moments, flat @ flat.T),
+            (Bank(at_moments), flat @ flat.T),
             noise.log_sizes(self.steps.observed)
             - noise.log_odds(self.usual) / (channels * len(self.steps)),
             np.tile(self.steps.block, channels),

@@ -19,6 +19,7 @@ CELL = 4  # reaches by which a place or a while is moved make a step of the grid
 REACH_S, REACH = 0.5, 0.25  # ... they are of a moment, and of a place and its radius, over this
 NEARER, NEAREST = 0.5, 0.2  # factor on the reach where no move is better, and the last
 MOVES = 8  # at most
+PLACES = 9  # decimals in which two points of a place or a while are the same
 Whiten = Callable[[np.ndarray], np.ndarray]
 
 
@@ -94,15 +95,29 @@ def nearby(
     low, high = (np.array([getattr(c.parameters[k], end) for k in where]) for end in ("min", "max"))
     ways = np.array(list(product((0, -1, 1), repeat=len(where))), float)  # the first stays
 
+    usual = np.array([p.usual for p in c.parameters])
+    nothing = steps.errors(model, names, usual[None])
+    seen: dict[tuple[float, ...], tuple[float, np.ndarray]] = {}  # most moves meet known points
+
     def gains_at(tries: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        points = np.tile([p.usual for p in c.parameters], (len(tries), 1 + len(c.sizes), 1))
-        points[:, :, where] = tries[:, None]
-        for n, k in enumerate(c.sizes):
-            points[:, 1 + n, k] = c.parameters[k].value
-        errors = steps.errors(model, names, points.reshape(-1, len(names)))
-        errors = errors.reshape(*points.shape[:2], *errors.shape[1:])
-        white = PRIORS.size * whiten(errors[:, :1] - errors[:, 1:])
-        return _gains(*_products(white, linear), c.one_sided)
+        rounded = [tuple(point) for point in tries.round(PLACES)]
+        fresh = {key: at for key, at in zip(rounded, tries, strict=True) if key not in seen}
+        if fresh:
+            points = np.tile(usual, (len(fresh), len(c.sizes), 1))
+            points[:, :, where] = np.array(list(fresh.values()))[:, None]
+            for n, k in enumerate(c.sizes):
+                points[:, n, k] = c.parameters[k].value
+            errors = steps.errors(model, names, points.reshape(-1, len(names)))
+            white = PRIORS.size * whiten(nothing - errors).reshape(*points.shape[:2], -1)
+            seen.update(
+                zip(
+                    fresh,
+                    zip(*_gains(*_products(white, linear), c.one_sided), strict=True),
+                    strict=True,
+                )
+            )
+        gains, weights = zip(*map(seen.__getitem__, rounded), strict=True)
+        return np.array(gains), np.array(weights)
 
     found = []
     for at in starts[:, where]:
@@ -125,9 +140,10 @@ def nearby(
 
 def _products(white: np.ndarray, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
     """(G, k, k) Gram matrices of (G, k, R) white columns, and (G, k) products with what is left."""
-    cross = white @ linear.basis.T
+    cross, push = linear.taken(white.reshape(-1, white.shape[-1]))
+    cross = cross.reshape(*white.shape[:2], -1)
     gram = white @ white.swapaxes(1, 2) - cross @ cross.swapaxes(1, 2)
-    return gram, white @ (linear.y - linear.half @ linear.basis)
+    return gram, push.reshape(white.shape[:2])
 
 
 def _products_of_whiles(
@@ -190,7 +206,7 @@ def _start(c: Candidate, weights: np.ndarray, at: np.ndarray, where: list[int]) 
 def _fixed(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
     """An effect of limits, which has no size."""
     white = whiten(c.fixed)
-    cross, left = white @ linear.basis.T, linear.y - linear.half @ linear.basis
-    gains = white @ left - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
+    cross, push = linear.taken(white)
+    gains = push - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
     best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
     return Screened(total, c.at[[best]], total - float(gains[best]), white[[best]])

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import CHANCE, SIZES
-from twinmill.inference.evidence import Linear, gains_by_size
+from twinmill.inference.evidence import Columns, Linear
 from twinmill.inference.hypothesis import Hypothesis, next_of_kind
 from twinmill.inference.moments import MOMENTS
 from twinmill.inference.problem import Problem, View
@@ -44,8 +45,11 @@ class Evidence:
         linear: the linear model.
         alone: log evidence with no dependence.
         gains, falls: (F, S) gain in log evidence, and fall of the squares, by each kernel and size.
-        taken: (Q, R) orthonormal rows that span what the effects change: a dependence is the part
+        span: (Q, R) orthonormal rows that span what the effects change: a dependence is the part
             that they do not take.
+        inside: (K, Q) products of all kernels' white columns with these.
+        cross, push, grams: (K, P) what the numbers take of that part, and once they have, its
+            products with the data (K,) and, kernel by kernel, with itself.
     """
 
     hypothesis: Hypothesis
@@ -53,12 +57,23 @@ class Evidence:
     alone: float
     gains: np.ndarray
     falls: np.ndarray
-    taken: np.ndarray
+    span: np.ndarray
+    inside: np.ndarray
+    cross: np.ndarray
+    push: np.ndarray
+    grams: list[np.ndarray]
 
     def white(self, view: View, f: int) -> np.ndarray:
         """(K, R) white columns of a kernel, without what the effects take."""
-        columns = view.white(f)
-        return columns - (columns @ self.taken.T) @ self.taken
+        return view.white(f) - self.inside[view.parts[f]] @ self.span
+
+    def with_kernel(self, view: View, f: int, size: float) -> Linear:
+        """The linear model with a kernel of a size more."""
+        at = view.parts[f]
+        columns = view.white(f), self.span
+        more = Columns(columns, (size * np.eye(len(columns[0])), -size * self.inside[at].T))
+        gram, push = size**2 * self.grams[f], size * self.push[at]
+        return self.linear.with_projected(more, size * self.cross[at], gram, push)
 
 
 class Search:
@@ -172,7 +187,7 @@ class Search:
     def _screened(self, h: Hypothesis, names: Collection[str] | None = None) -> _Screen:
         """A hypothesis with the base as known, linear there, and some effects or all beside it."""
         told = self.problem.told(h)
-        columns, linear = self.problem.columns(told, names), told.linear(self.view.fitter.whiten)
+        columns, linear = self.problem.columns(told, names), told.linear(self.view.fitter)
         return (told, linear), columns, screened(linear, columns, self.view.fitter.whiten)
 
     def _fitted(
@@ -196,10 +211,10 @@ class Search:
         if c.masks is not None or c.fixed is not None:
             return found
         value = np.array([p.value for p in c.parameters])
-        best = found.log_evidence(found.linear(fitter.whiten))
+        best = found.log_evidence(found.linear(fitter))
         for other in [start, value] if len(value) > 1 else [self._best_size(*told, c)]:
             again = fitter.with_effect(told[0], c, other, grid)
-            then = again.log_evidence(again.linear(fitter.whiten))
+            then = again.log_evidence(again.linear(fitter))
             if then > best:
                 found, best = again, then
         return found
@@ -216,11 +231,11 @@ class Search:
         sizes = np.clip(p.usual + np.array([0, *TRIED]) * (p.value - p.usual), p.min, p.max)
         errors = self.problem.steps.errors(model, [name], sizes[:, None])
         left = linear.y + self.view.fitter.whiten(errors[1:] - errors[0])
-        squares = (left**2).sum(axis=1) - ((left @ linear.basis.T) ** 2).sum(axis=1)
+        squares = (left**2).sum(axis=1) - (linear.taken(left)[0] ** 2).sum(axis=1)
         return sizes[1:][[np.argmin(squares)]]
 
     def _keep(self, h: Hypothesis) -> None:
-        self.fitted[h.effects] = evidence(h, self.view, h.linear(self.view.fitter.whiten))
+        self.fitted[h.effects] = evidence(h, self.view, h.linear(self.view.fitter))
 
     def _log_posterior(self, names: tuple[str, ...]) -> float:
         """Of a set at its best: alone or with the likeliest dependence, up to a constant."""
@@ -249,33 +264,16 @@ def evidence(h: Hypothesis, view: View, linear: Linear, cov: np.ndarray | None =
     Args:
         h: the hypothesis.
         view: under a noise.
-        linear: its linear model, with all that is there as well.
+        linear: of `h.linear`, with all that is there as well.
         cov: prior covariance in the place of its own.
     """
-    taken = _taken(h, view)
-    # one product: the columns are long, and reading them takes the time
-    rows = np.concatenate([linear.basis, taken, linear.y[None]])
-    products = view.stacked @ rows.T
-    cross, inside, push = np.split(products, [len(linear.basis), len(rows) - 1], axis=1)
-    cross = cross - inside @ (taken @ linear.basis.T)
-    push = push[:, 0] - inside @ (taken @ linear.y) - cross @ linear.half
-    each = []
-    for part, gram in zip(view.parts, view.grams, strict=True):
-        own = np.concatenate([cross[part], inside[part]], axis=1)
-        each.append(gains_by_size(gram - own @ own.T, push[part], SIZES))
-    return Evidence(
-        h,
-        linear,
-        h.log_evidence(linear, cov),
-        np.array([g for g, _ in each]),
-        np.array([f for _, f in each]),
-        taken,
-    )
-
-
-def _taken(h: Hypothesis, view: View) -> np.ndarray:
-    """(Q, R) orthonormal rows that span the white columns of the effects' numbers."""
-    own = (
-        view.fitter.whiten(h.slopes[h.of_effects]) if h.effects else np.zeros((0, len(view.block)))
-    )
-    return np.linalg.qr(own.T)[0].T
+    rows, named = linear.parts[0].rows[0], int(h.named.sum())
+    span, inside = rows[named:-1], view.stacked.dot(rows)[:, named:-1]
+    cross, push = linear.taken(view.stacked)
+    of_span, push_of_span = linear.taken(span)
+    cross, push = cross - inside @ of_span, push - inside @ push_of_span
+    own = np.concatenate([cross, inside], axis=1)
+    grams = [gram - own[at] @ own[at].T for at, gram in zip(view.parts, view.grams, strict=True)]
+    gains, falls = native.gains_by_size(grams, push, SIZES)
+    alone = h.log_evidence(linear, cov)
+    return Evidence(h, linear, alone, gains, falls, span, inside, cross, push, grams)

@@ -7,7 +7,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from scipy.special import logsumexp
 
 from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP
@@ -137,11 +136,12 @@ def table_of(search: Search) -> Table:
         search.progress("comparing hypotheses")
         h = fitted[names]
         changes = _changes(p, h)
+        forms = [p.forms(change) for change in changes]
         within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
         for view in views:
             each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
             squares = np.array([each[index].sum() for index in within])
-            own = _Comparison(p, search.words, h, changes, squares, view)
+            own = _Comparison(p, search.words, h, forms, squares, view)
             of_noise = own.entries(names in whole)
             for entry in of_noise:
                 key = entry.effects, entry.stale, tuple(sorted(entry.words))
@@ -155,7 +155,7 @@ def table_of(search: Search) -> Table:
     return Table(
         [replace(entry, fall=falls[key]) for key, entry in entries.items()],
         {names: own.numbers() for names, (_, own) in best.items()},
-        max(fitted[()].linear(views[0].fitter.whiten).left - rows, 1e-9),
+        max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
         tuple(p.names),
         search.words,
         {names: own.always() for names, (_, own) in best.items()},
@@ -244,17 +244,17 @@ class _Comparison:
     problem: Problem
     words: tuple[str, ...]
     h: Hypothesis
-    changes: np.ndarray  # (E, W, 3) of the prediction by each effect, m and rad
+    forms: list[tuple[np.ndarray, ...]]  # what the formula of each effect may miss
     squares: np.ndarray  # (M,) that each of `subsets` takes
     view: View
 
     def entries(self, whole: bool) -> list[Entry]:
         """Alone and with each dependence; if `whole`, also of a stale base, and with two."""
-        usual, news = self._moments(None)
-        own = self._evidence(usual)
+        (usual, own), *others = self._plain
+        news = self._usual_and_news[1]
         out = [self._alone(usual), *self._with_words(usual, own), self._alone(news)]
-        for other in self._others(usual):
-            out += [self._alone(other), *self._with_words(other, self._evidence(other))]
+        for other, of_other in others:
+            out += [self._alone(other), *self._with_words(other, of_other)]
         if whole:
             stale, _ = self._moments(self._stale_cov)
             of_stale = self._evidence(stale)
@@ -270,20 +270,18 @@ class _Comparison:
         As wide as the posterior, and as blocks of time drawn again and again let them scatter,
         which is wider where the form is wrong (Lyddon, Holmes and Walker 2019, Biometrika 106).
         """
-        usual, news = self._moments(None)
-        plain = (usual, *self._others(usual))
-        likely = [self._likeliest(b, self._evidence(b)) for b in plain]
-        every = [(b, self._linear(b)) for b in (*plain, news, *likely)]
+        likely = [self._likeliest(b, own) for b, own in self._plain]
+        plain = [(b, own.linear) for b, own in self._plain]
+        every = plain + [(b, self._linear(b)) for b in (self._usual_and_news[1], *likely)]
         linear = max(every, key=lambda b: b[1].log_evidence + b[0].log_chance)[1]
         mean, spread = self.h.posterior(linear)
-        root, count = np.linalg.cholesky(self.h.cov), len(self.h.mean)
-        parts = [linear.x[:, self.view.block == b] for b in range(self.view.block.max() + 1)]
+        root, count, x = np.linalg.cholesky(self.h.cov), len(self.h.mean), linear.x
+        parts = [x[:, self.view.block == b] for b in range(self.view.block.max() + 1)]
         grams = np.array([part @ part.T for part in parts])
         pushes = np.array([part @ linear.y[self.view.block == b] for b, part in enumerate(parts)])
         draws = np.random.default_rng(0).dirichlet(np.ones(len(parts)), DRAWS) * len(parts)
         drawn = [
-            root
-            @ np.linalg.solve(np.tensordot(w, grams, 1) + np.eye(len(linear.x)), w @ pushes)[:count]
+            root @ np.linalg.solve(np.tensordot(w, grams, 1) + np.eye(len(x)), w @ pushes)[:count]
             for w in draws
         ]
         wider = np.sqrt(np.maximum(np.var(drawn, axis=0) / np.diag(spread), 1.0))
@@ -321,6 +319,16 @@ class _Comparison:
                 found.append((names, then - self.h.log_evidence(self._known)))
         return found
 
+    @cached_property
+    def _usual_and_news(self) -> tuple[_Beside, _Beside]:
+        return self._moments(None)
+
+    @cached_property
+    def _plain(self) -> list[tuple[_Beside, Evidence]]:
+        """Usual moments and each of what may be in their place, with its evidence."""
+        usual = self._usual_and_news[0]
+        return [(beside, self._evidence(beside)) for beside in (usual, *self._others(usual))]
+
     def _moments(self, cov: np.ndarray | None) -> tuple[_Beside, _Beside]:
         """Moments as often as the base's own log had them, and as news."""
         bare = self._bare(cov)
@@ -345,7 +353,7 @@ class _Comparison:
         return [*none, *self._of_form(none[0] if none else usual)]
 
     def _without_moments(self, usual: _Beside) -> _Beside:
-        rate, count = self.problem.rate, self.view.moments[0].shape[0] - 1
+        rate, count = self.problem.rate, len(self.view.moments[0].columns) - 1
         chance = float(rate.log_chance(np.array(0), count)) if rate else 0.0
         nothing = np.zeros(())
         return replace(
@@ -360,8 +368,7 @@ class _Comparison:
     def _of_form(self, beside: _Beside) -> list[_Beside]:
         """With what the formula of one effect misses at its likeliest size; none if it is exact."""
         linear, best = self._linear(beside), (0.0, beside)
-        for change in self.changes:
-            forms = self.problem.forms(change)
+        for forms in self.forms:
             for columns in forms:
                 white = self.view.fitter.whiten(columns)
                 gains, _ = gains_by_size(*linear.projected(white, white @ white.T), SIZES)
@@ -412,11 +419,12 @@ class _Comparison:
 
     @cached_property
     def _known(self) -> Linear:
-        return self.h.linear(self.view.fitter.whiten)
+        return self.h.linear(self.view.fitter)
 
     @cached_property
     def _stale(self) -> Linear:
-        return self.h.linear(self.view.fitter.whiten, self._stale_cov)
+        known = self._known.parts[0].rows[0]
+        return self.h.linear(self.view.fitter, self._stale_cov, known)
 
     @cached_property
     def _stale_cov(self) -> np.ndarray:
@@ -460,14 +468,14 @@ class _Comparison:
         at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
         gains = own.gains[at] - np.log(len(at))
         likely = gains + np.log(np.maximum(chance, 1e-300))
-        total = float(logsumexp(likely))
+        total = float(np.logaddexp.reduce(likely, axis=None))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
         if words and not beside.words:
             relative = self._log_relative(own.falls[at])
             each = (gains + relative).reshape(len(relative), gains.size)
             mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
-        linear = own.linear.with_columns(SIZES[s] * own.white(self.view, at[f]))
+        linear = own.with_kernel(self.view, at[f], SIZES[s])
         return self._entry(
             beside,
             linear,

@@ -111,11 +111,11 @@ def test_a_patch_whose_centre_was_never_driven_to_is_found(
             return left
 
     p = problem_of([measure(Patched(), 13)], one_clock_base, always_of([own], one_clock_base))
-    told, whiten = p.told(p.base), p.view(p.noise).fitter.whiten
-    linear, columns = told.linear(whiten), p.columns(told, ("floor_patch",))
-    starts = screened(linear, columns, whiten)["floor_patch"].starts
+    told, fitter = p.told(p.base), p.view(p.noise).fitter
+    linear, columns = told.linear(fitter), p.columns(told, ("floor_patch",))
+    starts = screened(linear, columns, fitter.whiten)["floor_patch"].starts
     c = columns["floor_patch"]
-    found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=whiten)
+    found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=fitter.whiten)
     assert log_share < -3  # a place is known to centimetres, a cell of the grid has decimetres
     away_m = np.hypot(*(p.steps.place - centre_m).T)
     assert away_m.min() > 0.3
@@ -134,14 +134,13 @@ def test_the_share_of_a_cell_is_that_of_the_evidence_over_it(
             return motion * (1 - 0.1 * (np.arange(len(motion)) * STEP_S > 20.3))[:, None]
 
     p = problem_of([measure(Slower(), 13)], one_clock_base, always_of([own], one_clock_base))
-    fitter = p.view(p.noise).fitter
-    told, whiten = p.told(p.base), fitter.whiten
-    linear, c = told.linear(whiten), p.columns(told, ("abrupt_loss",))["abrupt_loss"]
-    starts = screened(linear, {c.name: c}, whiten)[c.name].starts
-    found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=whiten)
+    told, fitter = p.told(p.base), p.view(p.noise).fitter
+    linear, c = told.linear(fitter), p.columns(told, ("abrupt_loss",))["abrupt_loss"]
+    starts = screened(linear, {c.name: c}, fitter.whiten)[c.name].starts
+    found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=fitter.whiten)
     at_s = found[2] + np.linspace(-1, 1, 61)
     each = [fitter.with_effect(told, c, np.r_[found[:2], t_s], 0.0) for t_s in at_s]
-    logs = np.array([h.log_evidence(h.linear(whiten)) for h in each])
+    logs = np.array([h.log_evidence(h.linear(fitter)) for h in each])
     averaged = logsumexp(logs) - np.log(len(logs)) - logs.max()
     assert log_share == pytest.approx(averaged, abs=0.7)
 

@@ -23,7 +23,7 @@ from twinmill.inference.discrepancy import (
     in_another_log,
     kernels,
 )
-from twinmill.inference.evidence import Linear, gains_by_size
+from twinmill.inference.evidence import Bank, Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise
@@ -100,6 +100,7 @@ def test_evidence_is_that_of_the_marginal_normal_distribution():
     both = np.concatenate([x, f])
     normal = both @ both.T + np.eye(8)
     assert more.mean == pytest.approx(np.linalg.solve(normal, both @ y))
+    assert more.residuals == pytest.approx(y - np.linalg.solve(normal, both @ y) @ both)
     assert more.covariance == pytest.approx(np.linalg.inv(normal))
 
 
@@ -132,11 +133,11 @@ def test_two_moments_of_a_shift_are_found_and_no_third():
     y[20:25] += 8.0
     y[100:110] -= 8.0
     flat = white.reshape(31 * 4, -1)
-    found = moments.find(Linear.of(y, np.zeros((1, 150))), white, flat @ flat.T, 1.5)
+    found = moments.find(Linear.of(y, np.zeros((1, 150))), Bank(white), flat @ flat.T, 1.5)
     on = found.on[: found.likeliest(Rate())]
     assert {(m.begin, m.end) for m in on} == {(4, 5), (20, 22)}
     assert found.after(0.05).there > 0.95
-    quiet = moments.find(Linear.of(random.normal(size=150), np.zeros((1, 150))), white,
+    quiet = moments.find(Linear.of(random.normal(size=150), np.zeros((1, 150))), Bank(white),
                          flat @ flat.T, 1.5)  # fmt: skip
     assert quiet.after(0.05).there < 0.05
 
@@ -148,7 +149,7 @@ def test_the_gain_of_moments_is_that_of_their_columns():
     flat = white.reshape(31 * 4, -1)
     y = random.normal(size=150) + 3 * (white[8, 1] - white[6, 1]) + white[20, 3] - white[19, 3]
     linear = Linear.of(y, random.normal(size=(2, 150)))
-    found = moments.find(linear, white, flat @ flat.T, 1.5)
+    found = moments.find(linear, Bank(white), flat @ flat.T, 1.5)
     assert len(found.on) >= 2
     together = linear.with_columns(np.concatenate([m.white for m in found.on]))
     gain = together.log_evidence - linear.log_evidence
