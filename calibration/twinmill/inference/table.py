@@ -301,21 +301,21 @@ class _Comparison:
         far as a data sheet lets it go; weights become zero (projection of a posterior; Goutis and
         Robert 1998, Biometrika 85).
         """
-        h, whiten = self.h, self.view.fitter.whiten
+        h, fitter = self.h, self.view.fitter
         named, out = h.named, np.diag(h.named.astype(float))
         if not named.all():
-            x, beside = whiten(h.slopes[named]), whiten(h.slopes[~named])
+            x, beside = fitter.whiten(h.slopes[named]), fitter.always
             known = np.linalg.inv(self._stale_cov[np.ix_(named, named)])
             out[np.ix_(named, ~named)] = np.linalg.solve(x @ x.T + known, x @ beside.T)
         return out
 
     def always(self) -> list[tuple[tuple[str, ...], float]]:
         """Of each of `subsets` how much likelier it always was there than that it is new, log."""
-        found, whiten = [], self.view.fitter.whiten
+        found, fitter = [], self.view.fitter
         for names in subsets(self.h.effects):
             if there := self.problem.always_there(self.h, names):
                 told, log_factor = there
-                then = told.log_evidence(told.linear(whiten)) + log_factor
+                then = told.log_evidence(told.linear(fitter)) + log_factor
                 found.append((names, then - self.h.log_evidence(self._known)))
         return found
 
