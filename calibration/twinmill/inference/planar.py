@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
+from scipy.linalg import block_diag
 
 from twinmill.data.measurement import Measurement
 from twinmill.inference import candidates, discrepancy, moments
@@ -15,9 +16,18 @@ from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.noise import Course, Noise, first_noise
 from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
+from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import CLOCK, LAG, beginning_at_a_moment, catalogue, is_local
+from twinmill.model.parameters import (
+    CLOCK,
+    LAG,
+    beginning_at_a_moment,
+    catalogue,
+    effect_names,
+    is_local,
+    newest_instance,
+)
 
 CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between two commands
 FINE_GRID_S = np.arange(-0.05, 0.0501, 0.002)  # about that, where logs are set side by side
@@ -134,7 +144,7 @@ def problem_of(
     motion = _motion(steps, bare, always)  # as in its own log: weights belong to these columns
     found = discrepancy.kernels(motion)
     if always is not None:
-        prior = with_always(prior, always, found)
+        prior = _with_forms(with_always(prior, always, found), steps, model, motion, always.effects)
     noise = _begin_noise(steps, motion, model_file, always)
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
@@ -146,6 +156,31 @@ def problem_of(
     noise = flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
     return replace(rough, noise=noise, base=base)
+
+
+def _with_forms(
+    prior: Prior, steps: Steps, model: native.Model, motion: Motion, effects: Sequence[str]
+) -> Prior:
+    """With what the formulas of effects that the base always lacked may miss.
+
+    Each is off in one of its forms by a size that is exponentially distributed; of the mixture the
+    normal distribution has the variance.
+    """
+    whole = steps.predicted(model)
+    columns = [prior.columns.reshape(-1, *whole.shape)]
+    for name in effects:
+        less = model.copy()
+        less.remove_effect(effect_names(less).index(newest_instance(less, name)))
+        forms = discrepancy.forms_of(whole - steps.predicted(less), motion)
+        columns += [np.sqrt(2 / len(forms)) * PRIORS.form * f for f in forms]
+    stacked = np.concatenate(columns)
+    more = len(stacked) - len(prior.columns)
+    return replace(
+        prior,
+        mean=np.r_[prior.mean, np.zeros(more)],
+        cov=block_diag(prior.cov, np.eye(more)),
+        columns=stacked,
+    )
 
 
 def _set_to(model: native.Model, prior: Prior, always: Always) -> None:
