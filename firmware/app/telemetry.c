@@ -243,8 +243,7 @@ void telemetry_publish(struct telemetry *telemetry, const struct link_report *re
     {
         const bool is_change = report->session_us < telemetry->change_end_us;
         publish_run(telemetry, report);
-        telemetry->next_run_us =
-            report->utime_us + (is_change ? CHANGE_PERIOD_US : RUN_PERIOD_US);
+        telemetry->next_run_us = report->utime_us + (is_change ? CHANGE_PERIOD_US : RUN_PERIOD_US);
     }
     publish_step(telemetry, report);
     if (report->session_us >= telemetry->next_link_us)

@@ -47,7 +47,7 @@ class Verdict:
     ends_well: bool = False
 
     def __post_init__(self) -> None:
-        """What a sentence quotes, as the name of a file or host, may be no text."""
+        """Names of files and hosts, which a sentence quotes, may be no text."""
         object.__setattr__(self, "sentence", printable(self.sentence))
 
     @property

@@ -62,7 +62,7 @@ private:
         Random random;
         RobotState last;
         std::string telemetry, drive, pose, run, truth;  // channels
-        bool run_due = false;  // before the others
+        bool run_due = false;                            // before the others
     };
     void PublishRun(int id, int64_t utime_us);
     void PublishTelemetry(int id, const Swarm &swarm);
