@@ -94,7 +94,7 @@ def plant_of(logs: Logs, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
     log = joined([one.ordered(mjcf.joints, mjcf.actuators) for one in each])
     check_units(log, mjcf)
     series = series_of(log)
-    return Plant(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
+    return Plant.of(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
 
 
 def _of_speeds(log: JointLog, series: Series, mjcf: Mjcf) -> list[str]:

@@ -14,11 +14,11 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco import rollout
-from scipy.signal import lfilter
 
 from twinmill.inference.settings import PRIORS
 from twinmill.joints.mjcf import Mjcf
-from twinmill.joints.series import Series
+from twinmill.joints.series import Series, lagged
+from twinmill.joints.states import Run, with_run
 from twinmill.model.parameters import effect_names, instance_of, key_of
 
 CLOCK = "clock.offset_s"  # by which positions are stamped later than commands
@@ -64,7 +64,7 @@ class Action:
         for a, lag_s in enumerate(self.lag_s):
             if lag_s > 0:
                 for run in self.series.runs:
-                    ctrl[run, a] = _lagged(ctrl[run, a], lag_s, self.series.width_s[0])
+                    ctrl[run, a] = lagged(ctrl[run, a], lag_s, self.series.width_s[0])
         for a, shape in self.shapes:
             ctrl[:, a] = shape(ctrl[:, a])
         return ctrl
@@ -148,24 +148,32 @@ class Plant:
 
     Attributes:
         mjcf: the model.
-        series: of the log.
+        series: of the log, its states those by the run.
+        run: of the model by the log's commands.
     """
 
     mjcf: Mjcf
     series: Series
+    run: Run
+
+    @classmethod
+    def of(cls, mjcf: Mjcf, series: Series) -> "Plant":
+        """Runs the model by the commands of a log."""
+        return cls(mjcf, *with_run(series, mjcf))
 
     def begin(self, usual: Usual | None = None) -> Action:
         """The base as it stands."""
+        s = self.series
         return Action(
-            self.series,
+            s,
             usual,
             copy(self.mjcf.model),
-            self.series.q.copy(),
-            self.series.v.copy(),
+            s.q.copy(),
+            s.v.copy(),
             self.mjcf.delay_s.copy(),
             self.mjcf.lag_s.copy(),
             [],
-            np.zeros_like(self.series.q),
+            np.zeros_like(s.q),
         )
 
     def accelerations(self, action: Action) -> np.ndarray:
@@ -179,6 +187,20 @@ class Plant:
         after, _ = rollout.rollout(action.model, data, state, given, control_spec=INPUT, nstep=1)
         gained = after[:, 0, 1 + count : 1 + 2 * count] - action.v
         return gained / float(action.model.opt.timestep)
+
+    @cached_property
+    def errors(self) -> np.ndarray:
+        """(W, J) momentum that is measured, less that of the base.
+
+        What the base does between its states is known of the run alone: the rest is how its forces
+        differ where the robot is elsewhere.
+        """
+        run, seen = self.begin(), self.begin()
+        run.q, run.v, run.force = self.run.q, self.run.v, self.run.pull
+        seen.q, seen.v = self.series.seen_q, self.series.seen_v
+        elsewhere = self.accelerations(seen) - self.accelerations(run)
+        between = self.series.weights @ elsewhere + self.run.changes
+        return np.einsum("wij,wj->wi", self.inertia, self.series.changes - between)
 
     def momenta(self, accelerations: np.ndarray) -> np.ndarray:
         """(W, J) momentum of each joint that is measured, less that of these accelerations."""
@@ -307,13 +329,16 @@ class Steps:
                     found = found + value * self._column(model, f"{kind}.{key_of(n)}")
             else:
                 exact.append((kind, tuple((key_of(n), v) for n, v in own.items())))
-        found = found + self._exactly(model.catalogue, tuple(exact))
+        found = found + self.plant.errors * self.plant.usual.slides
+        if exact:
+            found = found + self._exactly(model.catalogue, tuple(exact))
+            found = found - self._exactly(model.catalogue, ())
         if forces.force.any():
             found = found - self.plant.momentum_of(forces.force)
         return np.asarray(found)
 
     def _exactly(self, catalogue: Mapping[str, Any], effects: tuple[Any, ...]) -> np.ndarray:
-        """(W, J) errors of the base with some effects."""
+        """(W, J) errors of the base with some effects, but for how states of the base were seen."""
         if effects not in self._known:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
@@ -350,11 +375,3 @@ def _turns(v: np.ndarray) -> np.ndarray:
     change = np.diff(np.sign(v), axis=0) != 0
     none = np.zeros((1, v.shape[1]), bool)
     return np.asarray(np.concatenate([change, none]) | np.concatenate([none, change]))
-
-
-def _lagged(u: np.ndarray, lag_s: float, step_s: float) -> np.ndarray:
-    """Mean of a first-order lag's output over each of equal times, its input constant in each."""
-    kept = np.exp(-step_s / lag_s)
-    end, _ = lfilter([1 - kept], [1, -kept], u, zi=[kept * u[0]])
-    before = np.r_[u[0], end[:-1]]
-    return np.asarray(u + (before - u) * (lag_s / step_s) * (1 - kept))
