@@ -5,9 +5,9 @@ A candidate changes MuJoCo's own numbers, a command, a measured state, or adds a
 changes of momentum, so that a friction of one joint shows in its channel alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -70,6 +70,9 @@ class Action:
         return ctrl
 
 
+Act = Callable[[Action], None]
+
+
 @dataclass(frozen=True)
 class Usual:
     """Motion and forces of the base in a log.
@@ -124,9 +127,10 @@ class JointModel:
 
     def remove_effect(self, index: int) -> None:
         """Takes the effect at that place out."""
+        instance = effect_names(self)[index]  # type: ignore[arg-type]
         name = self.effects.pop(index)
         for p in self.catalogue[name].parameters:
-            del self._numbers[f"{name}.{p.key}"]
+            del self._numbers[f"{instance}.{p.key}"]
 
     def get(self, name: str) -> float:
         """One number."""
@@ -135,6 +139,22 @@ class JointModel:
     def set(self, name: str, value: float) -> None:
         """Changes one number."""
         self._numbers[name] = value
+
+    def of(self, catalogue: Mapping[str, Any]) -> "JointModel":
+        """The same numbers with the effects of a catalogue."""
+        other = self.copy()
+        other.catalogue = catalogue
+        return other
+
+    def act(self, action: Action) -> None:
+        """Changes MuJoCo's inputs by all of its numbers and effects."""
+        action.late_s += self.get(CLOCK)
+        for name in self._numbers:
+            if instance_of(name) == "base":
+                self.catalogue[name].act(action, {"value": self.get(name)})
+        for instance in effect_names(self):  # type: ignore[arg-type]
+            own = {key_of(n): v for n, v in self.own(instance).items()}
+            self.catalogue[instance.split("#")[0]].act(action, own)
 
     def own(self, instance: str, other: Mapping[str, float] | None = None) -> dict[str, float]:
         """Numbers of an effect, those of another mapping in their place."""
@@ -149,17 +169,30 @@ class Plant:
     Attributes:
         mjcf: the model.
         series: of the log, its states those by the run.
-        run: of the model by the log's commands.
+        run: of the model by the log's commands; None as it is made.
+        act: makes that model of the base.
     """
 
     mjcf: Mjcf
     series: Series
-    run: Run
+    run: Run | None = None
+    act: Act = field(default=lambda _: None, repr=False)
 
     @classmethod
     def of(cls, mjcf: Mjcf, series: Series) -> "Plant":
         """Runs the model by the commands of a log."""
-        return cls(mjcf, *with_run(series, mjcf))
+        return cls(mjcf, series).about(lambda _: None)
+
+    def about(self, act: Act) -> "Plant":
+        """With the states of a run of the base once it is changed."""
+        action = self.begin()
+        act(action)
+        return Plant(self.mjcf, *with_run(action, self.mjcf), act)
+
+    def is_farther_than(self, other: "Plant") -> bool:
+        """True if the run of this model is farther from some joint's log than another's."""
+        assert self.run is not None and other.run is not None
+        return not np.all(self.run.far <= other.run.far)
 
     def begin(self, usual: Usual | None = None) -> Action:
         """The base as it stands."""
@@ -188,19 +221,21 @@ class Plant:
         gained = after[:, 0, 1 + count : 1 + 2 * count] - action.v
         return gained / float(action.model.opt.timestep)
 
-    @cached_property
-    def errors(self) -> np.ndarray:
-        """(W, J) momentum that is measured, less that of the base.
+    def errors(self, action: Action) -> np.ndarray:
+        """(W, J) momentum that is measured, less that of the model that was run.
 
-        What the base does between its states is known of the run alone: the rest is how its forces
-        differ where the robot is elsewhere.
+        What it does between its states is known of the run alone: the rest is how its forces differ
+        where the robot is elsewhere.
+
+        Args:
+            action: that model in the states of the series.
         """
-        run, seen = self.begin(), self.begin()
-        run.q, run.v, run.force = self.run.q, self.run.v, self.run.pull
-        seen.q, seen.v = self.series.seen_q, self.series.seen_v
-        elsewhere = self.accelerations(seen) - self.accelerations(run)
-        between = self.series.weights @ elsewhere + self.run.changes
-        return np.einsum("wij,wj->wi", self.inertia, self.series.changes - between)
+        assert self.run is not None
+        s = self.series
+        seen = replace(action, q=action.q + s.seen_q - s.q, v=action.v + s.seen_v - s.v)
+        elsewhere = self.accelerations(seen) - self.accelerations(self.run.action)
+        between = s.weights @ elsewhere + self.run.changes
+        return np.einsum("wij,wj->wi", self.inertia, s.changes - between)
 
     def momenta(self, accelerations: np.ndarray) -> np.ndarray:
         """(W, J) momentum of each joint that is measured, less that of these accelerations."""
@@ -228,16 +263,17 @@ class Plant:
     def usual(self) -> Usual:
         """Motion and forces of the base, from one look at each state."""
         action, s = self.begin(), self.series
+        self.act(action)
         model, data, ctrl = action.model, mujoco.MjData(action.model), action.commands()
         torque, inertial = np.empty_like(s.q), np.empty_like(s.q)
         for k in range(len(s.q)):
-            data.qpos[:], data.qvel[:], data.ctrl[:] = s.q[k], s.v[k], ctrl[k]
+            data.qpos[:], data.qvel[:], data.ctrl[:] = action.q[k], s.v[k], ctrl[k]
             mujoco.mj_forward(model, data)
             torque[k] = data.qfrc_actuator
             inertial[k] = data.qfrc_bias
         load = np.sqrt((torque**2).mean(axis=0))
         load = np.where(load > 0, load, np.sqrt((inertial**2).mean(axis=0)))
-        lead = ctrl - np.where(self.mjcf.servo, s.q[:, self.mjcf.moves], 0.0)
+        lead = ctrl - np.where(self.mjcf.servo, action.q[:, self.mjcf.moves], 0.0)
         speed = np.sqrt((s.v**2).mean(axis=0))
         return Usual(
             torque,
@@ -294,8 +330,15 @@ class Steps:
         observed: (J,) all joints are.
     """
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: Plant, about: JointModel | None = None) -> None:
+        """Prepares a log.
+
+        Args:
+            plant: MuJoCo at its states.
+            about: the model that was run there; None for the base.
+        """
         self.plant = plant
+        self.about = about
         self.block = plant.series.block
         self.observed = np.ones(plant.series.q.shape[1], bool)
         self._columns: dict[str, np.ndarray] = {}
@@ -314,6 +357,20 @@ class Steps:
         )
 
     def _errors(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
+        return self._given + self._change(model, other)
+
+    @cached_property
+    def _given(self) -> np.ndarray:
+        """(W, J) errors of the base."""
+        action = self.plant.begin(self.plant.usual)
+        if self.about is None:
+            return self.plant.errors(action) * self.plant.usual.slides
+        self.about.act(action)
+        own = self.plant.errors(action) * self.plant.usual.slides
+        return np.asarray(own - self._change(self.about, {}))
+
+    def _change(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
+        """(W, J) of the base's errors by numbers and effects."""
         found, forces = np.zeros((1, 1)), self.plant.begin(self.plant.usual)
         exact = []
         for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
@@ -329,13 +386,12 @@ class Steps:
                     found = found + value * self._column(model, f"{kind}.{key_of(n)}")
             else:
                 exact.append((kind, tuple((key_of(n), v) for n, v in own.items())))
-        found = found + self.plant.errors * self.plant.usual.slides
         if exact:
             found = found + self._exactly(model.catalogue, tuple(exact))
             found = found - self._exactly(model.catalogue, ())
         if forces.force.any():
             found = found - self.plant.momentum_of(forces.force)
-        return np.asarray(found)
+        return np.broadcast_to(found, (len(self), len(self.observed)))
 
     def _exactly(self, catalogue: Mapping[str, Any], effects: tuple[Any, ...]) -> np.ndarray:
         """(W, J) errors of the base with some effects, but for how states of the base were seen."""

@@ -9,11 +9,13 @@ the model is run by the log's commands, as instruments are for industrial robots
 the measured positions by what differs smoothly (Janot, Vandanjon and Gautier 2014, IEEE Trans.
 Control Syst. Technol. 22: a generic instrumental variable approach). The base's error is that of
 the run, which has all of its own forces, and of what the difference between both adds to these.
+Where effects are found they are part of the model that is run, as instruments are made again from
+the model that they gave: of a robot that is far from its model the first run is far, too.
 """
 
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -23,6 +25,9 @@ from scipy.special import softmax
 
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.series import FEWEST, Series, lagged, series_of, smoothed
+
+if TYPE_CHECKING:
+    from twinmill.joints.plant import Action
 
 FOLLOW_S = 0.3  # in which a spring leads the run back: slower than any servo
 OVER = np.geomspace(0.1, 1e10, 23)  # variance over the noise's at low frequencies
@@ -35,40 +40,47 @@ class Run:
     """The model in a log, run by its commands and led back by a spring.
 
     Attributes:
-        q, v: (n, J) at the states of a series.
-        pull: (n, J) forces of the spring.
+        action: the model, in the run's states, with the forces of the spring.
         changes: (W, J) change of velocity over steps, found from positions as the measured one is.
+        far: (J,) root mean square of how far it is from the measured positions.
     """
 
-    q: np.ndarray
-    v: np.ndarray
-    pull: np.ndarray
+    action: "Action"
     changes: np.ndarray
+    far: np.ndarray
 
 
-def with_run(series: Series, mjcf: Mjcf) -> tuple[Series, Run]:
-    """Series with states by a run of the model, see this module, and that run."""
-    step_s, log = float(series.step_s[0]), series.log
+def with_run(action: "Action", mjcf: Mjcf) -> tuple[Series, Run]:
+    """Series with states by a run of a model, see this module, and that run.
+
+    Args:
+        action: the model in the states of the series as they are.
+        mjcf: whose joints and actuators it has.
+    """
+    series, log = action.series, action.series.log
+    zero = (action.q - series.q).mean(axis=0)  # a model's encoders may have another
     q, v, pull = np.empty_like(series.q), np.empty_like(series.v), np.empty_like(series.q)
     near, far, at_stamps = np.empty((2, *q.shape)), np.empty((2, *q.shape)), log.qpos.copy()
     for part in log.stretches:
         stamps = log.t_s[part]
         own = (series.t_s > stamps[0]) & (series.t_s < stamps[-1])
         if own.any():
-            path, pulls = _run(series, mjcf, part, own)
-            t_s, at_stamps[part] = series.t_s[own], path(stamps)
+            path, pulls = _run(action, mjcf, part, own)
+            t_s, at_stamps[part] = series.t_s[own], path(stamps) - zero
             q[own], v[own], pull[own] = path(t_s), path(t_s, 1), pulls(t_s)
             beside = log.qpos[part] - at_stamps[part]
-            near[:, own] = smoothed(stamps, beside, t_s, step_s)
+            near[:, own] = smoothed(stamps, beside, t_s, float(series.step_s[0]))
             far[:, own] = without_noise(stamps, beside, t_s)
     states = {
-        "q": q + far[0],
+        "q": q - zero + far[0],
         "v": v + far[1],
-        "seen_q": q + near[0],
+        "seen_q": q - zero + near[0],
         "seen_v": v + near[1],
     }
     changes = series_of(replace(log, qpos=at_stamps)).changes
-    return replace(series, **states), Run(q, v, pull, changes)
+    away = np.sqrt(((log.qpos - at_stamps) ** 2).mean(axis=0))
+    run = Run(replace(action, q=q, v=v, force=action.force + pull), changes, away)
+    return replace(series, **states), run
 
 
 def without_noise(
@@ -98,15 +110,15 @@ def without_noise(
     return found[0], found[1]
 
 
-def _run(series: Series, mjcf: Mjcf, part: slice, own: np.ndarray) -> tuple[Any, Any]:
+def _run(action: "Action", mjcf: Mjcf, part: slice, own: np.ndarray) -> tuple[Any, Any]:
     """Positions of the model over time, run by a stretch's commands, and forces of the spring."""
-    stamps, model = series.log.t_s[part], _of_run(mjcf)
-    data = mujoco.MjData(model)
+    series, model = action.series, _of_run(action.model)
+    stamps, data = series.log.t_s[part], mujoco.MjData(model)
     t_s = np.arange(stamps[0], stamps[-1] + 2 * RUN_S, RUN_S)
-    ctrl = _commands(series, mjcf, t_s + RUN_S / 2)  # the middle of a step makes none late
-    lead_q, lead_v = (
+    ctrl = _commands(action, mjcf, t_s + RUN_S / 2)  # the middle of a step makes none late
+    lead_q, lead_v, force = (
         np.column_stack([np.interp(t_s, series.t_s[own], x) for x in states[own].T])
-        for states in (series.q, series.v)
+        for states in (action.q, action.v, action.force)
     )
     stiff, damping = model.dof_M0 / FOLLOW_S**2, 2 * model.dof_M0 / FOLLOW_S
     lead = stiff * lead_q + damping * lead_v
@@ -115,25 +127,28 @@ def _run(series: Series, mjcf: Mjcf, part: slice, own: np.ndarray) -> tuple[Any,
     for k in range(len(t_s)):
         q[k], v[k] = data.qpos, data.qvel
         data.ctrl[:] = ctrl[k]
-        data.qfrc_applied[:] = pull[k] = lead[k] - stiff * q[k] - damping * v[k]
+        pull[k] = lead[k] - stiff * q[k] - damping * v[k]
+        data.qfrc_applied[:] = pull[k] + force[k]
         mujoco.mj_step(model, data)
     return CubicHermiteSpline(t_s, q, v), make_interp_spline(t_s, pull, k=1)
 
 
-def _of_run(mjcf: Mjcf) -> Any:
-    model = copy(mjcf.model)
+def _of_run(given: Any) -> Any:
+    model = copy(given)
     model.opt.timestep = RUN_S
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
     mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 
 
-def _commands(series: Series, mjcf: Mjcf, t_s: np.ndarray) -> np.ndarray:
-    """(n, U) commands at the steps of a run, as late and slow as the model has them."""
-    out = np.empty((len(t_s), len(mjcf.actuators)))
-    for a, late_s in enumerate(mjcf.delay_s):
-        at = np.searchsorted(series.log.t_s, t_s - late_s, side="right") - 1
-        out[:, a] = series.log.ctrl[np.maximum(at, 0), a]
-        if mjcf.lag_s[a] > 0:
-            out[:, a] = lagged(out[:, a], mjcf.lag_s[a], RUN_S)
+def _commands(action: "Action", mjcf: Mjcf, t_s: np.ndarray) -> np.ndarray:
+    """(n, U) commands at the steps of a run, as late, slow and shaped as the model has them."""
+    out, log = np.empty((len(t_s), len(mjcf.actuators))), action.series.log
+    for a, (late_s, lag_s) in enumerate(zip(action.late_s, action.lag_s, strict=True)):
+        at = np.searchsorted(log.t_s, t_s - late_s, side="right") - 1
+        out[:, a] = log.ctrl[np.maximum(at, 0), a]
+        if lag_s > 0:
+            out[:, a] = lagged(out[:, a], lag_s, RUN_S)
+    for a, shape in action.shapes:
+        out[:, a] = shape(out[:, a])
     return out

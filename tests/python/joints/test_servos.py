@@ -67,7 +67,7 @@ def test_a_servo_that_lacks_nothing_raises_no_alarm(wrist, seed):
 def test_a_run_leaves_nothing_of_a_servo_whose_ways_have_corners(wrist):
     """Without noise: less than a fiftieth of the momentum that its forces pass on in a step."""
     plant, _ = plant_of(simulated(4, 0.0), Mjcf.load(wrist))
-    left = plant.errors * plant.usual.slides
+    left = plant.errors(plant.begin()) * plant.usual.slides
     assert np.sqrt((left**2).mean()) < 0.02 * plant.usual.load * plant.series.step_s[0]
 
 

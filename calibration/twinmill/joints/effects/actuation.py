@@ -83,8 +83,9 @@ class ServoDamping(ActuatorEffect):
     @property
     def parameters(self) -> list[Number]:
         """The gain that is added."""
-        usual = float(self.plant.usual.load[self.joint] / self.plant.usual.speed[self.joint])
         own = -float(self.plant.mjcf.model.actuator_biasprm[self.at, 2])
+        usual = float(self.plant.usual.load[self.joint] / self.plant.usual.speed[self.joint])
+        usual = max(usual, own)  # a stiff servo's gain is larger than what its loads ask for
         return [Number("more", self.per_speed, SHARE * usual, -own, 100 * usual)]
 
     def act(self, action: Action, values: Mapping[str, float]) -> None:
