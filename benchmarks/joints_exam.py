@@ -418,6 +418,7 @@ def cases(robot: str) -> dict[str, Case]:
     }[robot]
     vbd = any_of(f"viscous_friction_by_direction@{j1}")
     more = any_of(f"viscous_friction@{j1}", f"servo_damping@{a1}")
+    parts = any_of(f"servo_damping@{a2}", f"servo_stiffness@{a2}")  # a servo's gains are these
     offset = any_of(f"force_offset@{j2}", f"coulomb_friction_by_direction@{j2}")
     coulomb = any_of(f"coulomb_friction@{j2}")
     more_coulomb = attribute("joint", j2, "frictionloss", plus=0.25 * f2)
@@ -430,7 +431,7 @@ def cases(robot: str) -> dict[str, Case]:
         "viscous": Case((more,), attribute("joint", j1, "damping", plus=0.25 * f1 / s1)),
         "armature": Case((any_of(f"armature@{j2}"),),
                          attribute("joint", j2, "armature", plus=0.05 if robot == "ur" else 0.02)),
-        "gain": Case((any_of(f"actuator_gain@{a2}"),), weaker),
+        "gain": Case((any_of(f"actuator_gain@{a2}"),), weaker, also=parts),
         "delay": Case((any_of(f"command_delay@{a1}"),), change=delayed(a1)),
         "offset": Case((offset,), push=constant(d2, 0.2 * f2)),
         "one way": Case((vbd,), push=forward, also=more),
@@ -443,7 +444,8 @@ def cases(robot: str) -> dict[str, Case]:
         "encoder": Case((any_of(f"encoder_offset@{j2}"),), shift=shift),
         "coulomb and delay": Case((coulomb, any_of(f"command_delay@{a1}")),
                                   chain(more_coulomb, delayed(a1))),
-        "one way and gain": Case((vbd, any_of(f"actuator_gain@{a2}")), weaker, forward, also=more),
+        "one way and gain": Case((vbd, any_of(f"actuator_gain@{a2}")), weaker, forward,
+                                 also=more | parts),
         "spring": Case((any_of(f"joint_stiffness@{j1}"),), push=hardening(d1, 0.3 * f1)),
         "coupled": Case(push=coupled(d2, 0.25 * f2), outside="other joints"),
         "knocks": Case(push=knocks(d2, f2), outside="moments"),
