@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an MJCF lacks in the log that it was made with, too, so that it is no news in another one.
+"""Effects that an MJCF lacks in the log that it was made with, too: no news in another one.
 
 The likeliest set of effects of that log is part of the base of a later one, with the posterior of
 its numbers and of the base's, as much less certain as they drift between logs (Kennedy and O'Hagan
@@ -47,7 +47,7 @@ def always_of(search: Search) -> Always:
 
 
 def with_always(model: JointModel, prior: Prior, always: Always, own: Sequence[Parameter]) -> Prior:
-    """What is known of the base of a later log, to which what it always lacks is added.
+    """Prior of the base of a later log, to which its effects of the own log are added.
 
     Args:
         model: of the base, which is changed.

@@ -16,8 +16,9 @@ import numpy as np
 from mujoco import rollout
 
 from twinmill.inference.settings import PRIORS
+from twinmill.joints.action import Action, Usual
 from twinmill.joints.mjcf import Mjcf
-from twinmill.joints.series import Series, lagged
+from twinmill.joints.series import Series
 from twinmill.joints.states import Run, with_run
 from twinmill.model.parameters import effect_names, instance_of, key_of
 
@@ -27,78 +28,13 @@ INPUT = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APP
 NEUTRAL = {CLOCK: 0.0}  # numbers of the base that are no factors
 SHARE = 0.1  # default strength of what adds to a force or scales a number: a tenth
 SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
-SLOW = 0.02  # of a joint's usual speed, below which its direction is soft
 CLOCK_NUDGE_S = 1e-3
 KEPT = 200  # predictions that are kept, since searches ask for them again
 HELD = 0.98  # share of a push that a joint takes, below which friction holds it
 NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether it gives way
 
 
-@dataclass
-class Action:
-    """Inputs of MuJoCo, for effects to change.
-
-    Attributes:
-        series: of the log.
-        usual: forces and velocities of the base, see `Usual`; None while these are looked for.
-        model: MuJoCo's.
-        q, v: (n, J) measured states.
-        late_s, lag_s: (U,) of commands.
-        shapes: actuator, and what becomes of its command (n,), in turn.
-        force: (n, J) forces of effects.
-    """
-
-    series: Series
-    usual: "Usual | None"
-    model: Any
-    q: np.ndarray
-    v: np.ndarray
-    late_s: np.ndarray
-    lag_s: np.ndarray
-    shapes: list[tuple[int, Any]]
-    force: np.ndarray
-
-    def commands(self) -> np.ndarray:
-        """(n, U) commands once they are late, slow and shaped."""
-        ctrl = self.series.commands(self.late_s)
-        for a, lag_s in enumerate(self.lag_s):
-            if lag_s > 0:
-                for run in self.series.runs:
-                    ctrl[run, a] = lagged(ctrl[run, a], lag_s, self.series.width_s[0])
-        for a, shape in self.shapes:
-            ctrl[:, a] = shape(ctrl[:, a])
-        return ctrl
-
-
 Act = Callable[[Action], None]
-
-
-@dataclass(frozen=True)
-class Usual:
-    """Motion and forces of the base in a log.
-
-    Attributes:
-        torque: (n, J) forces of its actuators.
-        load: (J,) root mean square of the force on each joint.
-        speed, reach: (J,) root mean square velocity, and range of positions.
-        command: (U,) root mean square command, about a servo's position.
-        gives: (n, J) momentum that a joint takes from a small force: 0 where friction holds it.
-        slides: (W, J) 1 for steps in which a joint neither turns back nor is held by friction, were
-            that more by an effect of usual size; 0 for others, which say nothing: friction is
-            anything up to its limit there.
-    """
-
-    torque: np.ndarray
-    load: np.ndarray
-    speed: np.ndarray
-    reach: np.ndarray
-    command: np.ndarray
-    gives: np.ndarray
-    slides: np.ndarray
-
-    def sign(self, v: np.ndarray, d: int) -> np.ndarray:
-        """(n,) direction of a joint's motion, soft near standstill."""
-        return np.tanh(v[:, d] / (SLOW * self.speed[d]))
 
 
 class JointModel:
@@ -141,7 +77,7 @@ class JointModel:
         self._numbers[name] = value
 
     def of(self, catalogue: Mapping[str, Any]) -> "JointModel":
-        """The same numbers with the effects of a catalogue."""
+        """With its numbers, and the effects of a catalogue."""
         other = self.copy()
         other.catalogue = catalogue
         return other

@@ -15,7 +15,7 @@ the model that they gave: of a robot that is far from its model the first run is
 
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -23,11 +23,9 @@ from scipy.fft import dct, idct
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, make_interp_spline
 from scipy.special import softmax
 
+from twinmill.joints.action import Action
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.series import FEWEST, Series, lagged, series_of, smoothed
-
-if TYPE_CHECKING:
-    from twinmill.joints.plant import Action
 
 FOLLOW_S = 0.3  # in which a spring leads the run back: slower than any servo
 OVER = np.geomspace(0.1, 1e10, 23)  # variance over the noise's at low frequencies
@@ -45,12 +43,12 @@ class Run:
         far: (J,) root mean square of how far it is from the measured positions.
     """
 
-    action: "Action"
+    action: Action
     changes: np.ndarray
     far: np.ndarray
 
 
-def with_run(action: "Action", mjcf: Mjcf) -> tuple[Series, Run]:
+def with_run(action: Action, mjcf: Mjcf) -> tuple[Series, Run]:
     """Series with states by a run of a model, see this module, and that run.
 
     Args:
@@ -110,7 +108,7 @@ def without_noise(
     return found[0], found[1]
 
 
-def _run(action: "Action", mjcf: Mjcf, part: slice, own: np.ndarray) -> tuple[Any, Any]:
+def _run(action: Action, mjcf: Mjcf, part: slice, own: np.ndarray) -> tuple[Any, Any]:
     """Positions of the model over time, run by a stretch's commands, and forces of the spring."""
     series, model = action.series, _of_run(action.model)
     stamps, data = series.log.t_s[part], mujoco.MjData(model)
@@ -141,7 +139,7 @@ def _of_run(given: Any) -> Any:
     return model
 
 
-def _commands(action: "Action", mjcf: Mjcf, t_s: np.ndarray) -> np.ndarray:
+def _commands(action: Action, mjcf: Mjcf, t_s: np.ndarray) -> np.ndarray:
     """(n, U) commands at the steps of a run, as late, slow and shaped as the model has them."""
     out, log = np.empty((len(t_s), len(mjcf.actuators))), action.series.log
     for a, (late_s, lag_s) in enumerate(zip(action.late_s, action.lag_s, strict=True)):

@@ -5,12 +5,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from twinmill.joints.action import Action
 from twinmill.joints.effects.effect import (
     ActuatorEffect,
     Effect,
     Number,
 )
-from twinmill.joints.plant import SHARE, Action, Plant
+from twinmill.joints.plant import SHARE, Plant
 
 LATE_S = 0.01  # default of a delay or a lag: some periods of a control loop
 LONGEST_S = 0.5
