@@ -51,7 +51,11 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.joints.diagnose import diagnose_joints as diagnose_joints
     from twinmill.joints.explain import JointExplanation as JointExplanation
     from twinmill.joints.explain import explain_joints as explain_joints
+    from twinmill.joints.importers.import_joints import ImportedJoints as ImportedJoints
+    from twinmill.joints.importers.import_joints import import_joints as import_joints
     from twinmill.joints.log import JointLog as JointLog
+    from twinmill.joints.next import Excitation as Excitation
+    from twinmill.joints.next import next_joints as next_joints
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.model.python_effect import Number as Number
     from twinmill.model.python_effect import PythonEffect as PythonEffect
@@ -72,7 +76,9 @@ _HOME = {
     **dict.fromkeys(("JointComparison", "compare_joints"), "twinmill.joints.compare"),
     **dict.fromkeys(("JointDiagnosis", "diagnose_joints"), "twinmill.joints.diagnose"),
     **dict.fromkeys(("JointExplanation", "explain_joints"), "twinmill.joints.explain"),
+    **dict.fromkeys(("ImportedJoints", "import_joints"), "twinmill.joints.importers.import_joints"),
     "JointLog": "twinmill.joints.log",
+    **dict.fromkeys(("Excitation", "next_joints"), "twinmill.joints.next"),
     "ModelError": "twinmill.model.model_file",
     **dict.fromkeys(("Number", "PythonEffect", "python_effect"), "twinmill.model.python_effect"),
     **dict.fromkeys(

@@ -94,6 +94,12 @@ static void remark(const struct loop *loop, struct link_ack *ack)
         (void)snprintf(ack->reason, sizeof ack->reason, "armed; the robot's key is %s",
                        loop->link.key_name);
     }
+    else if (ack->verb == FW_VERB_SELECT && ack->accepted && loop->plan.waits &&
+             (loop->plan.plays_script || loop->plan.behavior[0] != '\0'))
+    {
+        (void)snprintf(ack->reason, sizeof ack->reason, "a start that it waits for plays %s",
+                       loop->plan.plays_script ? "a script" : loop->plan.behavior);
+    }
 }
 
 void loop_link_tell(struct loop *loop)

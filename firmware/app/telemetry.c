@@ -16,6 +16,9 @@
 #define CONNECT_PERIOD_US 2000000
 #define RUN_PERIOD_US 5000000
 #define LINK_PERIOD_US 100000
+// One message of a change may be lost: it is said again for a second.
+#define CHANGE_PERIOD_US 200000
+#define CHANGE_US 1000000
 // More than any message takes but run_t.
 #define MESSAGE_MAX_BYTES 256
 
@@ -214,6 +217,19 @@ static void publish_signed_ack(struct telemetry *telemetry, const struct link_ac
                 turbopi_signed_ack_t_encode(bytes, 0, sizeof bytes, &message));
 }
 
+// What a robot plays is shown, and logged, as it is now.
+static void note_behavior(struct telemetry *telemetry, const struct link_report *report)
+{
+    if (strncmp(telemetry->behavior, report->behavior, sizeof telemetry->behavior) == 0)
+    {
+        return;
+    }
+    const bool is_first = telemetry->behavior[0] == '\0';
+    memcpy(telemetry->behavior, report->behavior, sizeof telemetry->behavior);
+    telemetry->next_run_us = report->utime_us;
+    telemetry->change_end_us = is_first ? 0 : report->session_us + CHANGE_US;
+}
+
 void telemetry_publish(struct telemetry *telemetry, const struct link_report *report)
 {
     if (!is_connected(telemetry))
@@ -221,11 +237,13 @@ void telemetry_publish(struct telemetry *telemetry, const struct link_report *re
         ++*losses(telemetry);
         return;
     }
+    note_behavior(telemetry, report);
     if (report->utime_us >= telemetry->next_run_us ||
         report->utime_us < telemetry->next_run_us - RUN_PERIOD_US)
     {
+        const bool is_change = report->session_us < telemetry->change_end_us;
         publish_run(telemetry, report);
-        telemetry->next_run_us = report->utime_us + RUN_PERIOD_US;
+        telemetry->next_run_us = report->utime_us + (is_change ? CHANGE_PERIOD_US : RUN_PERIOD_US);
     }
     publish_step(telemetry, report);
     if (report->session_us >= telemetry->next_link_us)

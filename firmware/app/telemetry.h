@@ -20,6 +20,9 @@ struct telemetry
     lcm_t *lcm;
     struct lcm_log log;
     int64_t next_create_us, next_run_us, next_link_us;
+    // What the newest R<nn>_RUN said is played, and until when that is told often.
+    char behavior[LINK_NAME_MAX];
+    int64_t change_end_us;
     // Messages that no network took; the log counts its own.
     uint32_t unsent_count;
 };
@@ -31,7 +34,8 @@ void telemetry_init(struct telemetry *telemetry, const struct app_config *config
 // Connects if that is due. May take seconds.
 void telemetry_connect(struct telemetry *telemetry, int64_t now_us);
 
-// R<nn>_TELEMETRY, R<nn>_LINK ten times a second, R<nn>_RUN every 5 s; lost without a network.
+// R<nn>_TELEMETRY, R<nn>_LINK ten times a second, R<nn>_RUN every 5 s, and at once where it plays
+// something else; lost without a network.
 void telemetry_publish(struct telemetry *telemetry, const struct link_report *report);
 void telemetry_publish_ack(struct telemetry *telemetry, const struct link_ack *ack);
 

@@ -256,6 +256,24 @@ static void test_answer_to_a_stop_says_if_the_board_took_it(void)
     TEST_ASSERT_FALSE(robot.report.stands);
 }
 
+// Whoever selects in another's countdown is told by the robot itself what will be played instead.
+static void test_select_before_a_start_is_answered_with_what_that_plays(void)
+{
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_SELECT, 0, "diffusing_v2"));
+    TEST_ASSERT_EQUAL_STRING("", robot.ack.reason);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, "milling"));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_SELECT, 0, "diffusing_v2"));
+    TEST_ASSERT_EQUAL_STRING("a start that it waits for plays milling", robot.ack.reason);
+    robot_steps(60);
+    TEST_ASSERT_EQUAL_STRING("milling", robot.report.behavior);
+    // One that names nothing plays what was selected.
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_SELECT, 0, "diffusing_v2"));
+    TEST_ASSERT_EQUAL_STRING("", robot.ack.reason);
+    robot_steps(60);
+    TEST_ASSERT_EQUAL_STRING("diffusing_v2", robot.report.behavior);
+}
+
 int main(void)
 {
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
@@ -275,6 +293,7 @@ int main(void)
     RUN_TEST(test_robot_that_lost_its_operator_does_not_start_later);
     RUN_TEST(test_start_without_a_word_on_it_has_the_configured_time_out);
     RUN_TEST(test_answer_to_a_stop_says_if_the_board_took_it);
+    RUN_TEST(test_select_before_a_start_is_answered_with_what_that_plays);
     const int failures = UNITY_END();
     char path[128];
     snprintf(path, sizeof path, "%s/not_stopped", folder);

@@ -190,6 +190,55 @@ static void test_log_that_cannot_be_opened_is_lost_and_begun_later(void)
     TEST_ASSERT_TRUE(unlink(config.io_tsv) == 0 && rmdir(folder) == 0);
 }
 
+// In a file, how often some bytes stand.
+static int count_in(const char *path, const char *word)
+{
+    static char text[1 << 20];
+    FILE *file = fopen(path, "r");
+    TEST_ASSERT_NOT_NULL(file);
+    const size_t size = fread(text, 1, sizeof text, file);
+    TEST_ASSERT_EQUAL(0, fclose(file));
+    int count = 0;
+    for (size_t i = 0; i + strlen(word) <= size; ++i)
+    {
+        count += memcmp(text + i, word, strlen(word)) == 0;
+    }
+    return count;
+}
+
+static void publish_steps(struct telemetry *telemetry, struct link_report *report, int count)
+{
+    for (int i = 0; i < count; ++i)
+    {
+        report->utime_us += 33000;
+        report->session_us += 33000;
+        telemetry_publish(telemetry, report);
+    }
+}
+
+// Who looks on saw for up to 5 s what was chosen before; and one message may be lost.
+static void test_what_is_played_is_told_as_soon_as_it_changes_and_again(void)
+{
+    char path[32] = "/tmp/test_reporter.XXXXXX";
+    TEST_ASSERT_EQUAL(0, close(mkstemp(path)));
+    (void)snprintf(config.lcm_url, sizeof config.lcm_url, "file://%s?mode=w", path);
+    config.robot_id = 1;
+    struct telemetry telemetry;
+    struct link_report report = {.utime_us = 1000000, .session_us = 1, .behavior = "milling"};
+    telemetry_init(&telemetry, &config, &no_key, 1);
+    telemetry_connect(&telemetry, 1);
+    publish_steps(&telemetry, &report, 60);
+    TEST_ASSERT_EQUAL(1, count_in(path, "R01_RUN"));
+    (void)snprintf(report.behavior, sizeof report.behavior, "diffusing_v2");
+    publish_steps(&telemetry, &report, 1);
+    TEST_ASSERT_EQUAL(2, count_in(path, "R01_RUN"));
+    TEST_ASSERT_EQUAL(1, count_in(path, "diffusing_v2"));
+    publish_steps(&telemetry, &report, 60);
+    TEST_ASSERT_GREATER_OR_EQUAL(4, count_in(path, "diffusing_v2"));
+    telemetry_close(&telemetry);
+    TEST_ASSERT_EQUAL(0, unlink(path));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -197,5 +246,6 @@ int main(void)
     RUN_TEST(test_flood_of_reports_is_dropped_and_told_to_the_loop);
     RUN_TEST(test_second_of_reports_fits);
     RUN_TEST(test_log_that_cannot_be_opened_is_lost_and_begun_later);
+    RUN_TEST(test_what_is_played_is_told_as_soon_as_it_changes_and_again);
     return UNITY_END();
 }

@@ -49,7 +49,7 @@ def accepted():
     ack = turbopi.signed_ack_t()
     ack.session, ack.session_us, ack.accepted, ack.verb = SESSION, 1_000_000, True, VERBS.VERB_START
     robot.signed_acks = {SEQ: ack}
-    fleet.robots, fleet.said, fleet.counter = {1: robot}, {SEQ}, OWN
+    fleet.robots, fleet.said, fleet.counter = {1: robot}, {SEQ: 0.0}, OWN
     return fleet, robot
 
 
@@ -105,7 +105,7 @@ def test_who_refuses_since_another_has_stopped_it_is_told_so(accepted, stop_us, 
     if arm_us:
         robot.signed_acks[78] = signed(ARM, arm_us)
     assert dropouts(fleet).words == ({1: STOPPED} if is_stop else {})
-    fleet.said.add(77)
+    fleet.said[77] = 0.0
     assert not dropouts(fleet)
 
 
@@ -113,7 +113,7 @@ def test_a_stop_of_somebody_else_is_told_with_where_it_came_from(accepted):
     fleet, _ = accepted
     fleet.bus.sender = ("10.0.0.2", 40000)
     stop, own, arm, odd = (tell.make_command(v) for v in (VERBS.VERB_STOP,) * 2 + (ARM, 0))
-    fleet.said.add(own.seq)
+    fleet.said[own.seq] = 0.0
     stop.robot_id, odd.robot_id = 3, 10**6
     for command in (own, arm, odd):
         fleet._on_message("SWARM_COMMAND", command.encode())

@@ -136,8 +136,10 @@ def test_a_failure_that_quotes_a_file_cannot_rewrite_the_terminal(twinmill, tmp_
     assert code == 1 and not forbidden(out + err)
 
 
-def test_a_name_that_no_output_can_hold_is_refused(twinmill):
-    code, _, err = twinmill("compare", "run\udcff.lcmlog", "--model", "turbopi.toml")
+def test_a_name_that_no_output_can_hold_is_refused(twinmill, tmp_path):
+    log = tmp_path / "run\udcff.lcmlog"
+    log.touch()
+    code, _, err = twinmill("compare", log, "--model", "turbopi.toml")
     assert code == 1 and "rename" in err and not forbidden(err)
 
 

@@ -72,6 +72,20 @@ def test_a_robot_that_stands_is_said_to_with_what_it_signs(held, says, reason):
     assert reason in words(STOPPED, **says) and robots.is_over
 
 
+@pytest.mark.parametrize(("plays", "says"), [("diffusing", "said select"), ("milling", "")])
+def test_a_selection_that_a_start_overrides_is_not_told(held, plays, says):
+    """Said in the countdown, and obeyed: at its instant the start selected its own."""
+    _, robot, words = held
+    words_said = "select diffusing at 11:01:31"
+    robot.commands[OWN + 1] = Heard(
+        77, VERBS.VERB_SELECT, SESSION, OWN + 1, words_said, "diffusing"
+    )
+    robot.run = turbopi.run_t()
+    robot.run.behavior = plays
+    told = words(TABLE, stands=False, counter=OWN + 1)
+    assert says in told and bool(told) == bool(says)
+
+
 def test_a_script_that_is_over_is_told_apart_from_a_table(held):
     _, _, words = held
     words(SCRIPT, stands=False)

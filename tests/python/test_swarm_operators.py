@@ -10,7 +10,7 @@ import turbopi
 
 from twinmill.robots import key as keys
 from twinmill.robots import tell
-from twinmill.robots.fleet import MODES, TELEMETRY, Fleet, Robot
+from twinmill.robots.fleet import MODES, TELEMETRY, Fleet, Robot, Step
 from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_screen import status_table
@@ -256,7 +256,7 @@ def test_a_clock_that_is_odd_is_told_by_status_and_at_both_ends_of_a_start(
     ahead, right = robot(1), robot(2)
     for known, s in ((ahead, 30.0), (right, 0.0)):
         known.telemetry.utime_us = round((time.time() + s) * 1e6)
-        known.recent.append((time.monotonic(), time.time(), known.telemetry))
+        known.recent.append(Step(time.monotonic(), time.time(), known.telemetry))
     fleet = fleet_of(ahead, right)
     monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
     said = "R01's clock is 30.00 s ahead of this computer's, with which R02 agrees: set its (NTP)."

@@ -20,6 +20,7 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.robots.key import load
 from twinmill_cli import swarm_door, swarm_stop
+from twinmill_cli.main import main
 from twinmill_cli.swarm_door import key_fault
 from twinmill_cli.swarm_signals import saying_nothing
 from twinmill_cli.swarm_verdict import Saying, of_stop
@@ -49,7 +50,9 @@ def test_a_stop_outlives_the_terminal_that_it_came_from(monkeypatch, tmp_path, t
     """As where ssh breaks off while robots out of reach have not yet signed."""
     monkeypatch.setenv("HOME", str(tmp_path))
     ended = []
-    monkeypatch.setattr(swarm_stop, "waiting_words", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
+    monkeypatch.setattr(
+        swarm_stop, "waiting_words", lambda *_: os.kill(os.getpid(), signal.SIGHUP) or ""
+    )
     before = signal.signal(signal.SIGHUP, lambda *_: ended.append("hung up"))
     try:
         code, out, _ = twinmill("swarm", "stop", "--lcm-url", "memq://", "--timeout-s", "2")
@@ -95,7 +98,10 @@ def test_a_word_that_nobody_reads_keeps_no_stop_waiting():
         os.close(handle)
 
 
-@pytest.mark.parametrize("robots", ["", "1;2", "1-2", "R01", "100", "1,1"])
+@pytest.mark.parametrize(
+    "robots",
+    ["", "1;2", "1-2", "R01", "100", "1,1", "1_2", "\u0661", "1, 2", "1,2\u00a0", "1,2\udca0"],
+)
 def test_a_selection_that_cannot_be_read_stops_all_and_says_so(
     monkeypatch, tmp_path, twinmill, robots
 ):
@@ -143,6 +149,64 @@ def test_a_command_line_that_cannot_be_read_stops_all_and_says_so(
     said = json.loads(out)
     assert code == 2 and told == [("memq://", prefix), set()] and not said["ok"]
     assert says in said["sentence"] and ". So all robots are told to stop." in said["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["--robots", "1,2\udca0"], 2),
+        (["\udca0"], 2),
+        (["--timeout-s", "1\udca0"], 2),
+        (["--channel-prefix", "TWIN_\udca0"], 2),
+        (["--key", "m\udcfchle.key"], 1),
+        (["--host", "robot\udca003"], 1),
+        ([], 1),
+    ],
+)
+def test_words_that_are_no_text_keep_no_stop_from_being_said(
+    monkeypatch, tmp_path, capsys, words, code
+):
+    """A byte of another encoding, as a paste or an old file name has it; HOME is such a one."""
+    home = tmp_path / "m\udcfchle"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    told = []
+    monkeypatch.setattr(swarm_stop.tell, "say_stop", lambda fleet, asked: told.append(asked))
+    line = ["twinmill", "swarm", "stop", "--lcm-url", "memq://", "--json", *words]
+    line += [] if "--timeout-s" in words else ["--timeout-s", "0.5"]
+    monkeypatch.setattr(sys, "argv", line)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = json.loads(capsys.readouterr().out)
+    assert ended.value.code == code and told == [set()] and not said["ok"]
+    assert "\udca0" not in said["sentence"] and "\udcfc" not in said["sentence"]
+    assert ("all robots are told to stop" in said["sentence"]) == (code == 2)
+
+
+@pytest.mark.parametrize("words", [["start", "--robots", "1\udca0"], ["select", "m\udcfc"]])
+def test_words_that_are_no_text_are_to_be_typed_anew(monkeypatch, capsys, words):
+    """They were names of files to be renamed."""
+    monkeypatch.setattr(sys, "argv", ["twinmill", "swarm", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    err = capsys.readouterr().err
+    assert ended.value.code == 1 and "is not in UTF-8; type it anew" in err
+
+
+def test_a_stop_is_said_before_a_file_is_read(monkeypatch, twinmill):
+    """A key on a file system that hangs may never be read."""
+    order = []
+    monkeypatch.setattr(swarm_stop.tell, "say_stop", lambda *_: order.append("stop"))
+    monkeypatch.setattr(swarm_stop, "key_if_there", lambda _: order.append("key") or (None, ""))
+    twinmill("swarm", "stop", "--lcm-url", "memq://", "--timeout-s", "0.5")
+    assert order == ["stop", "key"]
+
+
+@pytest.mark.parametrize("words", [["stop"], ["swarm", "stopp"], ["robot", "stop"], ["STPO"]])
+def test_a_stop_in_words_that_are_no_command_says_that_nothing_was_stopped(twinmill, words):
+    code, _, err = twinmill(*words)
+    assert code == 2 and "NOTHING WAS STOPPED: `twinmill swarm stop` stops robots." in err
 
 
 @pytest.mark.parametrize("words", ["Stop", "STOP --ROBOTS 1"])

@@ -363,6 +363,15 @@ def test_a_silent_robot_keeps_the_others_held():
     assert not SILENT.stands and not SILENT.is_meant
 
 
+def test_a_selection_that_a_countdown_overrides_has_not_gone_as_it_was_meant():
+    """Said by the robot itself, as it will play something else."""
+    waits = replace(STANDS, reason="a start that it waits for plays milling")
+    told = of_select([STANDS, waits], "diffusing")
+    assert told.code == 1
+    assert "will not play diffusing (a start that it waits for plays milling)" in told.sentence
+    assert of_select([STANDS], "diffusing").code == 0
+
+
 @pytest.mark.parametrize(
     ("clock_s", "says"),
     [

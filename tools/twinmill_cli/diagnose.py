@@ -59,7 +59,21 @@ def register(app: typer.Typer) -> None:
 
 
 def _diagnose(
-    logs: Logs, model: Model = DEFAULT_MODEL, as_json: AsJson = False, out: Out = None
+    logs: Logs,
+    *,
+    model: Model = DEFAULT_MODEL,
+    own: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--own",
+            metavar="LOG",
+            show_default=False,
+            help="Of an MJCF: log that it was made with (once for each); what it lacks there, too, "
+            "is not reported as new.",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+    out: Out = None,
 ) -> Diagnosis | JointDiagnosis:
     """Name the physical effect that a model lacks, or say that none is missing or identifiable.
 
@@ -73,7 +87,12 @@ def _diagnose(
     if is_mjcf(model):
         from twinmill_cli.joints import diagnosed  # MuJoCo's Python is slow to import
 
-        return diagnosed(logs, model, as_json, out)
+        return diagnosed(logs, model, own=own or [], as_json=as_json, out=out)
+    if own:
+        raise ValueError(
+            "diagnose: --own is for models in MJCF; of a robot on wheels `twinmill lab infer` "
+            "takes it."
+        )
     native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:

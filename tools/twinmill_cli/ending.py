@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How our programs end: an exit code; where they fail a sentence, and an object with --json."""
 
+import difflib
 import errno
 import io
 import os
@@ -19,6 +20,8 @@ from twinmill.streams import STDERR, STDOUT
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.output import begin_telling, decided_or, has_told, print_object, say
 
+WRONG_COMMAND_LINE = 2
+LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
 QUOTED = 80  # letters of what a sentence quotes
 TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
 NO_ROOM = {  # why a file takes no more, and what to do
@@ -45,7 +48,8 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     begin_telling()
     words = sys.argv[1:] or ["--help"]
     try:
-        _check_encoding(words)
+        if not _is_stop(words):
+            _check_encoding(words)
         result = run(words)
         code = result if isinstance(result, int) else 0
         _end_untouched()
@@ -54,6 +58,7 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     except (typer.TyperException, ImportError, OSError, ValueError) as error:
         code, sentence = _told(error)
         if sentence:
+            sentence += _of_no_stop(words) if code == WRONG_COMMAND_LINE else ""
             say(sentence, program)
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
@@ -86,18 +91,36 @@ def _take_standard_files() -> None:
     sys.stderr = sys.stderr or io.TextIOWrapper(io.FileIO(STDERR, "w", closefd=False))
 
 
+def _is_stop(words: list[str]) -> bool:
+    """A stop of robots, which is said whatever its words are: it reads them itself."""
+    return [word.lower() for word in words[:2]] == ["swarm", "stop"]
+
+
+def _of_no_stop(words: list[str]) -> str:
+    """To whoever asked for a stop by words that are no command, as `stop` or `swarm stopp`."""
+    asked = [word.lower() for word in words[:2] if not _is_stop(words)]
+    if not any(difflib.get_close_matches(word, ["stop"], cutoff=LIKE_STOP) for word in asked):
+        return ""
+    return " NOTHING WAS STOPPED: `twinmill swarm stop` stops robots."
+
+
 def _check_encoding(words: list[str]) -> None:
-    """Raises ValueError for a name that no page, model file, table or JSON could hold."""
+    """Raises ValueError for a word that no page, model file, table or JSON could hold."""
     for word in words:
         if word != word.encode(errors="replace").decode():
-            raise ValueError(f"'{word}': this name is not in UTF-8; rename the file or folder.")
+            name = word.partition("=")[2] or word
+            is_file = os.path.lexists(word) or os.path.lexists(name)
+            remedy = "rename the file or folder" if is_file else "type it anew, in UTF-8"
+            raise ValueError(f"'{word}': is not in UTF-8; {remedy}.")
 
 
 def _told(error: Exception) -> tuple[int, str]:
     """Exit code and sentence; this is empty where help was printed instead."""
     if isinstance(error, typer.TyperException):
         sentence, code = error.format_message(), error.exit_code
-        more = " (--help lists what can be given)" if sentence and code == 2 else ""
+        more = (
+            " (--help lists what can be given)" if sentence and code == WRONG_COMMAND_LINE else ""
+        )
         return code, _short(sentence + more)
     if isinstance(error, ModuleNotFoundError) and not isinstance(error, MissingExtra):
         if error.name != LAB and (error.name or "twinmill").startswith("twinmill"):

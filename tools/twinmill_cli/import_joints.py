@@ -24,7 +24,7 @@ if working():  # not for --help
     from twinmill.report import joints as shown
     from twinmill.version import __version__
 if TYPE_CHECKING:
-    from twinmill.joints.importers.import_joints import Imported
+    from twinmill.joints.importers.import_joints import ImportedJoints
 
 ONE_AFTER_ANOTHER = "Names of columns that have none, in their order, with commas: of {}."
 
@@ -76,7 +76,7 @@ def _import_joints(
     ] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace LOG if it exists.")] = False,
     as_json: AsJson = False,
-) -> Imported:
+) -> ImportedJoints:
     """Make a log of joints for an MJCF from a table, a ROS bag or a LeRobot data set.
 
     Names, units and stamps are checked against the model. Then compare, diagnose,
@@ -108,7 +108,7 @@ def _import_joints(
     return found
 
 
-def _told(found: Imported) -> dict[str, Any]:
+def _told(found: ImportedJoints) -> dict[str, Any]:
     """Fields of JSON."""
     log = found.log
     return {

@@ -479,7 +479,7 @@ def _pair(text: str, form: str) -> tuple[str, str]:
 
 
 def _number(text: str) -> int:
-    if not text.isdecimal():
+    if not (text.isascii() and text.isdecimal()):
         raise LogError(f"--robot: '{text}' is no robot number in 0..99.")
     return int(text)
 

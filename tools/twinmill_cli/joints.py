@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +20,16 @@ from twinmill_cli.frame import command_line
 from twinmill_cli.output import deliver, say, telling
 
 
-def diagnosed(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointDiagnosis:
+def diagnosed(
+    logs: list[Path], model: str, *, own: list[Path], as_json: bool, out: Path | None
+) -> JointDiagnosis:
     """Names what an MJCF lacks."""
     _no_report("diagnose", out)
     with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
-        found = diagnose_joints(logs, model, progress)
+        found = diagnose_joints(logs, model, progress, own=own)
     _warn(found.warnings)
-    command = command_line("diagnose", logs, model)
+    words = [word for path in own for word in ("--own", str(path))]
+    command = command_line(shlex.join(["diagnose", *words]), logs, model)
     deliver({**found.to_json(), **_source(command)}, shown.diagnosis(found), as_json)
     return found
 

@@ -96,6 +96,6 @@ def robot_ids(text: str | None) -> list[int] | None:
     if text is None:
         return None
     words = text.split(",")
-    if not all(re.fullmatch(r"R?\d{1,2}", word) for word in words):
+    if not all(re.fullmatch(r"R?[0-9]{1,2}", word) for word in words):
         raise ValueError(f"--odd '{text}': write robots as 5 or R05,R06.")
     return [int(word.lstrip("R")) for word in words]

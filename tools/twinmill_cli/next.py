@@ -179,7 +179,7 @@ def _narrowing(
 
 def _sides(text: str) -> tuple[float, float]:
     """`2x1.5` to its sides in m."""
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)x(\d+(?:\.\d+)?)", text)
+    found = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)x([0-9]+(?:\.[0-9]+)?)", text)
     if not found:
         raise ValueError(
             f"--floor-m {text}: is no floor; give its length and width in m as in 2x1.5."

@@ -114,7 +114,7 @@ def parse_numbers(option: str, text: str, allowed: range) -> list[int]:
     """
     numbers: set[int] = set()
     for part in text.split(","):
-        found = re.fullmatch(r"\s*(\d{1,4})\s*(?:-\s*(\d{1,4})\s*)?", part)
+        found = re.fullmatch(r" *([0-9]{1,4}) *(?:- *([0-9]{1,4}) *)?", part)
         if not found or (found[2] and int(found[2]) < int(found[1])):
             raise ValueError(f"{option} {text}: must be numbers and ranges, as 1-8,12.")
         numbers |= set(range(int(found[1]), int(found[2] or found[1]) + 1))

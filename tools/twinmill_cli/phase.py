@@ -17,6 +17,7 @@ if working():  # not for --help
 
     from twinmill.counted import counted
     from twinmill.files import check_report
+    from twinmill.numbers_typed import typed_float
     from twinmill.report import Provenance, Section, write_report
     from twinmill.report.phase_figures import (
         map_figure,
@@ -125,7 +126,7 @@ def _place(texts: list[str], phase: Phase) -> dict[str, float]:
         try:
             if name not in known:
                 raise ValueError
-            place[name] = float(value)
+            place[name] = typed_float(value)
         except ValueError:
             raise ValueError(
                 f"--at '{text}': write name=value with an axis beyond the first two: "

@@ -16,6 +16,7 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     from twinmill.files import check_new_file, replacing
     from twinmill.model.set_values import with_values
+    from twinmill.numbers_typed import typed_float
     from twinmill_cli.frame import command_line, open_model
 
 
@@ -61,6 +62,6 @@ def _set(
 def _parsed(word: str) -> tuple[str, float]:
     name, _, value = word.partition("=")
     try:
-        return name, float(value)
+        return name, typed_float(value)
     except ValueError as error:
         raise ValueError(f"{word}: is not of the form NAME=VALUE with a number.") from error

@@ -278,6 +278,9 @@ def _select(
     check_bus(lcm_url, channel_prefix)
     with commanding("select", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
         asked = tell.find(fleet, asked)
+        busy = tell.find_busy(fleet, asked)
+        if busy:
+            say(f"{of_busy(busy)}.")
         command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
         return finish("select", given, of_select(given, behavior), {}, as_json=as_json)
@@ -330,6 +333,7 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         say(f"this computer has no network ({fleet.fault}).")
     heard = f"Heard: {names(fleet.robots)}." if robots else "No robot is heard."
     heard = Verdict(bool(robots), heard)
+    tell.ask_clocks(fleet, set(fleet.robots))
     odd = clocks(fleet, fleet.robots)
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import errno
+import math
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -15,11 +16,14 @@ from twinmill_cli.output import say
 
 if working():  # not for --help
     from twinmill.arguments import option
-    from twinmill.data.bus import check_url
+    from twinmill.data.bus import CHANNEL_MAX, check_url
+    from twinmill.numbers_typed import typed_int
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.key import load, of_operator
-    from twinmill_cli.swarm_verdict import of_clocks
+    from twinmill_cli.swarm_verdict import of_clocks, of_late
+
+    PREFIX_MAX = CHANNEL_MAX - len("R00_SIGNED_ACK")  # the longest of robots' channels
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -54,7 +58,7 @@ def parse_robots(text: str | None) -> set[int]:
     if text is None:
         return set()
     try:
-        robots = [int(word) for word in text.split(",")]
+        robots = [typed_int(word) for word in text.split(",")]
     except ValueError:
         robots = []
     if not robots or not set(robots) <= set(range(100)):
@@ -75,14 +79,30 @@ def check_bus(lcm_url: str, channel_prefix: str | None) -> None:
 
     The latter is what an unset variable of a script leaves, and would command real robots.
     """
-    try:
-        check_url(lcm_url)
-    except RuntimeError as error:
-        raise typer.BadParameter(f"{error}.", param_hint="'--lcm-url'") from error
+    check_network(lcm_url)
     if channel_prefix == "":
         raise typer.BadParameter(
             "is empty, and robots without a prefix would be commanded; leave it out if they are "
             "meant.",
+            param_hint="'--channel-prefix'",
+        )
+    check_prefix(channel_prefix or "")
+
+
+def check_network(lcm_url: str) -> None:
+    """Raises typer.BadParameter if no bus has such a URL."""
+    try:
+        check_url(lcm_url)
+    except RuntimeError as error:
+        raise typer.BadParameter(f"{error}.", param_hint="'--lcm-url'") from error
+
+
+def check_prefix(prefix: str) -> None:
+    """Raises typer.BadParameter if no channel of LCM can begin so."""
+    if not (prefix.isascii() and prefix.isprintable() and len(prefix) <= PREFIX_MAX):
+        raise typer.BadParameter(
+            f"{prefix}: must be at most {PREFIX_MAX} printable ASCII characters, as TWIN_; type "
+            "it anew.",
             param_hint="'--channel-prefix'",
         )
 
@@ -192,9 +212,23 @@ def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: 
     Raises:
         ValueError: they could not all have begun soon after the instant.
     """
-    clocks_s = {i: fleet.robots[i].clock_s for i in sorted(robots & set(fleet.robots))}
+    tell.ask_clocks(fleet, robots)
+    known = [fleet.robots[i] for i in sorted(robots & set(fleet.robots))]
+    clocks_s = {robot.robot_id: robot.clock_s for robot in known}
     told = of_clocks({f"R{i:02d}": s for i, s in clocks_s.items()}, ahead_s)
     if any(abs(s) > tell.BEGUN_S for s in clocks_s.values()) and not may_differ:
         raise ValueError(f"nothing was started: {told}; --partial starts those that do not refuse.")
-    if told:
-        say(f"{told}.")
+    late = of_late(known)
+    needs_s = tell.CALL_OFF_S + max((r.round_trip_s for r in known if r.has_answered), default=0.0)
+    if late and needs_s > ahead_s and not may_differ:
+        raise ValueError(
+            f"nothing was started: {late} So long an answer to a start takes: "
+            f"--in-s {math.ceil(2 * needs_s)} leaves time for it."
+        )
+    if any(r.late_s > tell.BEGUN_S for r in known) and not may_differ:
+        raise ValueError(
+            f"nothing was started: {late} That all drive is to be known {tell.BEGUN_S:g} s after "
+            "the instant; --partial starts those that do not refuse."
+        )
+    for words in filter(None, [f"{told}." if told else "", late]):
+        say(words)

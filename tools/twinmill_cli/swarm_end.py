@@ -11,7 +11,7 @@ from twinmill.robots.tell import DRIVING
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_screen import answer_table
-from twinmill_cli.swarm_verdict import of_clocks_now
+from twinmill_cli.swarm_verdict import of_clocks_now, of_late
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -28,9 +28,10 @@ def driving(fleet: Fleet, asked: set[int]) -> list[str]:
 
 
 def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
-    """Sentence on clocks of some robots that are odd now; empty if none is."""
+    """Sentences on clocks of some robots that are odd now, and on a late network; may be empty."""
     known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
-    return of_clocks_now({f"R{r.robot_id:02d}": r.clock_s for r in known})
+    odd = of_clocks_now({f"R{r.robot_id:02d}": r.clock_s for r in known})
+    return " ".join(filter(None, [odd, of_late(known)]))
 
 
 def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_json: bool) -> int:

@@ -10,9 +10,8 @@ from rich.table import Table
 from rich.text import Text
 
 from twinmill.robots.fleet import GONE_S, Robot
-from twinmill.robots.tell import Answer
+from twinmill.robots.tell import CLOCK_WARN_S, Answer
 from twinmill.terminal import Fitting
-from twinmill_cli.swarm_verdict import CLOCK_WARN_S
 
 
 def answer_table(given: list[Answer]) -> Fitting:
@@ -64,15 +63,25 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
             _battery(robot.telemetry),
             Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
             _sees(robot),
-            Text(
-                f"{round(robot.clock_s, 2) + 0:+.2f} s",
-                "red" if abs(robot.clock_s) > CLOCK_WARN_S else "",
-            ),
+            _clock(robot),
             Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
             _link(robot) if has_key else Text("not checked: no key"),
-            Text("; ".join(robot.alarms), "bold red"),
+            Text("; ".join([*robot.alarms, *_late(robot)]), "bold red"),
         )
     return Fitting(table)
+
+
+def _clock(robot: Robot) -> Text:
+    """How far it is ahead, a question mark where that may be the network's delay."""
+    if robot.late_s > CLOCK_WARN_S and not robot.has_answered:
+        return Text(f"{-robot.late_s:+.2f} s?", "red")
+    is_odd = abs(robot.clock_s) > CLOCK_WARN_S
+    return Text(f"{round(robot.clock_s, 2) + 0:+.2f} s", "red" if is_odd else "")
+
+
+def _late(robot: Robot) -> list[str]:
+    is_late = robot.late_s > CLOCK_WARN_S and robot.has_answered
+    return [f"network {robot.late_s:.2f} s late"] if is_late else []
 
 
 def _link(robot: Robot) -> Text:

@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from twinmill.defaults import URL
+from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill_cli.output import print_object, say
 
 if TYPE_CHECKING:
@@ -152,7 +153,7 @@ def saying_nothing() -> Iterator[Callable[[str], None]]:
     def say_if_heard(sentence: str) -> None:
         with suppress(OSError):
             if select.select([], [kept], [], 0)[1]:
-                os.write(kept, f"twinmill: {sentence}\n".encode())
+                os.write(kept, f"twinmill: {plain_line(sentence, MESSAGE_MAX)}\n".encode())
 
     try:
         yield say_if_heard

@@ -21,7 +21,8 @@ from twinmill_cli.swarm_door import (
     BusPrefix,
     KeyThere,
     Robots,
-    check_bus,
+    check_network,
+    check_prefix,
     key_if_there,
     names,
     parse_robots,
@@ -139,17 +140,18 @@ def stop(
     """
     voice = Voice()
     with counting_signals() as signals:
-        asked, misread = _selected(robots, context.meta.get(MISREAD, ""))
         with _refusing():
-            check_bus(lcm_url, channel_prefix or None)
-        operator_key, fault = key_if_there(key)
+            check_network(lcm_url)
+        asked, prefix, misread = _read(robots, channel_prefix or "", context.meta.get(MISREAD, ""))
         with saying_nothing() as say:
+            connect = partial(open_bus, needs_network=False)
+            fleet = Fleet(lcm_url, prefix, connect)
+            begin_s = time.monotonic()
+            tell.say_stop(fleet, asked)  # before the disk or a name server is asked for anything
+            fleet.key, fault = key_if_there(key)
             for words in filter(None, [misread, fault]):
                 say(words)
             hosts = tell.Hosts(host or ())
-            connect = partial(open_bus, needs_network=False)
-            fleet = Fleet(lcm_url, channel_prefix or "", connect, operator_key)
-            begin_s = time.monotonic()
             given = tell.stop(
                 fleet,
                 asked,
@@ -184,13 +186,22 @@ def stop(
     return code
 
 
-def _selected(robots: str | None, misread: str) -> tuple[set[int], str]:
-    """The robots to stop, all where something could not be read, and then a sentence on it."""
+def _read(robots: str | None, prefix: str, misread: str) -> tuple[set[int], str, str]:
+    """The robots to stop and their channels' prefix.
+
+    All, and none, where something could not be read; then there is a sentence on it.
+    """
+    asked: set[int] = set()
+    try:
+        check_prefix(prefix)
+    except typer.BadParameter as error:
+        prefix, misread = "", _sentence(error)
     try:
         asked = parse_robots(robots)
     except typer.BadParameter as error:
-        asked, misread = set(), _sentence(error)
-    return asked, f"{misread} So all robots are told to stop." if misread else ""
+        misread = _sentence(error)
+    asked = set() if misread else asked
+    return asked, prefix, f"{misread} So all robots are told to stop." if misread else ""
 
 
 def _ends_a_stop(signals: Sequence[int]) -> bool:

@@ -9,11 +9,13 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from twinmill.data.bus import Reach
+from twinmill.foreign_text import printable
 from twinmill.robots.countdown import STOPPED
 from twinmill.robots.fleet import DRY_RUN, Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
     AHEAD_S,
+    CLOCK_WARN_S,
     DRIVING,
     LATE_S,
     NEVER_HEARD,
@@ -27,7 +29,6 @@ from twinmill_cli import exit_now
 from twinmill_cli.swarm_signals import BY_KEY
 
 BY_HAND = "SWITCH OFF BY HAND what still drives."
-CLOCK_WARN_S = 0.05
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 
 
@@ -44,6 +45,10 @@ class Verdict:
     ok: bool
     sentence: str
     ends_well: bool = False
+
+    def __post_init__(self) -> None:
+        """Names of files and hosts, which a sentence quotes, may be no text."""
+        object.__setattr__(self, "sentence", printable(self.sentence))
 
     @property
     def code(self) -> int:
@@ -259,6 +264,17 @@ def of_clocks_now(clock_s: dict[str, float]) -> str:
     return f"{odd[0].upper()}{odd[1:]}." if odd else ""
 
 
+def of_late(robots: Iterable[Robot]) -> str:
+    """Sentence on whose words come late; empty if nobody's do."""
+    late = [r for r in robots if r.late_s > CLOCK_WARN_S]
+    if not late:
+        return ""
+    each = ", ".join(f"{r.late_s:.2f} s from R{r.robot_id:02d}" for r in late)
+    if all(r.has_answered for r in late):
+        return f"The network is late, as answers show: what is said takes {each}."
+    return f"What is said comes late, {each}: the network is late, or a clock is behind (NTP)."
+
+
 def _off_clocks(clock_s: dict[str, float]) -> dict[str, float]:
     return {name: s for name, s in clock_s.items() if abs(s) > CLOCK_WARN_S}
 
@@ -303,6 +319,10 @@ def of_select(given: list[Answer], behavior: str) -> Verdict:
     wrong = _wrong(given)
     if wrong:
         return Verdict(False, f"Not all did: {wrong}{_hint(given)}.")
+    waiting = [a for a in given if a.reason]
+    if waiting:
+        words = f"{_names(waiting)} will not play {behavior}{_because(waiting)}"
+        return Verdict(False, f"All chose {behavior}, but {words}.")
     return Verdict(True, f"All chose {behavior}.")
 
 

@@ -201,7 +201,7 @@ def _settings(found: dict[str, Fitted]) -> dict[str, int | str]:
 
 
 def _parse_size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d+)x(\d+)", text)
+    found = re.fullmatch(r"([0-9]+)x([0-9]+)", text)
     if not found or int(found[1]) % 2 or 0 in (int(found[1]), int(found[2])):
         raise ValueError(f"--size {text}: must be WIDTHxHEIGHT with an even width, as 640x480.")
     return int(found[1]), int(found[2])

@@ -27,6 +27,7 @@ if working():  # not for --help
     from twinmill.data.bus import open_bus
     from twinmill.data.importers.plain import Columns, read_commands, read_poses
     from twinmill.files import check_new_file
+    from twinmill.numbers_typed import typed_float, typed_int
     from twinmill.terminal import Fitting, PlainConsole, progress_bar
     from twinmill.track.align import align
     from twinmill.track.boards import Board
@@ -505,7 +506,11 @@ def _board(kind: str, squares: str, square_m: float) -> Board:
     across, _, down = squares.partition("x")
     if kind not in ("charuco", "checkerboard"):
         raise ValueError(f"--board {kind}: must be charuco or checkerboard.")
-    if not (across.isdigit() and down.isdigit() and min(int(across), int(down)) >= 4):
+    try:
+        fits = min(typed_int(across), typed_int(down)) >= 4
+    except ValueError:
+        fits = False
+    if not fits:
         raise ValueError(f"--squares {squares}: must be as 7x5, at least 4 each way.")
     if kind == "charuco" and int(across) * int(down) > 200:
         raise ValueError(f"--squares {squares}: a ChArUco board has at most 200 here.")
@@ -570,7 +575,7 @@ def _check(
 
 def _marks_m(text: str) -> list[float]:
     try:
-        marks_m = [1e-3 * float(word) for word in text.split(",")]
+        marks_m = [1e-3 * typed_float(word) for word in text.split(",")]
     except ValueError:
         marks_m = []
     if len(marks_m) < 2 or not all(0 < b - a < 100 for a, b in pairwise(marks_m)):

@@ -10,6 +10,8 @@ from typing import Any
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
 
+from twinmill.numbers_typed import REAL
+
 OF_PYDANTIC = "Input should be "  # how its messages on a value begin
 
 _display_type = TyperOption.display_type_rich
@@ -56,6 +58,7 @@ class _Word:
         return [self.kind(one) for one in value] if many else self.kind(value)
 
 
+NUMBERS = {int: "integer", float: "number", list[int]: "integer", list[float]: "number"}
 # By the annotation, as Typer tells it; of `bool` are flags alone.
 WORDS = {bool: bool, str: str, Path: Path, list[str]: str, list[Path]: Path}
 
@@ -71,12 +74,14 @@ def _without_pydantic(param: TyperOption | TyperArgument) -> None:
 def _given(argument: TyperArgument, ctx: typer.Context, value: Any) -> Any:
     """Typer's, but without pydantic where that is not needed."""
     _without_pydantic(argument)
+    _refuse_misread(argument, ctx, value)
     return _argument_value(argument, ctx, value)
 
 
 def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
     """Typer's, but NaN and infinity are refused as such: NaN passes some ranges, and no others."""
     _without_pydantic(option)
+    _refuse_misread(option, ctx, value)
     try:
         found = _process_value(option, ctx, value)
     except typer.BadParameter as error:
@@ -85,6 +90,18 @@ def _finite(option: TyperOption, ctx: typer.Context, value: Any) -> Any:
         raise
     _refuse_odd(option, ctx, _each(found), value)
     return found
+
+
+def _refuse_misread(param: TyperOption | TyperArgument, ctx: typer.Context, value: Any) -> None:
+    """Raises typer.BadParameter for 1_2 and the like, which pydantic takes for a number."""
+    kind = NUMBERS.get(param.type_descriptor.annotation)
+    for text in _each(value) if kind else ():
+        if not isinstance(text, str) or REAL.fullmatch(text):
+            continue
+        number = _as_number(text)
+        if not text.isascii() or (isinstance(number, float) and math.isfinite(number)):
+            why = f"{text}: must be a valid {kind}; give another value."
+            raise typer.BadParameter(why, ctx=ctx, param=param)
 
 
 def _quoting(message: str, value: Any) -> str:

@@ -65,7 +65,7 @@ void Publisher::PublishDecisions(const Swarm &swarm)
     }
     for (int id = 0; id < swarm.Size(); ++id)
     {
-        if (run_due)
+        if (run_due || members_[static_cast<size_t>(id)].run_due)
             PublishRun(id, swarm.UtimeUs());
         PublishTelemetry(id, swarm);
         if (members_[static_cast<size_t>(id)].base.drive != Drive::kDuty)
@@ -75,7 +75,8 @@ void Publisher::PublishDecisions(const Swarm &swarm)
 
 void Publisher::PublishRun(int id, int64_t utime_us)
 {
-    const Member &member = members_[static_cast<size_t>(id)];
+    Member &member = members_[static_cast<size_t>(id)];
+    member.run_due = false;
     turbopi::run_t run;
     run.utime_us = utime_us;
     run.robot_id = id;

@@ -32,10 +32,12 @@ public:
               std::vector<Robot> robots, const std::string &channel_prefix, double pose_rate_hz,
               uint64_t seed);
 
-    // What R<nn>_RUN says from now on.
+    // What R<nn>_RUN says from now on, at the next step first.
     void SetBehavior(int robot, const std::string &name)
     {
-        members_[static_cast<size_t>(robot)].robot.behavior = name;
+        Member &member = members_[static_cast<size_t>(robot)];
+        member.run_due = member.run_due || member.robot.behavior != name;
+        member.robot.behavior = name;
     }
 
     // What was published of poses, newest ones.
@@ -60,6 +62,7 @@ private:
         Random random;
         RobotState last;
         std::string telemetry, drive, pose, run, truth;  // channels
+        bool run_due = false;                            // before the others
     };
     void PublishRun(int id, int64_t utime_us);
     void PublishTelemetry(int id, const Swarm &swarm);

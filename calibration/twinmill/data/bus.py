@@ -59,6 +59,8 @@ def open_bus(url: str, *, needs_network: bool = True) -> Any:
 def check_url(url: str) -> None:
     """Raises RuntimeError if no bus has such a URL; whether it can be joined is not asked."""
     kind = urlsplit(url).scheme
+    if not url.isprintable():
+        raise RuntimeError(f"{url}: has characters that no URL has")
     if url and kind not in KINDS:
         raise RuntimeError(f"{url}: begins with none of {', '.join(f'{k}://' for k in KINDS)}")
     if kind == "udpm":

@@ -4,8 +4,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from twinmill.joints.action import Action
 from twinmill.joints.effects.effect import plain
-from twinmill.joints.plant import Action, Plant
+from twinmill.joints.plant import Plant
 
 ARRAYS = {"damping": "dof_damping", "frictionloss": "dof_frictionloss", "armature": "dof_armature"}
 

@@ -16,6 +16,7 @@ from twinmill.joints.effects.effect import plain
 from twinmill.joints.plant import Plant
 
 NODES = 7  # of a curve
+FAST = 10  # steps of the quickest wave over time: it has five either way
 TURNED = 0.1  # of a joint's reach, over which what a reversal leaves fades
 
 Form = tuple[str, np.ndarray, np.ndarray | float]
@@ -118,6 +119,9 @@ def _of_time(plant: Plant, d: int) -> Iterator[Form]:
         if np.any(torque):
             yield f"{name} gain", torque * w, share
         yield f"{name} friction", load * sign * w, share
+    fast_s = FAST * float(plant.series.step_s[0])
+    w, share = waves(plant.series.t_s, fast_s, fast_s / 2)
+    yield "fast force", load * w, share
 
 
 def _of_position(plant: Plant, d: int) -> Iterator[Form]:
@@ -177,6 +181,16 @@ def _of_others(plant: Plant, d: int) -> Iterator[Form]:
         force = [load * usual.torque[:, k] / usual.load[k] for k in others]
         place = [load * 2 * (s.q[:, k] - s.q[:, k].mean()) / usual.reach[k] for k in others]
         yield "linear", np.array([*speed, *force, *place]), 1 / (3 * len(others))
+        curves = [load * usual.sign(s.v, k) * _hats(np.abs(s.v[:, k])) for k in others]
+        yield "by speed", np.concatenate(curves), 1 / len(others)
+        bent = np.concatenate([_hats(s.q[:, k] - s.q[:, k].min()) for k in others])
+        yield "by position", load * bent, 1 / len(others)
+        yield "friction by position", load * usual.sign(s.v, d) * bent, 1 / len(others)
+
+
+def _hats(values: np.ndarray) -> np.ndarray:
+    """(K, n) of a curve over all that values reach."""
+    return hats(values, float(values.max()), NODES)
 
 
 def _way_since_back(q: np.ndarray, v: np.ndarray) -> np.ndarray:

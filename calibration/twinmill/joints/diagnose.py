@@ -12,12 +12,13 @@ from twinmill.inference.answer import Answer, answer
 from twinmill.inference.search import Evidence, Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
+from twinmill.joints.always import Always, always_of
 from twinmill.joints.checks import check_units, warnings_of
 from twinmill.joints.files import read_joint_log
 from twinmill.joints.log import JointLog, joined
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.plant import Plant
-from twinmill.joints.problem import JointProblem, problem_of
+from twinmill.joints.problem import JointProblem, begun, problem_of
 from twinmill.joints.series import Series, series_of
 
 Logs = JointLog | Path | str | Sequence[JointLog | Path | str]
@@ -32,12 +33,14 @@ class JointDiagnosis:
         problem: that was solved.
         fitted: sets of effects that were fitted.
         warnings: what is odd about the log, in sentences.
+        always: what the model lacks in its own log, too; None where that is not known.
     """
 
     answer: Answer
     problem: JointProblem
     fitted: Mapping[tuple[str, ...], Evidence]
     warnings: tuple[str, ...]
+    always: Always | None = None
 
     @property
     def mjcf(self) -> Mjcf:
@@ -59,6 +62,7 @@ class JointDiagnosis:
             "joints": list(self.mjcf.joints),
             "actuators": list(self.mjcf.actuators),
             "warnings": list(self.warnings),
+            "always": list(self.always.effects) if self.always else [],
             "settings": {name: value for name, value, _ in PRIORS.listed()},
         }
 
@@ -67,6 +71,8 @@ def diagnose_joints(
     log: Logs,
     model: Mjcf | Path | str,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    own: Logs | None = None,
 ) -> JointDiagnosis:
     """Probabilities of what an MJCF lacks, from a log of its joints and commands.
 
@@ -74,17 +80,41 @@ def diagnose_joints(
         log: arrays, or a file of them; or several of one machine, which are judged together.
         model: opened, or its path.
         progress: told in words what is being done.
+        own: log, or several, that the model was made with: what it lacks there, too, is no news.
 
     Raises:
-        LogError: the log does not fit the model, or cannot be read.
+        LogError: a log does not fit the model, or cannot be read.
         ModelError: the model cannot be loaded, or is of a kind that is not judged.
     """
     mjcf = model if isinstance(model, Mjcf) else Mjcf.load(model)
+    before = None
+    if own:
+        progress("what the model lacks in its own log")
+        before = always_of(_searched(plant_of(own, mjcf)[0], None, progress))
     plant, warnings = plant_of(log, mjcf)
     progress("what the model predicts")
-    problem = problem_of(plant)
-    search = Search(problem, progress).run()
-    return JointDiagnosis(answer(table_of(search)), problem, search.fitted, warnings)
+    search = _searched(plant, before, progress)
+    assert isinstance(search.problem, JointProblem)
+    found = answer(table_of(search))
+    return JointDiagnosis(found, search.problem, search.fitted, warnings, before)
+
+
+def _searched(plant: Plant, always: Always | None, progress: Callable[[str], None]) -> Search:
+    """A search in a run of the model, then in one with what that found, if it is nearer."""
+    model = None
+    if always and always.effects:
+        _, model, _ = begun(plant, always)
+        plant = plant.about(model.act)
+    search = Search(problem_of(plant, model, always), progress).run()
+    (likely, *_) = search.likely()
+    if not likely:
+        return search
+    model = search.fitted[likely].hypothesis.model
+    nearer = plant.about(model.act)
+    if nearer.is_farther_than(plant):
+        return search
+    progress("again, from a run with what was found")
+    return Search(problem_of(nearer, model, always), progress).run()
 
 
 def plant_of(logs: Logs, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
@@ -94,7 +124,7 @@ def plant_of(logs: Logs, mjcf: Mjcf) -> tuple[Plant, tuple[str, ...]]:
     log = joined([one.ordered(mjcf.joints, mjcf.actuators) for one in each])
     check_units(log, mjcf)
     series = series_of(log)
-    return Plant(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
+    return Plant.of(mjcf, series), (*warnings_of(log, mjcf), *_of_speeds(log, series, mjcf))
 
 
 def _of_speeds(log: JointLog, series: Series, mjcf: Mjcf) -> list[str]:

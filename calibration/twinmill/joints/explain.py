@@ -13,10 +13,10 @@ import mujoco
 import numpy as np
 
 from twinmill.inference.answer import Named
+from twinmill.joints.action import Action
 from twinmill.joints.diagnose import JointDiagnosis, Logs, diagnose_joints
 from twinmill.joints.effects.effect import Effect
 from twinmill.joints.mjcf import INERTIAL, Edit, Mjcf
-from twinmill.joints.plant import Action
 from twinmill.model.model_file import ModelError
 
 DIGITS = 6

@@ -131,7 +131,7 @@ def next_joints(
         progress(f"motion {seed + 1} of {TRIED}")
         runs.append(one := motion(mjcf, stock, limits, begin, t_s=t_s, seed=seed))
         if not one.exceeds:
-            odds = asked.odds(Plant(mjcf, series_of(one.log)), pairs)
+            odds = asked.odds(Plant.of(mjcf, series_of(one.log)), pairs)
             left = sum(1 - sure(o) for o in odds.values())
             if best is None or left < best[0]:
                 best = left, one, odds

@@ -5,20 +5,21 @@ A candidate changes MuJoCo's own numbers, a command, a measured state, or adds a
 changes of momentum, so that a friction of one joint shows in its channel alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import mujoco
 import numpy as np
 from mujoco import rollout
-from scipy.signal import lfilter
 
 from twinmill.inference.settings import PRIORS
+from twinmill.joints.action import Action, Usual
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.series import Series
+from twinmill.joints.states import Run, with_run
 from twinmill.model.parameters import effect_names, instance_of, key_of
 
 CLOCK = "clock.offset_s"  # by which positions are stamped later than commands
@@ -27,75 +28,13 @@ INPUT = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APP
 NEUTRAL = {CLOCK: 0.0}  # numbers of the base that are no factors
 SHARE = 0.1  # default strength of what adds to a force or scales a number: a tenth
 SMALL = 0.05  # of a number or its default, by which a column is found: it is linear
-SLOW = 0.02  # of a joint's usual speed, below which its direction is soft
 CLOCK_NUDGE_S = 1e-3
 KEPT = 200  # predictions that are kept, since searches ask for them again
 HELD = 0.98  # share of a push that a joint takes, below which friction holds it
 NUDGE = 1e-3  # of a joint's usual force, by which it is pushed to see whether it gives way
 
 
-@dataclass
-class Action:
-    """Inputs of MuJoCo, for effects to change.
-
-    Attributes:
-        series: of the log.
-        usual: forces and velocities of the base, see `Usual`; None while these are looked for.
-        model: MuJoCo's.
-        q, v: (n, J) measured states.
-        late_s, lag_s: (U,) of commands.
-        shapes: actuator, and what becomes of its command (n,), in turn.
-        force: (n, J) forces of effects.
-    """
-
-    series: Series
-    usual: "Usual | None"
-    model: Any
-    q: np.ndarray
-    v: np.ndarray
-    late_s: np.ndarray
-    lag_s: np.ndarray
-    shapes: list[tuple[int, Any]]
-    force: np.ndarray
-
-    def commands(self) -> np.ndarray:
-        """(n, U) commands once they are late, slow and shaped."""
-        ctrl = self.series.commands(self.late_s)
-        for a, lag_s in enumerate(self.lag_s):
-            if lag_s > 0:
-                for run in self.series.runs:
-                    ctrl[run, a] = _lagged(ctrl[run, a], lag_s, self.series.width_s[0])
-        for a, shape in self.shapes:
-            ctrl[:, a] = shape(ctrl[:, a])
-        return ctrl
-
-
-@dataclass(frozen=True)
-class Usual:
-    """Motion and forces of the base in a log.
-
-    Attributes:
-        torque: (n, J) forces of its actuators.
-        load: (J,) root mean square of the force on each joint.
-        speed, reach: (J,) root mean square velocity, and range of positions.
-        command: (U,) root mean square command, about a servo's position.
-        gives: (n, J) momentum that a joint takes from a small force: 0 where friction holds it.
-        slides: (W, J) 1 for steps in which a joint neither turns back nor is held by friction, were
-            that more by an effect of usual size; 0 for others, which say nothing: friction is
-            anything up to its limit there.
-    """
-
-    torque: np.ndarray
-    load: np.ndarray
-    speed: np.ndarray
-    reach: np.ndarray
-    command: np.ndarray
-    gives: np.ndarray
-    slides: np.ndarray
-
-    def sign(self, v: np.ndarray, d: int) -> np.ndarray:
-        """(n,) direction of a joint's motion, soft near standstill."""
-        return np.tanh(v[:, d] / (SLOW * self.speed[d]))
+Act = Callable[[Action], None]
 
 
 class JointModel:
@@ -124,9 +63,10 @@ class JointModel:
 
     def remove_effect(self, index: int) -> None:
         """Takes the effect at that place out."""
+        instance = effect_names(self)[index]  # type: ignore[arg-type]
         name = self.effects.pop(index)
         for p in self.catalogue[name].parameters:
-            del self._numbers[f"{name}.{p.key}"]
+            del self._numbers[f"{instance}.{p.key}"]
 
     def get(self, name: str) -> float:
         """One number."""
@@ -135,6 +75,22 @@ class JointModel:
     def set(self, name: str, value: float) -> None:
         """Changes one number."""
         self._numbers[name] = value
+
+    def of(self, catalogue: Mapping[str, Any]) -> "JointModel":
+        """With its numbers, and the effects of a catalogue."""
+        other = self.copy()
+        other.catalogue = catalogue
+        return other
+
+    def act(self, action: Action) -> None:
+        """Changes MuJoCo's inputs by all of its numbers and effects."""
+        action.late_s += self.get(CLOCK)
+        for name in self._numbers:
+            if instance_of(name) == "base":
+                self.catalogue[name].act(action, {"value": self.get(name)})
+        for instance in effect_names(self):  # type: ignore[arg-type]
+            own = {key_of(n): v for n, v in self.own(instance).items()}
+            self.catalogue[instance.split("#")[0]].act(action, own)
 
     def own(self, instance: str, other: Mapping[str, float] | None = None) -> dict[str, float]:
         """Numbers of an effect, those of another mapping in their place."""
@@ -148,24 +104,45 @@ class Plant:
 
     Attributes:
         mjcf: the model.
-        series: of the log.
+        series: of the log, its states those by the run.
+        run: of the model by the log's commands; None as it is made.
+        act: makes that model of the base.
     """
 
     mjcf: Mjcf
     series: Series
+    run: Run | None = None
+    act: Act = field(default=lambda _: None, repr=False)
+
+    @classmethod
+    def of(cls, mjcf: Mjcf, series: Series) -> "Plant":
+        """Runs the model by the commands of a log."""
+        return cls(mjcf, series).about(lambda _: None)
+
+    def about(self, act: Act) -> "Plant":
+        """With the states of a run of the base once it is changed."""
+        action = self.begin()
+        act(action)
+        return Plant(self.mjcf, *with_run(action, self.mjcf), act)
+
+    def is_farther_than(self, other: "Plant") -> bool:
+        """True if the run of this model is farther from some joint's log than another's."""
+        assert self.run is not None and other.run is not None
+        return not np.all(self.run.far <= other.run.far)
 
     def begin(self, usual: Usual | None = None) -> Action:
         """The base as it stands."""
+        s = self.series
         return Action(
-            self.series,
+            s,
             usual,
             copy(self.mjcf.model),
-            self.series.q.copy(),
-            self.series.v.copy(),
+            s.q.copy(),
+            s.v.copy(),
             self.mjcf.delay_s.copy(),
             self.mjcf.lag_s.copy(),
             [],
-            np.zeros_like(self.series.q),
+            np.zeros_like(s.q),
         )
 
     def accelerations(self, action: Action) -> np.ndarray:
@@ -179,6 +156,22 @@ class Plant:
         after, _ = rollout.rollout(action.model, data, state, given, control_spec=INPUT, nstep=1)
         gained = after[:, 0, 1 + count : 1 + 2 * count] - action.v
         return gained / float(action.model.opt.timestep)
+
+    def errors(self, action: Action) -> np.ndarray:
+        """(W, J) momentum that is measured, less that of the model that was run.
+
+        What it does between its states is known of the run alone: the rest is how its forces differ
+        where the robot is elsewhere.
+
+        Args:
+            action: that model in the states of the series.
+        """
+        assert self.run is not None
+        s = self.series
+        seen = replace(action, q=action.q + s.seen_q - s.q, v=action.v + s.seen_v - s.v)
+        elsewhere = self.accelerations(seen) - self.accelerations(self.run.action)
+        between = s.weights @ elsewhere + self.run.changes
+        return np.einsum("wij,wj->wi", self.inertia, s.changes - between)
 
     def momenta(self, accelerations: np.ndarray) -> np.ndarray:
         """(W, J) momentum of each joint that is measured, less that of these accelerations."""
@@ -206,16 +199,17 @@ class Plant:
     def usual(self) -> Usual:
         """Motion and forces of the base, from one look at each state."""
         action, s = self.begin(), self.series
+        self.act(action)
         model, data, ctrl = action.model, mujoco.MjData(action.model), action.commands()
         torque, inertial = np.empty_like(s.q), np.empty_like(s.q)
         for k in range(len(s.q)):
-            data.qpos[:], data.qvel[:], data.ctrl[:] = s.q[k], s.v[k], ctrl[k]
+            data.qpos[:], data.qvel[:], data.ctrl[:] = action.q[k], s.v[k], ctrl[k]
             mujoco.mj_forward(model, data)
             torque[k] = data.qfrc_actuator
             inertial[k] = data.qfrc_bias
         load = np.sqrt((torque**2).mean(axis=0))
         load = np.where(load > 0, load, np.sqrt((inertial**2).mean(axis=0)))
-        lead = ctrl - np.where(self.mjcf.servo, s.q[:, self.mjcf.moves], 0.0)
+        lead = ctrl - np.where(self.mjcf.servo, action.q[:, self.mjcf.moves], 0.0)
         speed = np.sqrt((s.v**2).mean(axis=0))
         return Usual(
             torque,
@@ -272,8 +266,15 @@ class Steps:
         observed: (J,) all joints are.
     """
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: Plant, about: JointModel | None = None) -> None:
+        """Prepares a log.
+
+        Args:
+            plant: MuJoCo at its states.
+            about: the model that was run there; None for the base.
+        """
         self.plant = plant
+        self.about = about
         self.block = plant.series.block
         self.observed = np.ones(plant.series.q.shape[1], bool)
         self._columns: dict[str, np.ndarray] = {}
@@ -292,6 +293,20 @@ class Steps:
         )
 
     def _errors(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
+        return self._given + self._change(model, other)
+
+    @cached_property
+    def _given(self) -> np.ndarray:
+        """(W, J) errors of the base."""
+        action = self.plant.begin(self.plant.usual)
+        if self.about is None:
+            return self.plant.errors(action) * self.plant.usual.slides
+        self.about.act(action)
+        own = self.plant.errors(action) * self.plant.usual.slides
+        return np.asarray(own - self._change(self.about, {}))
+
+    def _change(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
+        """(W, J) of the base's errors by numbers and effects."""
         found, forces = np.zeros((1, 1)), self.plant.begin(self.plant.usual)
         exact = []
         for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
@@ -307,13 +322,15 @@ class Steps:
                     found = found + value * self._column(model, f"{kind}.{key_of(n)}")
             else:
                 exact.append((kind, tuple((key_of(n), v) for n, v in own.items())))
-        found = found + self._exactly(model.catalogue, tuple(exact))
+        if exact:
+            found = found + self._exactly(model.catalogue, tuple(exact))
+            found = found - self._exactly(model.catalogue, ())
         if forces.force.any():
             found = found - self.plant.momentum_of(forces.force)
-        return np.asarray(found)
+        return np.broadcast_to(found, (len(self), len(self.observed)))
 
     def _exactly(self, catalogue: Mapping[str, Any], effects: tuple[Any, ...]) -> np.ndarray:
-        """(W, J) errors of the base with some effects."""
+        """(W, J) errors of the base with some effects, but for how states of the base were seen."""
         if effects not in self._known:
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)))
@@ -350,11 +367,3 @@ def _turns(v: np.ndarray) -> np.ndarray:
     change = np.diff(np.sign(v), axis=0) != 0
     none = np.zeros((1, v.shape[1]), bool)
     return np.asarray(np.concatenate([change, none]) | np.concatenate([none, change]))
-
-
-def _lagged(u: np.ndarray, lag_s: float, step_s: float) -> np.ndarray:
-    """Mean of a first-order lag's output over each of equal times, its input constant in each."""
-    kept = np.exp(-step_s / lag_s)
-    end, _ = lfilter([1 - kept], [1, -kept], u, zi=[kept * u[0]])
-    before = np.r_[u[0], end[:-1]]
-    return np.asarray(u + (before - u) * (lag_s / step_s) * (1 - kept))

@@ -14,6 +14,7 @@ from twinmill.inference.prior import Prior
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
 from twinmill.inference.settings import PRIORS
 from twinmill.joints import dependences
+from twinmill.joints.always import Always, with_always
 from twinmill.joints.base import base_numbers
 from twinmill.joints.effects import effects_of
 from twinmill.joints.effects.effect import Effect, Number
@@ -44,7 +45,7 @@ class JointProblem(Problem):
         """Columns of an effect of the catalogue beside a model."""
         model = model.copy()
         model.add_effect(name)
-        parameters = [_parameter(name, n) for n in self.effects[name].parameters]
+        parameters = parameters_of(self.effects[name])
         if any(p.role == "limit" for p in parameters):
             return with_limits(name, parameters, model, self.steps)
         on = np.array([p.usual for p in parameters])
@@ -59,19 +60,33 @@ class JointProblem(Problem):
         return dependences.moments(self.plant)
 
 
-def begun(plant: Plant) -> tuple[dict[str, Effect], JointModel, Prior]:
+def begun(
+    plant: Plant, always: Always | None = None
+) -> tuple[dict[str, Effect], JointModel, Prior]:
     """Effects that a robot may have in a log, its base's model, and what is known of that."""
     effects = effects_of(plant)
     base = {f"base.{key}": factor for key, factor in base_numbers(plant).items()}
     names = [CLOCK, *base]
     model = JointModel({**effects, **base}, {n: 0.0 if n == CLOCK else 1.0 for n in names})
-    return effects, model, _prior(names, plant)
+    prior = _prior(names, plant)
+    if always is not None:
+        own = [p for name in always.effects for p in parameters_of(effects[name])]
+        prior = with_always(model, prior, always, own)
+    return effects, model, prior
 
 
-def problem_of(plant: Plant) -> JointProblem:
-    """Prepares a log of a robot."""
-    effects, model, prior = begun(plant)
-    steps = Steps(plant)
+def problem_of(
+    plant: Plant, about: JointModel | None = None, always: Always | None = None
+) -> JointProblem:
+    """Prepares a log of a robot.
+
+    Args:
+        plant: MuJoCo at its states.
+        about: the model that was run there; None for the base.
+        always: what the model lacks in its own log, too; None where that is not known.
+    """
+    effects, model, prior = begun(plant, always)
+    steps = Steps(plant, about and about.of(model.catalogue))
     noise = _begin_noise(steps, model)
     fitted = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     kinds = Kinds({name: effect.words() for name, effect in effects.items()})
@@ -130,6 +145,11 @@ def _begin_noise(steps: Steps, model: JointModel) -> Noise:
     usual = np.array([float(np.median(own)) if len(own) else 0.0 for own in slid])
     each = np.maximum(usual / 0.6745, 1e-12) / 3  # of a normal variate
     return Noise(each / np.sqrt(2), each, each, np.full(len(each), 2 * s.step_s[0]), course)
+
+
+def parameters_of(effect: Effect) -> list[Parameter]:
+    """Numbers of an effect, as inference takes them."""
+    return [_parameter(effect.name, n) for n in effect.parameters]
 
 
 def _parameter(name: str, n: Number) -> Parameter:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from scipy.signal import lfilter
 from scipy.sparse import block_diag, csr_matrix
 
 from twinmill.data.lcm_log import LogError
@@ -33,7 +34,8 @@ class Series:
     Attributes:
         log: as recorded.
         t_s: (n,) times of states.
-        q, v: (n, J) positions and velocities of joints, from the positions of a step about each.
+        q, v: (n, J) positions and velocities of joints, for what depends on them.
+        seen_q, seen_v: the same from the positions of a step about each, for the base's prediction.
         width_s: (n,) time that a state stands for.
         mid_s, step_s: (W,) middle and length of each step.
         changes: (W, J) measured change of velocity.
@@ -48,6 +50,8 @@ class Series:
     t_s: np.ndarray
     q: np.ndarray
     v: np.ndarray
+    seen_q: np.ndarray
+    seen_v: np.ndarray
     width_s: np.ndarray
     mid_s: np.ndarray
     step_s: np.ndarray
@@ -102,12 +106,15 @@ def series_of(log: JointLog) -> Series:
     length_s = min(BLOCK_S, np.ptp(mid_s) / FEWEST_BLOCKS)
     t_s = np.concatenate([p.t_s for p in found])
     edges = [*np.searchsorted(t_s, log.t_s[[*log.begins]]), len(t_s)]
+    q, v = (np.concatenate([getattr(p, name) for p in found]) for name in ("q", "v"))
     held = np.diff(log.t_s)[:, None] * log.ctrl[:-1]
     return Series(
         log,
         t_s,
-        np.concatenate([p.q for p in found]),
-        np.concatenate([p.v for p in found]),
+        q,
+        v,
+        q,
+        v,
         np.full(first[-1], fine),
         mid_s,
         np.full(len(mid_s), step_s),
@@ -144,7 +151,7 @@ def _part(log: JointLog, part: slice, step_s: float, fine_s: float) -> _Part | N
     within = np.column_stack([edges_s - step_s / 2, edges_s + step_s / 2])
     slopes, before = zip(*(_edge(stamps, qpos, t_s, w) for w in within), strict=True)
     mid_s = (edges_s[1:] + edges_s[:-1]) / 2
-    q, v = _states(stamps, qpos, t_s, step_s)
+    q, v = smoothed(stamps, qpos, t_s, step_s)
     return _Part(
         t_s, q, v, mid_s, np.diff(slopes, axis=0), -np.diff(before, axis=0) * fine_s,
         np.searchsorted(t_s, mid_s),
@@ -165,19 +172,27 @@ def _edge(
     return pull @ qpos[low:high], np.interp(t_s, own, up_to, left=0.0, right=1.0)
 
 
-def _states(
-    stamps: np.ndarray, qpos: np.ndarray, t_s: np.ndarray, step_s: float
+def smoothed(
+    stamps: np.ndarray, qpos: np.ndarray, t_s: np.ndarray, width_s: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, J) positions and velocities at some times, by polynomials through a step's samples."""
-    count = min(int(np.round(step_s / np.median(np.diff(stamps)))) + 1, len(stamps))
+    """(n, J) positions and velocities at some times, by polynomials through samples about each."""
+    count = min(int(np.round(width_s / np.median(np.diff(stamps)))) + 1, len(stamps))
     first = np.clip(np.searchsorted(stamps, t_s) - count // 2, 0, len(stamps) - count)
     index = first[:, None] + np.arange(count)
-    away = (stamps[index] - t_s[:, None]) / step_s
+    away = (stamps[index] - t_s[:, None]) / width_s
     powers = away[:, :, None] ** np.arange(DEGREE + 1)
     gram = np.einsum("nik,nil->nkl", powers, powers)
     push = np.einsum("nik,nij->nkj", powers, qpos[index])
     found = np.linalg.solve(gram, push)
-    return found[:, 0], found[:, 1] / step_s
+    return found[:, 0], found[:, 1] / width_s
+
+
+def lagged(u: np.ndarray, lag_s: float, step_s: float) -> np.ndarray:
+    """Mean of a first-order lag's output over each of equal times, its input constant in each."""
+    kept = np.exp(-step_s / lag_s)
+    end, _ = lfilter([1 - kept], [1, -kept], u, zi=[kept * u[0]])
+    before = np.r_[u[0], end[:-1]]
+    return np.asarray(u + (before - u) * (lag_s / step_s) * (1 - kept))
 
 
 def _stacked(parts: list[np.ndarray]) -> csr_matrix:

@@ -11,7 +11,7 @@ from rich.text import Text
 from twinmill.joints.compare import WINDOW_S, JointComparison
 from twinmill.joints.diagnose import JointDiagnosis
 from twinmill.joints.explain import JointExplanation
-from twinmill.joints.importers.import_joints import Imported
+from twinmill.joints.importers.import_joints import ImportedJoints
 from twinmill.joints.next import Excitation, sure
 from twinmill.report import show
 from twinmill.report.inference import percent, sentence
@@ -25,6 +25,8 @@ def diagnosis(found: JointDiagnosis) -> RenderableType:
     """Text of `twinmill diagnose` of an MJCF."""
     answer = found.answer
     parts: list[RenderableType] = [Text(sentence(answer))]
+    if found.always and found.always.effects:
+        parts.append(Text(f"In its own log, too: {', '.join(found.always.effects)}."))
     if answer.findings:
         parts += [Text(), show.table(_effects(found))]
     named = {f.effect for f in answer.findings}
@@ -61,7 +63,7 @@ def explanation(found: JointExplanation, written: Mapping[str, str]) -> Renderab
     return Group(diagnosis(found.diagnosis), Text(), *map(Text, lines))
 
 
-def imported(found: Imported, path: Path) -> RenderableType:
+def imported(found: ImportedJoints, path: Path) -> RenderableType:
     """Text of `twinmill import joints`."""
     log, mjcf = found.log, found.mjcf
     rows = [

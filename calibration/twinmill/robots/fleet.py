@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What robots say on the LCM bus, and the one channel on which they are told."""
 
+import math
 import re
 import struct
 import time
@@ -9,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 import turbopi
 
@@ -20,6 +21,7 @@ from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
 
 BACKLOG_S = 0.02  # what waits is taken in for so long at once
+CLOCKS_PART = 1e-3  # two clocks that nobody sets, while NTP makes each 500 ppm faster or slower
 WINDOW_S = 2.0  # over which rates and detections are told
 RUN_PERIOD_S = 5.5  # robots say who they are every 5 s
 SIGNED_S = 2.0  # robots sign ten times a second; half of all lost, so many in a row are not
@@ -46,6 +48,8 @@ MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
 # Fields of text, which may be anybody's: most of these messages are not signed.
 TEXTS = {"source": NAME_MAX, "version": NAME_MAX, "behavior": NAME_MAX, "reason": LINE_MAX}
 SIGNED_COMMANDS, PLAIN_COMMANDS = "SWARM_SIGNED", "SWARM_COMMAND"
+# A verb that no robot knows: each refuses it, and the answer tells how long words take.
+ASK = 127
 COMMANDS = {
     turbopi.swarm_command_t.VERB_START: "start",
     turbopi.swarm_command_t.VERB_SELECT: "select",
@@ -58,6 +62,42 @@ LINK_TIMEOUT_MS = 2000
 HOLD_S = 0.1  # so often robots that were started hear that the operator is there
 
 
+class Step(NamedTuple):
+    """One message of telemetry.
+
+    Attributes:
+        heard_s, heard_utime_s: when it was taken in, by time.monotonic() and time.time().
+        telemetry: telemetry_t.
+        waited_s: for so long at most it had waited here, as while this program was halted.
+    """
+
+    heard_s: float
+    heard_utime_s: float
+    telemetry: Any
+    waited_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What the quickest answer to a word from here tells of a robot's clock.
+
+    Attributes:
+        session: of the robot.
+        most_s: its session's clock is ahead of time.monotonic() by so much at most: as if its
+            answer had been made when the word was said.
+        heard_s: when it was heard, by time.monotonic().
+    """
+
+    session: int
+    most_s: float
+    heard_s: float
+
+    @property
+    def most_now_s(self) -> float:
+        """By so much at most now."""
+        return self.most_s + CLOCKS_PART * (time.monotonic() - self.heard_s)
+
+
 @dataclass(frozen=True)
 class Heard:
     """A command that an operator was heard to sign.
@@ -66,6 +106,7 @@ class Heard:
         seq, verb, session, counter: as in swarm_command_t and signed_command_t.
         words: the command as a person would write it, and when it was said, by its sender's clock:
             a computer that slept hears it late.
+        behavior: that it names.
     """
 
     seq: int
@@ -73,6 +114,7 @@ class Heard:
     session: int
     counter: int
     words: str
+    behavior: str = ""
 
     @property
     def starts(self) -> bool:
@@ -88,10 +130,11 @@ class Robot:
     Attributes:
         telemetry, run: its newest messages.
         first_s, heard_s: when it said anything first and last, by time.monotonic().
-        recent: (time.monotonic(), time.time(), telemetry_t) of the last WINDOW_S.
+        recent: telemetry of the last WINDOW_S.
         senders: of its telemetry.
         acks, signed_acks: by number of the command; the latter with the robot's signature.
         link, link_s: its newest link_t with its signature, and when that was heard.
+        answered: its quickest answer.
         hold_s: when an operator was heard last, or said from here, that somebody is there.
         commands: that operators were heard to sign for it, by their counters.
     """
@@ -101,12 +144,13 @@ class Robot:
     run: Any = None
     first_s: float = field(default_factory=time.monotonic)
     heard_s: float = 0.0
-    recent: deque = field(default_factory=deque)
+    recent: deque[Step] = field(default_factory=deque)
     senders: Senders = field(default_factory=Senders)
     acks: dict = field(default_factory=dict)
     signed_acks: dict = field(default_factory=dict)
     link: Any = None
     link_s: float = 0.0
+    answered: Answered | None = None
     hold_s: float = 0.0
     commands: dict[int, Heard] = field(default_factory=dict)
 
@@ -232,18 +276,64 @@ class Robot:
 
     @property
     def clock_s(self) -> float:
-        """How far its clock is ahead of ours, less the network's delay; NaN before telemetry."""
+        """How far its clock is ahead of ours, as far as no delay explains it; NaN before telemetry.
+
+        What it says cannot come before it was said, nor an answer be made before its question: the
+        first tells how far its clock is ahead at least, the other at most.
+        """
+        least_s, most_s = self._clock_least_s, self._clock_most_s
+        if not least_s <= 0:
+            return least_s
+        return most_s if least_s <= most_s < 0 else 0.0
+
+    @property
+    def _clock_least_s(self) -> float:
         return max(
-            (t.utime_us / 1e6 - heard_utime_s for _, heard_utime_s, t in self.recent),
+            (step.telemetry.utime_us / 1e6 - step.heard_utime_s for step in self.recent),
             default=float("nan"),
         )
+
+    @property
+    def _clock_most_s(self) -> float:
+        """Infinite where nothing was answered in this session."""
+        link, answered = self.link, self.answered
+        if not (link and answered and link.session == answered.session):
+            return math.inf
+        set_to_s = (link.utime_us - link.session_us) / 1e6
+        return answered.most_now_s + set_to_s - (time.time() - time.monotonic())
+
+    @property
+    def age_s(self) -> float:
+        """How old the freshest of what it says is when it comes, by both clocks; NaN without any.
+
+        Not that it had waited here.
+        """
+        return min(
+            (s.heard_utime_s - s.waited_s - s.telemetry.utime_us / 1e6 for s in self.recent),
+            default=float("nan"),
+        )
+
+    @property
+    def late_s(self) -> float:
+        """As `age_s`, less what its clock is behind for sure."""
+        return self.age_s + min(self.clock_s, 0.0)
+
+    @property
+    def round_trip_s(self) -> float:
+        """From a word to the answer, at most; infinite where nothing was answered."""
+        return self._clock_most_s - self._clock_least_s
+
+    @property
+    def has_answered(self) -> bool:
+        """A late network can be told from a clock that is behind."""
+        return self.round_trip_s < math.inf
 
     @property
     def detected_frac(self) -> float:
         """Share of the last seconds' control steps in which it saw a neighbour; NaN without any."""
         if not self.recent:
             return float("nan")
-        return sum(t.detected != 0 for _, _, t in self.recent) / len(self.recent)
+        return sum(step.telemetry.detected != 0 for step in self.recent) / len(self.recent)
 
     @property
     def camera(self) -> str:
@@ -254,8 +344,8 @@ class Robot:
             return "lost"
         if self.telemetry.status_flags & TELEMETRY.STATUS_FRAME_STALE:
             return "no frames"
-        frames = {t.frame_seq for _, _, t in self.recent}
-        passed_s = self.recent[-1][0] - self.recent[0][0] if self.recent else 0
+        frames = {step.telemetry.frame_seq for step in self.recent}
+        passed_s = self.recent[-1].heard_s - self.recent[0].heard_s if self.recent else 0
         return f"{(len(frames) - 1) / passed_s:.0f} fps" if passed_s > 0.5 else "works"
 
     def to_json(self) -> dict:
@@ -278,6 +368,7 @@ class Robot:
             "battery_V": t.battery_V if t else None,
             "camera": self.camera,
             "clock_ahead_s": self.clock_s,
+            "late_s": self.late_s,
             "last_heard_s": time.monotonic() - self.heard_s,
             "detected": bool(t.detected) if t else None,
             "bits": t.detected if t else None,
@@ -318,12 +409,13 @@ class Fleet:
         self.watch: Callable[[], None] = lambda: None
         # Robots that shall hear all the time that the operator is there.
         self.held: set[int] = set()
-        # Numbers of the commands that were said from here, and the highest counter of those.
-        self.said: set[int] = set()
+        # When commands were said from here first, by number, and the highest counter of those.
+        self.said: dict[int, float] = {}
         self.counter = 0
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
-        self._prefix, self._key, self._hold_s = channel_prefix, key, 0.0
+        self._prefix, self.key, self._hold_s = channel_prefix, key, 0.0
+        self._empty_s = time.monotonic()  # nothing waited here then
         try:
             self.bus = connect(url)
             kinds = "TELEMETRY|RUN|ACK|LINK|SIGNED_ACK"
@@ -362,21 +454,32 @@ class Fleet:
             robot.run = message
         else:
             robot.telemetry = message
-            robot.recent.append((now_s, time.time(), message))
+            waited_s = max(0.0, now_s - self._empty_s)
+            robot.recent.append(Step(now_s, time.time(), message, waited_s))
             robot.senders.add(getattr(self.bus, "sender", None))
-            while robot.recent[0][0] < now_s - WINDOW_S:
+            while robot.recent[0].heard_s < now_s - WINDOW_S:
                 robot.recent.popleft()
 
     def _on_signed(self, robot: Robot, kind: str, message: Any, data: bytes) -> None:
         """Believes what the robot of that number has signed; copies of older words are no news."""
-        if not self._key or not keys.is_signed(keys.of_robot(self._key, robot.robot_id), data):
+        if not self.key or not keys.is_signed(keys.of_robot(self.key, robot.robot_id), data):
             return
         if kind == "SIGNED_ACK":
             robot.signed_acks[message.seq] = message
+            self._on_answer(robot, message)
             return
         old = robot.link
         if not old or message.session != old.session or message.session_us > old.session_us:
             robot.link, robot.link_s = message, time.monotonic()
+
+    def _on_answer(self, robot: Robot, ack: Any) -> None:
+        """Keeps the quickest."""
+        if ack.seq not in self.said:
+            return
+        found = Answered(ack.session, ack.session_us / 1e6 - self.said[ack.seq], time.monotonic())
+        known = robot.answered
+        if not known or known.session != ack.session or found.most_s <= known.most_now_s:
+            robot.answered = found
 
     def _on_command(self, data: bytes) -> None:
         """Notes what operators sign: that they hold a robot, or what they tell it."""
@@ -386,18 +489,19 @@ class Fleet:
         except (ValueError, struct.error, IndexError):
             return
         robot = self.robots.get(sealed.robot_id)
-        if not (self._key and robot and robot.link and robot.link.session == sealed.session):
+        if not (self.key and robot and robot.link and robot.link.session == sealed.session):
             return
         is_fresh = sealed.made_us > robot.session_us - FRESH_US
-        if not is_fresh or not keys.is_signed(keys.of_robot(self._key, robot.robot_id), data):
+        if not is_fresh or not keys.is_signed(keys.of_robot(self.key, robot.robot_id), data):
             return
         if command.verb == sealed.VERB_HOLD:
             robot.hold_s = time.monotonic()
         elif sealed.counter not in robot.commands:
-            words = f"{COMMANDS.get(command.verb, '?')} {plain_line(command.behavior, NAME_MAX)}"
+            behavior = plain_line(command.behavior, NAME_MAX)
+            words = f"{COMMANDS.get(command.verb, '?')} {behavior}"
             words = f"{words.strip()} at {_time_of_day(command.utime_us)}"
             robot.commands[sealed.counter] = Heard(
-                command.seq, command.verb, sealed.session, sealed.counter, words
+                *(command.seq, command.verb, sealed.session, sealed.counter, words, behavior)
             )
 
     def _on_plain_command(self, data: bytes) -> None:
@@ -445,12 +549,19 @@ class Fleet:
         """
         end_s = time.monotonic() + duration_s
         while not enough() and (left_s := end_s - time.monotonic()) > 0:
-            self.bus.handle_timeout(max(1, min(20, int(1000 * left_s))))
+            self._take_in(max(1, min(20, int(1000 * left_s))))
             backlog_end_s = time.monotonic() + BACKLOG_S
-            while time.monotonic() < backlog_end_s and self.bus.handle_timeout(0):
+            while time.monotonic() < backlog_end_s and self._take_in(0):
                 pass
             self._hold()
             self.watch()
+
+    def _take_in(self, timeout_ms: int) -> bool:
+        """Waits for a message; False if none came."""
+        begin_s = time.monotonic()
+        is_one = self.bus.handle_timeout(timeout_ms)
+        self._empty_s = self._empty_s if is_one else begin_s
+        return is_one
 
     @contextmanager
     def unwatched(self) -> Iterator[None]:
@@ -504,8 +615,8 @@ class Fleet:
         sealed.command = command.encode()
         sealed.command_size = len(sealed.command)
         sealed.tag = bytes(keys.TAG_BYTES)
-        message = keys.sign(keys.of_robot(self._key, robot.robot_id), sealed.encode())
-        self.said.add(command.seq)
+        message = keys.sign(keys.of_robot(self.key, robot.robot_id), sealed.encode())
+        self.said.setdefault(command.seq, time.monotonic())
         self.counter = max(self.counter, counter)
         self.bus.publish(self._prefix + SIGNED_COMMANDS, message)
 
@@ -515,7 +626,7 @@ class Fleet:
         Raises:
             OSError: there is no way to.
         """
-        self.said.add(command.seq)
+        self.said.setdefault(command.seq, time.monotonic())
         channel = self._prefix + PLAIN_COMMANDS
         if not host:
             self.bus.publish(channel, command.encode())
@@ -525,7 +636,7 @@ class Fleet:
     @property
     def has_key(self) -> bool:
         """What robots sign can be told from what anybody says."""
-        return self._key is not None
+        return self.key is not None
 
     @property
     def reach(self) -> Reach:

@@ -4,6 +4,8 @@
 import time
 from dataclasses import dataclass
 
+import turbopi
+
 from twinmill.robots.fleet import MAY_MOVE, TELEMETRY, Fleet, Heard, Robot
 from twinmill.robots.tell import Start
 
@@ -156,11 +158,17 @@ class Held:
     def _drives(self, robot: Robot) -> State:
         """As was told from here, or as another operator told it."""
         link, others = robot.link, self._others(robot)
-        if others:
+        if others and not self._is_overridden(robot, others[0]):
             return State(f"drives: another operator said {others[0].words}", is_meant=True)
         known = max([self._fleet.counter, *(c.counter for c in robot.commands.values())])
         is_own = link.session == self._sessions[robot.robot_id]
         return DRIVES_AS_UNHEARD if is_own and link.counter > known else DRIVES
+
+    @staticmethod
+    def _is_overridden(robot: Robot, command: Heard) -> bool:
+        """Another behaviour was selected before the instant of a start that selects one itself."""
+        is_select = command.verb == turbopi.swarm_command_t.VERB_SELECT
+        return is_select and bool(robot.run) and robot.run.behavior != command.behavior
 
     def _others(self, robot: Robot) -> list[Heard]:
         return self._fleet.others(robot, self._sessions[robot.robot_id])

@@ -49,8 +49,8 @@ def load_or_make(path: Path | None = None) -> bytes:
             _make(file)
         except OSError as error:
             raise ValueError(
-                f"{option('key', str(file))}: there is no key here, and none can be made "
-                f"({error.strerror}); copy the operator's, and name it."
+                f"{file}: there is no operator's key here, and none can be made "
+                f"({error.strerror}); copy the operator's, and name it: {option('key')}."
             ) from error
     return load(file)
 
@@ -63,26 +63,27 @@ def load(path: Path | None = None) -> bytes:
         OSError: it cannot be read.
     """
     file = path or default_path()
+    told = option("key", str(file)) if path else f"the operator's key, {file}"
     if not file.exists():
-        named = f" {option('key', str(file))}" if path else ""
+        named = f" {told}" if path else ""
         raise ValueError(
-            f"{option('key', str(file))}: there is no key here, so no robot's answer is believed; "
+            f"{told}: there is no key here, so no robot's answer is believed; "
             "copy the operator's, or make one and bring it to robots: "
             f"`twinmill robot flash HOST{named}`."
         )
     if not file.is_file():
-        raise ValueError(f"{option('key', str(file))}: is no file; name the file of a key.")
+        raise ValueError(f"{told}: is no file; name the file of a key.")
     mode = file.stat().st_mode & 0o777
     if mode & 0o077:
         raise ValueError(
-            f"{option('key', str(file))}: others may read it (mode {mode:o}): "
+            f"{told}: others may read it (mode {mode:o}): "
             f"`chmod 600 {quote(str(file))}` if nobody has, else make a new one (remove it, and "
             "flash the robots again)."
         )
     text = file.read_bytes().strip()
     if not re.fullmatch(rb"[0-9a-f]{%d}" % (2 * KEY_BYTES), text):
         raise ValueError(
-            f"{option('key', str(file))}: is no key, which is {2 * KEY_BYTES} hexadecimal digits "
+            f"{told}: is no key, which is {2 * KEY_BYTES} hexadecimal digits "
             f"(0-9, a-f), and this has {len(text)} characters; copy the operator's file again, or "
             "make a new one (remove it, and flash the robots again)."
         )

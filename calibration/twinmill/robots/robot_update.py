@@ -35,9 +35,9 @@ def parse_target(text: str) -> Target:
     host, _, number = text.partition("=")
     if not number:
         name = host.rpartition("@")[2].partition(".")[0]
-        found = re.findall(r"\d+", "" if name.isdigit() else name)
+        found = re.findall(r"[0-9]+", "" if name.isdigit() else name)
         number = found[-1] if found else ""
-    if not number.isdigit() or int(number) > 99 or host.startswith("-") or not host:
+    if not re.fullmatch(r"[0-9]{1,2}", number) or host.startswith("-") or not host:
         raise ValueError(f"{text}: which robot is it? Write HOST=ID with an ID in 0..99.")
     return Target(host, int(number))
 

@@ -17,8 +17,9 @@ from typing import Any
 import turbopi
 
 from twinmill.arguments import option
+from twinmill.foreign_text import plain_line
 from twinmill.robots.countdown import NOT_BEGUN, Dropouts, find_dropouts, stopped_by_another
-from twinmill.robots.fleet import ALL, LINK_TIMEOUT_MS, Fleet, Robot
+from twinmill.robots.fleet import ALL, ASK, LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
@@ -26,6 +27,8 @@ FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it
 CALL_OFF_S = 0.3
 OTHERS_S = 0.3  # in which who was not asked is heard: robots speak 10 times a second or more
 BEGUN_S = 0.5  # after the instant: all that start have said that they drive
+ASK_S = 3.0  # robots answer to no word that takes longer
+CLOCK_WARN_S = 0.05  # a clock, or a network, that is off by less is as it should be
 LATE_S = 2.0  # the same where nobody goes on watching; as late a start robots still obey
 ARM_S = 5.0  # in which a robot that is there has answered, whatever is lost
 AHEAD_S = 600.0  # robots obey no start that is further ahead by their clocks
@@ -146,6 +149,29 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     return fleet.here()
 
 
+def ask_clocks(fleet: Fleet, robots: set[int]) -> None:
+    """Asks robots of which all comes late for an answer.
+
+    By that a network that is late is told from a clock that is behind. Without the operator's key
+    no answer is believed, and none asked for.
+    """
+
+    def waiting() -> set[int]:
+        here = robots & fleet.here() if fleet.has_key else set()
+        return {i for i in here if fleet.robots[i].age_s > CLOCK_WARN_S} - {
+            i for i in here if fleet.robots[i].has_answered
+        }
+
+    end_s = time.monotonic() + ASK_S
+    while waiting() and time.monotonic() < end_s:
+        for robot_id in sorted(waiting()):
+            command = make_command(ASK)
+            command.robot_id = robot_id
+            with suppress(OSError):
+                fleet.send(command)
+        fleet.listen(REPEAT_S, lambda: not waiting())
+
+
 def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
     """Those of some robots that drive already, or that an operator holds who counts to their start.
 
@@ -246,6 +272,14 @@ def stop(
     with fleet.unwatched():
         hosts = hosts or Hosts(())
         return _stop(fleet, robots, timeout_s, hosts, waiting=waiting, enough=enough)
+
+
+def say_stop(fleet: Fleet, robots: set[int]) -> None:
+    """Says stop once to some robots, or to all if these are none; who answers is not asked."""
+    command = make_command(VERBS.VERB_STOP)
+    for command.robot_id in sorted(robots or {ALL}):
+        with suppress(OSError):
+            fleet.send(command)
 
 
 def _stop(
@@ -353,10 +387,12 @@ class Hosts:
     def unheard(self, fleet: Fleet) -> list[str]:
         """Those from which no robot has spoken, and why they were not told, where they were not."""
         heard = {host for robot in fleet.robots.values() for host in robot.senders.hosts}
+        unheard = [name for name, address in self._address_of.items() if address not in heard]
         return [
-            f"{name} ({self._faults[name]})" if name in self._faults else name
-            for name, address in self._address_of.items()
-            if address not in heard
+            f"{plain_line(name)} ({self._faults[name]})"
+            if name in self._faults
+            else plain_line(name)
+            for name in unheard
         ]
 
 

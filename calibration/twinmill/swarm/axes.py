@@ -11,6 +11,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.arguments import option
+from twinmill.numbers_typed import typed_float
 
 Set = Callable[[native.Model, float], None]
 
@@ -107,13 +108,13 @@ def _values(text: str, rest: str) -> tuple[float, ...]:
     try:
         if ":" in rest:
             first, last, count = rest.split(":")
-            if not re.fullmatch(r"[1-9]\d{0,3}", count):
+            if not re.fullmatch(r"[1-9][0-9]{0,3}", count):
                 raise ValueError
-            values = np.linspace(float(first), float(last), int(count))
+            values = np.linspace(typed_float(first), typed_float(last), int(count))
             if len(values) == 1 and float(first) != float(last):
                 raise ValueError
         else:
-            values = np.array([float(word) for word in rest.split(",")])
+            values = np.array([typed_float(word) for word in rest.split(",")])
     except ValueError:
         raise ValueError(
             f"'{text}': after = must come from:to:count with a count of 2 to 9999, as in "

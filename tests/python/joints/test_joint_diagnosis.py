@@ -179,3 +179,17 @@ def test_a_drive_whose_friction_differs_by_direction_is_named_from_its_training_
     assert first.probability > 0.8
     value, _ = first.numbers["half_difference"]
     assert value == pytest.approx(-42, abs=10)
+
+
+def test_what_the_own_log_shows_too_is_no_news(slide, tmp_path, capsys):
+    """15 N s/m more than the model's in all logs; in the later one friction by direction, too."""
+    own, later = tmp_path / "own.npz", tmp_path / "later.npz"
+    simulated(damping=25, seed=2).saved(own)
+    simulated(damping=25, seed=3, push=lambda v: -6 * abs(v)).saved(later)
+    again = tmp_path / "again.npz"
+    simulated(damping=25, seed=4).saved(again)
+    for log, expected in ((again, []), (later, ["viscous_friction_by_direction@x"])):
+        run(["diagnose", str(log), "--model", str(slide), "--own", str(own), "--json"])
+        told = json.loads(capsys.readouterr().out)
+        assert told["always"] == ["viscous_friction@x"]
+        assert [f["effect"] for f in told["findings"]] == expected

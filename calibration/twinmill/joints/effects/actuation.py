@@ -5,12 +5,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from twinmill.joints.action import Action
 from twinmill.joints.effects.effect import (
     ActuatorEffect,
     Effect,
     Number,
 )
-from twinmill.joints.plant import SHARE, Action, Plant
+from twinmill.joints.plant import SHARE, Plant
 
 LATE_S = 0.01  # default of a delay or a lag: some periods of a control loop
 LONGEST_S = 0.5
@@ -83,8 +84,9 @@ class ServoDamping(ActuatorEffect):
     @property
     def parameters(self) -> list[Number]:
         """The gain that is added."""
-        usual = float(self.plant.usual.load[self.joint] / self.plant.usual.speed[self.joint])
         own = -float(self.plant.mjcf.model.actuator_biasprm[self.at, 2])
+        usual = float(self.plant.usual.load[self.joint] / self.plant.usual.speed[self.joint])
+        usual = max(usual, own)  # a stiff servo's gain is larger than what its loads ask for
         return [Number("more", self.per_speed, SHARE * usual, -own, 100 * usual)]
 
     def act(self, action: Action, values: Mapping[str, float]) -> None:

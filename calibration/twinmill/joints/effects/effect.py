@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from twinmill.joints.plant import SLOW, Action, Plant
+from twinmill.joints.action import SLOW, Action
+from twinmill.joints.plant import Plant
 
 
 @dataclass(frozen=True)

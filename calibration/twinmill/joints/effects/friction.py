@@ -5,8 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from twinmill.joints.action import Action
 from twinmill.joints.effects.effect import JointEffect, Number
-from twinmill.joints.plant import SHARE, Action
+from twinmill.joints.plant import SHARE
 
 
 class Coulomb(JointEffect):

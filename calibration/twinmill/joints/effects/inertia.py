@@ -3,8 +3,9 @@
 
 from collections.abc import Mapping
 
+from twinmill.joints.action import Action
 from twinmill.joints.effects.effect import Effect, JointEffect, Number
-from twinmill.joints.plant import SHARE, Action, Plant
+from twinmill.joints.plant import SHARE, Plant
 
 
 class Armature(JointEffect):

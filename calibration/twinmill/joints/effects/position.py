@@ -5,12 +5,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from twinmill.joints.action import Action
 from twinmill.joints.effects.effect import (
     Effect,
     JointEffect,
     Number,
 )
-from twinmill.joints.plant import SHARE, Action, Plant
+from twinmill.joints.plant import SHARE, Plant
 
 
 class ForceOffset(JointEffect):

@@ -23,7 +23,7 @@ TOO_LITTLE = 0.5  # share of the rows below which commands and positions are of 
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedJoints:
     """A log that fits a model.
 
     Attributes:
@@ -49,32 +49,35 @@ ANY, NOTHING_SAID = Topics(), Given()
 
 
 def import_joints(
-    files: Sequence[Path],
-    mjcf: Mjcf,
+    files: Path | str | Sequence[Path | str],
+    model: Mjcf | Path | str,
     given: Given = NOTHING_SAID,
     topics: Topics = ANY,
-) -> Imported:
+) -> ImportedJoints:
     """Reads files of one machine.
 
     Args:
         files: one recording, or tables that are parts of one, as positions and commands.
-        mjcf: the model, whose joints and actuators are looked for.
+        model: opened, or its path; its joints and actuators are looked for.
         given: names and units that the files do not tell.
         topics: of a bag.
 
     Raises:
         LogError: a file cannot be read, or does not fit the model.
         MissingExtra: a package is not installed that this kind of file needs.
+        ModelError: the model cannot be loaded, or is of a kind that is not judged.
     """
+    mjcf = model if isinstance(model, Mjcf) else Mjcf.load(model)
+    paths = [Path(f) for f in ([files] if isinstance(files, Path | str) else files)]
     stamp = next((old for old, new in given.rename.items() if new == TIME), "")
     runs: list[Recording] = []
-    for path in files:
+    for path in paths:
         bag = is_bag(path)
         runs += read_bag(path, topics.state, topics.command) if bag else read_table(path, stamp)
-    if len(files) > 1:
-        if len(runs) > len(files):
+    if len(paths) > 1:
+        if len(runs) > len(paths):
             raise LogError(
-                f"{files[0].name} and others: have several runs each; import one at a time, and "
+                f"{paths[0].name} and others: have several runs each; import one at a time, and "
                 "give all logs to diagnose."
             )
         name = ", ".join(r.name for r in runs)
@@ -90,7 +93,7 @@ def import_joints(
     log = joined(logs)
     check_units(log, mjcf)
     _check_servos(log, mjcf)
-    return Imported(log, mjcf, (*told, *warnings_of(log, mjcf)))
+    return ImportedJoints(log, mjcf, (*told, *warnings_of(log, mjcf)))
 
 
 def _on_one_clock(

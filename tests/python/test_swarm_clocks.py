@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A clock that is behind, a late network and a tool that was halted look alike one way.
+
+The truth is how the network and the robot here were made.
+"""
+
+import time
+from collections import deque
+
+import pytest
+import turbopi
+
+from twinmill.robots import key as keys
+from twinmill.robots import tell
+from twinmill.robots.fleet import Fleet
+from twinmill_cli.swarm_door import check_clocks
+from twinmill_cli.swarm_end import clocks
+
+KEY, SESSION, STEP_S = bytes(range(32)), 7, 0.03
+NEAR_S = 0.06  # a robot answers in its next step, and this machine may be busy
+
+
+class Air:
+    """A robot behind a network: what is said on either side is heard a while later."""
+
+    def __init__(self, delay_s: float, ahead_s: float, *, answers: bool = True):
+        self.delay_s, self.ahead_s, self.answers = delay_s, ahead_s, answers
+        self.begin_s = self.next_s = time.monotonic()
+        self.on_its_way: deque = deque()
+
+    def subscribe(self, _, handler):
+        self.hear = handler
+
+    def _stamps(self, message, at_s: float):
+        message.robot_id = 1
+        message.utime_us = round(1e6 * (time.time() - time.monotonic() + at_s + self.ahead_s))
+        if hasattr(message, "session"):
+            message.session, message.session_us = SESSION, round(1e6 * (at_s - self.begin_s + 5))
+            message.tag = bytes(keys.TAG_BYTES)
+        return message
+
+    def _say(self, channel: str, message, at_s: float) -> None:
+        data = self._stamps(message, at_s).encode()
+        signed = keys.sign(keys.of_robot(KEY, 1), data) if hasattr(message, "session") else data
+        self.on_its_way.append((at_s + self.delay_s, channel, signed))
+
+    def publish(self, _, data):
+        command = turbopi.swarm_command_t.decode(data)
+        ack = turbopi.signed_ack_t()
+        ack.seq, ack.verb, ack.command_utime_us = command.seq, command.verb, command.utime_us
+        if self.answers:
+            self._say("R01_SIGNED_ACK", ack, time.monotonic() + self.delay_s)
+
+    def handle_timeout(self, timeout_ms):
+        end_s = time.monotonic() + timeout_ms / 1e3
+        while True:
+            while self.next_s <= time.monotonic():
+                self._say("R01_TELEMETRY", turbopi.telemetry_t(), self.next_s)
+                self._say("R01_LINK", turbopi.link_t(), self.next_s)
+                self.next_s += STEP_S
+            due = [said for said in self.on_its_way if said[0] <= time.monotonic()]
+            if due:
+                self.on_its_way.remove(due[0])
+                self.hear(*due[0][1:])
+                return True
+            if time.monotonic() >= end_s:
+                return False
+            time.sleep(0.001)
+
+
+def fleet_behind(**air) -> Fleet:
+    fleet = Fleet("", connect=lambda _: Air(**air), key=KEY)
+    fleet.listen(air["delay_s"] + 0.2)
+    return fleet
+
+
+def test_a_late_network_is_no_clock_that_is_behind():
+    """A robot was said to be 0.90 s behind: set this computer's clock, it said."""
+    fleet = fleet_behind(delay_s=0.3, ahead_s=0.0)
+    assert "the network is late, or a clock is behind" in clocks(fleet, {1})
+    tell.ask_clocks(fleet, {1})
+    robot = fleet.robots[1]
+    assert robot.clock_s == 0 and robot.late_s == pytest.approx(0.3, abs=NEAR_S)
+    assert clocks(fleet, {1}).startswith("The network is late")
+    with pytest.raises(ValueError, match=r"nothing was started: The network is late.*--in-s 2"):
+        check_clocks(fleet, {1}, 0.5, may_differ=False)
+
+
+def test_a_network_too_late_to_see_a_start_begin_is_refused_before_a_wheel_turns():
+    """Robots drove for 1.4 s before their start was called off."""
+    fleet = fleet_behind(delay_s=0.7, ahead_s=0.0)
+    with pytest.raises(ValueError, match=r"nothing was started: .*0\.5 s after the instant"):
+        check_clocks(fleet, {1}, 10.0, may_differ=False)
+    check_clocks(fleet, {1}, 10.0, may_differ=True)
+
+
+@pytest.mark.parametrize("ahead_s", [-2.0, 2.0])
+@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+def test_a_clock_is_told_by_as_much_as_no_delay_explains(delay_s, ahead_s):
+    fleet = fleet_behind(delay_s=delay_s, ahead_s=ahead_s)
+    tell.ask_clocks(fleet, {1})
+    told_s = abs(fleet.robots[1].clock_s)
+    assert abs(ahead_s) - delay_s - NEAR_S <= told_s <= abs(ahead_s) + 0.01
+    assert "R01's clock is" in clocks(fleet, {1})
+    assert ("behind" if ahead_s < 0 else "ahead of") in clocks(fleet, {1})
+
+
+def test_where_nothing_is_answered_both_are_said_to_be_possible(monkeypatch):
+    monkeypatch.setattr(tell, "ASK_S", 0.2)
+    fleet = fleet_behind(delay_s=0.0, ahead_s=-2.0, answers=False)
+    tell.ask_clocks(fleet, {1})
+    assert clocks(fleet, {1}) == (
+        f"What is said comes late, {fleet.robots[1].late_s:.2f} s from R01: the network is late, "
+        "or a clock is behind (NTP)."
+    )
+
+
+def test_a_tool_that_was_halted_tells_neither():
+    """What had waited here for 7 s was said to be 2.28 s late by the clock."""
+    fleet = fleet_behind(delay_s=0.0, ahead_s=0.0)
+    time.sleep(1.0)
+    for _ in range(4):  # of some sixty that wait
+        assert fleet._take_in(0)
+        assert fleet.robots[1].age_s < NEAR_S and clocks(fleet, {1}) == ""
