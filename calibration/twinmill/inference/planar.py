@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import twinmill_native as native
-from scipy.linalg import block_diag
 
 from twinmill.data.measurement import Measurement
 from twinmill.inference import candidates, discrepancy, moments
@@ -144,7 +143,9 @@ def problem_of(
     motion = _motion(steps, bare, always)  # as in its own log: weights belong to these columns
     found = discrepancy.kernels(motion)
     if always is not None:
-        prior = _with_forms(with_always(prior, always, found), steps, model, motion, always.effects)
+        prior = with_always(prior, always, found)
+        for columns in _missed_by_formulas(steps, model, motion, always.effects):
+            prior = prior.with_columns(columns)
     noise = _begin_noise(steps, motion, model_file, always)
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
@@ -158,29 +159,21 @@ def problem_of(
     return replace(rough, noise=noise, base=base)
 
 
-def _with_forms(
-    prior: Prior, steps: Steps, model: native.Model, motion: Motion, effects: Sequence[str]
-) -> Prior:
-    """With what the formulas of effects that the base always lacked may miss.
+def _missed_by_formulas(
+    steps: Steps, model: native.Model, motion: Motion, effects: Sequence[str]
+) -> list[np.ndarray]:
+    """Arrays (K, W, 3): what the formulas of a model's effects may miss, each of usual size.
 
-    Each is off in one of its forms by a size that is exponentially distributed; of the mixture the
-    normal distribution has the variance.
+    An effect is off in one of its forms by a size that is exponentially distributed; of this
+    mixture the normal distribution has the variance.
     """
-    whole = steps.predicted(model)
-    columns = [prior.columns.reshape(-1, *whole.shape)]
+    whole, found = steps.predicted(model), []
     for name in effects:
         less = model.copy()
         less.remove_effect(effect_names(less).index(newest_instance(less, name)))
         forms = discrepancy.forms_of(whole - steps.predicted(less), motion)
-        columns += [np.sqrt(2 / len(forms)) * PRIORS.form * f for f in forms]
-    stacked = np.concatenate(columns)
-    more = len(stacked) - len(prior.columns)
-    return replace(
-        prior,
-        mean=np.r_[prior.mean, np.zeros(more)],
-        cov=block_diag(prior.cov, np.eye(more)),
-        columns=stacked,
-    )
+        found += [np.sqrt(2 / len(forms)) * PRIORS.form * f for f in forms]
+    return found
 
 
 def _set_to(model: native.Model, prior: Prior, always: Always) -> None:

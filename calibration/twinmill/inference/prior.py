@@ -97,6 +97,15 @@ class Prior:
             cov[k, k] += (share * PRIORS.sheet * self.mean[k]) ** 2
         return cov
 
+    def with_columns(self, columns: np.ndarray) -> "Prior":
+        """With a discrepancy more, (K, W, C), whose weights have a standard normal distribution."""
+        return replace(
+            self,
+            mean=np.r_[self.mean, np.zeros(len(columns))],
+            cov=block_diag(self.cov, np.eye(len(columns))),
+            columns=np.concatenate([self.columns.reshape(-1, *columns.shape[1:]), columns]),
+        )
+
 
 def base_prior(
     model: native.Model,
