@@ -54,7 +54,7 @@ def terminal_of_robots(
 
 
 def _new(written: Better) -> str:
-    has = f"has {' and '.join(written.added)}" if written.added else "has the base's new numbers"
+    has = f"has {', '.join(written.added)}" if written.added else "has the base's new numbers"
     return (
         f"{written.file.path} {has}: score {number(written.before.score)} without, "
         f"{number(written.after.score)} with (1 is as good as the log can tell)."
