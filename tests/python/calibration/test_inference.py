@@ -341,10 +341,7 @@ def foreign(data_dir, model_file, tmp_path_factory):
 
 @pytest.mark.long
 @pytest.mark.parametrize("case", HIDDEN)
-def test_hidden_effects_of_a_foreign_plant(foreign, case, request):
-    if case == "u":
-        missed = "told as part of something outside that depends on time"
-        request.applymarker(pytest.mark.xfail(reason=missed, strict=True))
+def test_hidden_effects_of_a_foreign_plant(foreign, case):
     folder, before, base = foreign
     found = infer(load_measurements([folder / f"case_{case}.lcmlog"]), base, before)
     names = [f.effect for f in found.answer.findings]
