@@ -12,7 +12,16 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Hold, Logs, Model, NewModel, Out, effects_beginning
+from twinmill_cli.options import (
+    Force,
+    Hold,
+    Logs,
+    Model,
+    NewModel,
+    Out,
+    effects_beginning,
+    repeated,
+)
 from twinmill_cli.output import AsJson, busy, say
 
 if working():  # not for --help
@@ -27,7 +36,6 @@ if working():  # not for --help
     from twinmill_cli.frame import (
         command_line,
         finish,
-        holding,
         is_mjcf,
         load,
         of_robot,
@@ -99,7 +107,7 @@ def _fit(
     """
     held = hold or []
     kept = [] if history is None else ["--history", str(history)]
-    verb = shlex.join(["fit", *holding(held), *kept])
+    verb = shlex.join(["fit", *repeated("--hold", held), *kept])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
@@ -179,7 +187,7 @@ def _add(
         say(f"without --formula, {usual} is fitted.")
     held = hold or []
     given = [w for name, text in texts.items() for w in (option(name), text)]
-    verb = shlex.join(["twin", "add", effect, *of_robot(robot), *given, *holding(held)])
+    verb = shlex.join(["twin", "add", effect, *of_robot(robot), *given, *repeated("--hold", held)])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )

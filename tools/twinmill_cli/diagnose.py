@@ -17,7 +17,7 @@ import typer
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.exit_now import STOPPED
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Logs, Model, NewModel, Out
+from twinmill_cli.options import Force, Logs, Model, NewModel, Out, Own
 from twinmill_cli.output import AsJson, deliver, say, telling
 
 if working():  # not for --help
@@ -62,16 +62,7 @@ def _diagnose(
     logs: Logs,
     *,
     model: Model = DEFAULT_MODEL,
-    own: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--own",
-            metavar="LOG",
-            show_default=False,
-            help="Of an MJCF: log that it was made with (once for each); what it lacks there, too, "
-            "is not reported as new.",
-        ),
-    ] = None,
+    own: Own = None,
     as_json: AsJson = False,
     out: Out = None,
 ) -> Diagnosis | JointDiagnosis:
@@ -82,7 +73,8 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
 
-    Of a robot that MuJoCo can load: twinmill diagnose run.csv --model arm.xml
+    Of a robot that MuJoCo can load, which alone takes --own:
+    twinmill diagnose run.csv --model arm.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import diagnosed  # MuJoCo's Python is slow to import

@@ -13,6 +13,7 @@ import typer
 
 from twinmill.defaults import PER_GENERATION
 from twinmill_cli.lazy import working
+from twinmill_cli.options import repeated
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
@@ -174,7 +175,7 @@ def _source(
 ) -> Provenance:
     request = hunt.request
     words = ["twinmill", "lab", "discover", "--model", model]
-    words += [word for text in change for word in ("--set", text)]
+    words += repeated("--set", change)
     words += [word for name, limit in limits.items() for word in (f"--{name}", str(limit))]
     words += ["--n", str(hunt.n), "--seeds", str(request.seeds)]
     words += ["--duration-s", f"{request.duration_s:g}", "--start", request.start]

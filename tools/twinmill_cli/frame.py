@@ -38,11 +38,6 @@ def option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-def holding(names: list[str]) -> list[str]:
-    """Words of a command line that hold these quantities."""
-    return [word for name in names for word in ("--hold", name)]
-
-
 def of_robot(robot: int | None) -> list[str]:
     """As words of a command."""
     return [] if robot is None else ["--robot", str(robot)]

@@ -10,7 +10,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Model
+from twinmill_cli.options import Force, Model, Own, repeated
 from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
@@ -21,7 +21,6 @@ if working():  # not for --help
 
     from twinmill.files import check_new_file
     from twinmill.inference.answer import Answer
-    from twinmill.inference.better import better
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
     from twinmill.model.parameters import with_role
@@ -45,16 +44,7 @@ def _infer(
     ],
     *,
     model: Model = DEFAULT_MODEL,
-    own: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--own",
-            metavar="LOG",
-            show_default=False,
-            help="Log that the model was fitted to (once for each): what it misses there, too, "
-            "is not reported as new.",
-        ),
-    ] = None,
+    own: Own = None,
     keep: Annotated[
         Path | None,
         typer.Option(
@@ -91,10 +81,11 @@ def _infer(
     --keep known.toml the model as given is written with what it misses in --own.
     """
     native.keep_memory()  # what the work frees it wants again
-    words = [word for path in own or () for word in ("--own", str(path))]
+    words = ["lab", "infer", *repeated("--own", own or ())]
     if keep is not None:
         words += ["--keep", str(keep)]
-    typed = command_line(shlex.join(["lab", "infer", *words]), logs, model, output)
+    verb = shlex.join(words)
+    typed = command_line(verb, logs, model, output)
     source = provenance(typed, model_file := open_model(model, None))
     if keep is not None and not own:
         raise ValueError("infer: --keep stores what --own shows; give the model's own log, too.")
@@ -114,6 +105,8 @@ def _infer(
         results = infer_robots(measurements, model_file, before, progress)
         written = None
         if output is not None:
+            from twinmill.inference.better import better  # slow, and judging needs none
+
             progress("what the new model still misses in these logs")
             written = better(results[0], model_file, output, source.command)
     if keep is not None:
@@ -122,7 +115,6 @@ def _infer(
         written.file.write(force)
     each = [result.to_json() for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
-    verb = shlex.join(["lab", "infer", *words])
     commands = [] if written or len(results) > 1 else _mending(results[0].answer, verb, logs, model)
     data = {**data, **(written.to_json() if written else {})}
     data |= {"commands": [command for _, command in commands]}

@@ -17,6 +17,7 @@ from twinmill.joints.next import Excitation, next_joints
 from twinmill.report import joints as shown
 from twinmill.version import __version__
 from twinmill_cli.frame import command_line
+from twinmill_cli.options import repeated
 from twinmill_cli.output import deliver, say, telling
 
 
@@ -28,8 +29,7 @@ def diagnosed(
     with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
         found = diagnose_joints(logs, model, progress, own=own)
     _warn(found.warnings)
-    words = [word for path in own for word in ("--own", str(path))]
-    command = command_line(shlex.join(["diagnose", *words]), logs, model)
+    command = command_line(shlex.join(["diagnose", *repeated("--own", own)]), logs, model)
     deliver({**found.to_json(), **_source(command)}, shown.diagnosis(found), as_json)
     return found
 

@@ -14,7 +14,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Model, Out, SpreadM, Start
+from twinmill_cli.options import Model, Out, SpreadM, Start, repeated
 from twinmill_cli.output import AsJson, busy, deliver, say, telling
 
 if working():  # not for --help
@@ -208,7 +208,7 @@ def _command_line(given: dict) -> str:
     for name in ("seeds", "first_seed", "duration_s", "spread_m", "margin", "draws", "map_seeds"):
         words += [f"--{name.replace('_', '-')}", f"{given[name]:g}"]
     words += ["--start", given["start"], "--x", given["x"], "--y", given["y"]]
-    words += [word for name in given["only"] or [] for word in ("--only", name)]
+    words += repeated("--only", given["only"] or [])
     return shlex.join(words)
 
 

@@ -2,6 +2,7 @@
 """Options that several subcommands share, and lists of robots as they are written there."""
 
 import re
+from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -42,6 +43,16 @@ Model = Annotated[
     str,
     typer.Option(
         "--model", "-m", metavar="M", help="Model file, here or among the installed models."
+    ),
+]
+Own = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--own",
+        metavar="LOG",
+        show_default=False,
+        help="Log that the model was fitted to (once for each): what it misses there, too, is not "
+        "reported as new.",
     ),
 ]
 Start = Annotated[str, typer.Option("--start", help="square, disc or facing-out.")]
@@ -123,3 +134,8 @@ def parse_numbers(option: str, text: str, allowed: range) -> list[int]:
             f"{option} {text}: {wrong[0]} is not in {allowed.start}..{allowed.stop - 1}."
         )
     return sorted(numbers)
+
+
+def repeated(flag: str, values: Iterable[str | Path]) -> list[str]:
+    """Words of a command line that give an option once for each of these."""
+    return [word for value in values for word in (flag, str(value))]

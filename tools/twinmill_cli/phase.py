@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from twinmill_cli.lazy import working
+from twinmill_cli.options import repeated
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
@@ -86,7 +87,7 @@ def _phase(
     target = out or folder / "phase"
     check_report(target)
     words = ["twinmill", "swarm", "phase", str(folder), "--goal", phase.goal]
-    words += [word for text in at or [] for word in ("--at", text)]
+    words += repeated("--at", at or [])
     words += ["--experiments", str(experiments)] if experiments else []
     words += ["--rival", str(rival)] if rival else []
     source = Provenance(
