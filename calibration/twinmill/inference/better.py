@@ -6,7 +6,7 @@ effect that is of a moment of the log stays out, since no other log has it. An u
 out, too, but the base's numbers are those beside it, so that they do not stand for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -79,39 +79,40 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
             f"{model_file.path}: [robots.{robot}] has numbers of this robot alone, and a better "
             f"model is written for all; take that table out of a copy, and give the copy."
         )
-    numbers = found.answer.numbers
+    before = comparison(model_file, open_measurements(found.measurements, model_file))
+    fitted, added = _fitted(found, model_file, before.score)
+    child = child_of(model_file, fitted, path, command)
+    after = comparison(child, open_measurements(found.measurements, child))
+    child = child_of(model_file, replace(fitted, score_after=after.score), path, command)
+    document = tomlkit.parse(child.text)
+    document["fit"]["always"] = as_table(always_of(found.measurements, child))
+    return Better(ModelFile.of(path, tomlkit.dumps(document)), added, before, after)
+
+
+def _fitted(
+    found: Inference, model_file: ModelFile, score: float
+) -> tuple[Fitted, tuple[str, ...]]:
+    """What is to be written, and its new instances of effects; the score is not known yet."""
     model, name_of = _with_effects(model_file, found)
-    told = _told(numbers, name_of, model, duties=model_file.model.drive == "duty")
-    for estimate in told.estimates:
-        if instance_of(estimate.name) != "clock":
-            model.set(estimate.name, estimate.value)
-    opened = open_measurements(found.measurements, model_file)
-    before = comparison(model_file, opened)
-    of_clock = {e.name: e for e in told.estimates if e.name in (CLOCK, CLOCK_RATE)}
+    duties = model_file.model.drive == "duty"
+    estimates, covariance = _told(found.answer.numbers, name_of, model, duties=duties)
+    kept = [e for e in estimates if instance_of(e.name) != "clock"]
+    for estimate in kept:
+        model.set(estimate.name, estimate.value)
+    clock = {e.name: e for e in estimates if e.name in (CLOCK, CLOCK_RATE)}
     declared = model.clock_same or any(m.same_clock for m in found.measurements)
     if declared or len(found.measurements) > 1:  # several logs may have an offset each
-        of_clock = {}
-    kept = [e for e in told.estimates if instance_of(e.name) != "clock"]
-
-    def child(score: float) -> ModelFile:
-        fitted = Fitted(
-            model=model,
-            estimates=kept,
-            logs={m.log_name: m.log_sha256 for m in found.measurements},
-            score_before=before.score,
-            score_after=score,
-            clock=of_clock,
-            covariance=told.covariance.of([*(e.name for e in kept), *of_clock]),
-        )
-        return child_of(model_file, fitted, path, command)
-
-    written = child(before.score)
-    after = comparison(written, open_measurements(found.measurements, written))
-    written = child(after.score)
-    document = tomlkit.parse(written.text)
-    document["fit"]["always"] = as_table(always_of(found.measurements, written))
-    written = ModelFile.of(path, tomlkit.dumps(document))
-    return Better(written, tuple(name_of.values()), before, after)
+        clock = {}
+    fitted = Fitted(
+        model=model,
+        estimates=kept,
+        logs={m.log_name: m.log_sha256 for m in found.measurements},
+        score_before=score,
+        score_after=score,
+        clock=clock,
+        covariance=covariance.of([*(e.name for e in kept), *clock]),
+    )
+    return fitted, tuple(name_of.values())
 
 
 def _with_effects(model_file: ModelFile, found: Inference) -> tuple[native.Model, dict[str, str]]:
@@ -131,13 +132,9 @@ def _with_effects(model_file: ModelFile, found: Inference) -> tuple[native.Model
     return model, name_of
 
 
-@dataclass(frozen=True)
-class _Told:
-    estimates: list[ParameterEstimate]
-    covariance: Covariance
-
-
-def _told(numbers: Numbers, name_of: dict[str, str], model: native.Model, *, duties: bool) -> _Told:
+def _told(
+    numbers: Numbers, name_of: dict[str, str], model: native.Model, *, duties: bool
+) -> tuple[list[ParameterEstimate], Covariance]:
     """Estimates of the file's own quantities: of a refined table's nodes every second is one."""
     entries = {v["name"]: v for v in model.values()}
     at, names = [], []
@@ -167,4 +164,4 @@ def _told(numbers: Numbers, name_of: dict[str, str], model: native.Model, *, dut
                 seen=True,
             )
         )
-    return _Told(estimates, Covariance(tuple(names), cov))
+    return estimates, Covariance(tuple(names), cov)

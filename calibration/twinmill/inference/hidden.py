@@ -63,7 +63,7 @@ class Hidden:
         return cls(tuple(names), np.array(unit), gram, push, shift)
 
     def knows(self, effects: Sequence[str]) -> bool:
-        """Whether the own log tells of all of these; of a second of a kind it does not."""
+        """True if the own log tells of all of these; of a second of a kind it does not."""
         return set(effects) <= set(map(catalogue_name, self.names))
 
     def explained(self, h: Any, effects: Sequence[str], known: np.ndarray) -> tuple[Any, float]:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import tomlkit
-import twinmill_native as native
 
 from twinmill.arguments import option
 from twinmill.inference.hidden import Hidden
@@ -58,8 +57,7 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
     document["parent"] = model_file.hash
     document["created_by"] = command
     document.setdefault("fit", tomlkit.table())["always"] = as_table(always)
-    text = tomlkit.dumps(document)
-    return ModelFile(Path(path), text, native.Model.from_toml(text, str(path)))
+    return ModelFile.of(Path(path), tomlkit.dumps(document))
 
 
 def as_table(always: Always) -> dict[str, Any]:

@@ -26,8 +26,8 @@ class Belief:
     """One hypothesis and its probability.
 
     Attributes:
-        effects: of the catalogue that are missing, each kind once.
-        always: effects that the base always lacked, which is no news.
+        effects: of the catalogue that are missing, each kind once; without what the base always
+            lacked, which is no news.
         mimicked: effects in whose place one unnamed thing is; empty if none is.
         entry: of the table.
         stale: the base is known no better than a data sheet.
@@ -36,7 +36,6 @@ class Belief:
     """
 
     effects: tuple[str, ...]
-    always: tuple[str, ...]
     mimicked: tuple[str, ...]
     words: tuple[str, ...]
     entry: Entry
@@ -106,7 +105,7 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
     words = (AGAIN, *entry.words) if again else entry.words
     real = once(n for n in entry.effects if n not in (*row.mimicked, *row.always))
     like = tuple(n for n in once(row.mimicked) if n not in real)
-    return Belief(real, once(row.always), like, words, entry, probability)
+    return Belief(real, like, words, entry, probability)
 
 
 def _rows(entry: Entry, table: Table) -> list[_Row]:

@@ -301,10 +301,10 @@ class _Comparison:
         far as a data sheet lets it go; weights become zero (projection of a posterior; Goutis and
         Robert 1998, Biometrika 85).
         """
-        h, fitter = self.h, self.view.fitter
-        named, out = h.named, np.diag(h.named.astype(float))
+        named = self.h.named
+        out = np.diag(named.astype(float))
         if not named.all():
-            x, beside = fitter.whiten(h.slopes[named]), fitter.always
+            x, beside = self._rows[: named.sum()], self.view.fitter.always
             known = np.linalg.inv(self._stale_cov[np.ix_(named, named)])
             out[np.ix_(named, ~named)] = np.linalg.solve(x @ x.T + known, x @ beside.T)
         return out
@@ -423,8 +423,12 @@ class _Comparison:
 
     @cached_property
     def _stale(self) -> Linear:
-        known = self._known.parts[0].rows[0]
-        return self.h.linear(self.view.fitter, self._stale_cov, known)
+        return self.h.linear(self.view.fitter, self._stale_cov, self._rows)
+
+    @property
+    def _rows(self) -> np.ndarray:
+        """Of `Hypothesis.rows`."""
+        return self._known.parts[0].rows[0]
 
     @cached_property
     def _stale_cov(self) -> np.ndarray:

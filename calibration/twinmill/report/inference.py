@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Posterior probabilities of effects, as sentences and tables."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.arguments import option
 from twinmill.inference.answer import Answer, Named
-from twinmill.inference.better import Better
 from twinmill.inference.infer import Inference
 from twinmill.model.parameters import catalogue
 from twinmill.report import show
 from twinmill.report.tables import Cell, Table, number
+
+if TYPE_CHECKING:
+    from twinmill.inference.better import Better
 
 ONE_BY_ONE = (
     "Robots of one model differ by an amount that infer does not know: a small effect of one robot "
