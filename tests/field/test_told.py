@@ -316,6 +316,12 @@ FAULTS = {
         0,
         is_brief=True,
     ),
+    "stop_with_few_descriptors": Fault(
+        "`swarm stop` under `ulimit -n 5` (from its first packet)",
+        ("All stand. 2 robots were heard: R01, R02",),
+        0,
+        is_brief=True,
+    ),
     "stop_of_a_host_that_is_not_there": Fault(
         "`swarm stop --host` with a wrong address (from its first packet)",
         (

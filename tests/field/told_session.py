@@ -11,6 +11,7 @@ import json
 import os
 import pty
 import re
+import resource
 import select
 import shlex
 import signal
@@ -47,6 +48,7 @@ SIGNALLED = 128  # and the number of the signal by which a program ended, in a s
 HELD = "they stop by themselves"  # said once robots drive
 AT_THE_INSTANT_S = 0.3  # before it: who falls silent then is not missed before it
 HALTED_S = 0.5  # in which the held table wants to be drawn twice
+FEW_FILES = 5  # below, Python itself does not begin
 BUS_PORT = f":{7667:04X} "  # as /proc/net/udp has it
 START = ("start", "--arm", "--robots", "1,2")
 
@@ -412,6 +414,14 @@ class Field:
         operator.end()
         return self.row(stops_s[0], code)
 
+    def stop_with_few_descriptors(self) -> dict:
+        """As under `ulimit -n 5`: two more than the standard files, one for each socket."""
+
+        def limit() -> None:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (FEW_FILES, FEW_FILES))
+
+        return self._stopped_by(preexec_fn=limit)
+
     def stop_of_a_host_that_is_not_there(self) -> dict:
         operator = self.held(terminal=False)
         with self.hearing_stops() as stops_s:
@@ -699,11 +709,12 @@ class Field:
         self.operator = Operator(key, "start", terminal=False)
         return self._unmoved(begin_s, self.operator.end()) | {"made_a_key": key.exists()}
 
-    def _stopped_by(self, *words: str, key: Path | None = None) -> dict:
+    def _stopped_by(self, *words: str, key: Path | None = None, **options) -> dict:
         """Robots that are held, by another command."""
         operator = self.held(terminal=False)
         with self.hearing_stops() as stops_s:
-            self.operator = Operator(key or self.key_file, "stop", *words, terminal=False)
+            key = key or self.key_file
+            self.operator = Operator(key, "stop", *words, terminal=False, **options)
             code = self.operator.end()
         operator.end()
         return self.row(stops_s[0], code)

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bus of the tools on this machine alone: waiting ends in time whatever else is said on it."""
 
+import os
+import resource
 import socket
 import time
 
 import pytest
 
 from twinmill.data import bus as buses
-from twinmill.data.bus import HEADER, MAGIC_SHORT, SKIP_S, Reach, UdpBus, check_url, open_bus
+from twinmill.data.bus import HEADER, MAGIC_SHORT, SKIP_S, Reach, UdpBus, check_url, open_bus, too_many_files
 
 WAIT_MS = 200
 SLACK_S = 0.3  # the machine may be busy with other tests
@@ -31,8 +33,7 @@ def bus():
 
     yield bus, say
     mouth.close()
-    bus._ear.close()
-    bus._mouth.close()
+    bus.close()
 
 
 def always_ready(bus, monkeypatch, say):
@@ -86,14 +87,15 @@ def test_how_far_a_message_got_is_what_the_kernel_says_of_the_networks_that_took
 ):
     """IFF_RUNNING is what tells a network without a carrier from one that carries."""
     bus, _ = bus
-    monkeypatch.setattr(buses, "_kind", kinds.get)
+    monkeypatch.setattr(bus, "_kind", kinds.get)
     bus._ttl, bus.reach = ttl, Reach()
     bus._note(took, errors)
     assert (bus.reach.out, bus.reach.networks, bus.reach.fault) == says and bus.reach.said == 1
 
 
-def test_a_network_of_this_machine_is_known_by_its_flags():
-    assert buses._kind("lo") == "own" and buses._kind("no such") == "none"
+def test_a_network_of_this_machine_is_known_by_its_flags(bus):
+    bus, _ = bus
+    assert bus._kind("lo") == "own" and bus._kind("no such") == "none"
 
 
 @pytest.mark.parametrize(
@@ -113,3 +115,46 @@ def test_a_stop_can_wait_for_a_network(monkeypatch):
         waits.publish("A", b"")
     waits._ear.close()
     waits._mouth.close()
+
+
+@pytest.fixture
+def room_for_one(bus):
+    """No file can be opened but one."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    free = os.open(os.devnull, os.O_RDONLY)
+    os.close(free)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (free + 1, hard))
+    yield free + 1
+    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def test_a_stop_needs_one_socket_and_no_other_file(bus, room_for_one):
+    """It is heard by a bus that was there before."""
+    ear, _ = bus
+    heard = []
+    ear.subscribe("STOP", lambda *message: heard.append(message))
+    mouth = UdpBus(f"udpm://239.255.76.67:{ear.group[1]}?ttl=0", hears=False)
+    try:
+        mouth.publish("STOP", b"now")
+        assert ear.handle_timeout(WAIT_MS) and heard == [("STOP", b"now")]
+        with pytest.raises(OSError) as error:
+            mouth.hear()
+        told = too_many_files(error.value)
+        assert f"{room_for_one} are allowed" in told and "`ulimit -n " in told
+        assert not mouth.handle_timeout(1)
+    finally:
+        mouth.close()
+
+
+def test_networks_are_known_without_another_file(bus, room_for_one):
+    """All that have an address, as by the system's own list."""
+    ear, _ = bus
+    asker = ear._mouth
+    held = os.open(os.devnull, os.O_RDONLY)
+    try:
+        with pytest.raises(OSError):
+            socket.if_nameindex()
+        found = buses._networks(asker)
+    finally:
+        os.close(held)
+    assert found and found.items() <= dict(socket.if_nameindex()).items()

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from twinmill.defaults import URL
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
+from twinmill.streams import STDERR, STDOUT
 from twinmill_cli.output import print_object, say
 
 if TYPE_CHECKING:
@@ -38,16 +39,25 @@ def key_reaches() -> bool:
 
     Not so behind `&`, under cron, over ssh without `-t`, or below `timeout` in a script.
     """
+    with _terminal() as terminal:
+        try:
+            *_, local, _, _, keys = termios.tcgetattr(terminal)
+            is_set = bool(local & termios.ISIG) and keys[termios.VINTR] == INTERRUPT_KEY
+            return is_set and os.tcgetpgrp(terminal) == os.getpgrp()
+        except (OSError, termios.error):
+            return False
+
+
+@contextmanager
+def _terminal() -> Iterator[int]:
+    """A handle of this program's terminal, or a standard file, which may be none."""
     try:
         terminal = os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
-    except OSError:
-        return False
+    except OSError:  # there is none, or too many files are open
+        yield next((handle for handle in (0, STDOUT, STDERR) if os.isatty(handle)), STDERR)
+        return
     try:
-        *_, local, _, _, keys = termios.tcgetattr(terminal)
-        is_set = bool(local & termios.ISIG) and keys[termios.VINTR] == INTERRUPT_KEY
-        return is_set and os.tcgetpgrp(terminal) == os.getpgrp()
-    except (OSError, termios.error):
-        return False
+        yield terminal
     finally:
         os.close(terminal)
 
@@ -147,8 +157,11 @@ def saying_nothing() -> Iterator[Callable[[str], None]]:
 
     Gives a function that says a sentence where there is room for it, and else says nothing.
     """
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 2)
+    kept, nowhere = STDERR, None
+    with suppress(OSError):  # so many files are open that libraries keep their stderr
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        kept = os.dup(STDERR)
+        os.dup2(nowhere, STDERR)
 
     def say_if_heard(sentence: str) -> None:
         with suppress(OSError):
@@ -158,6 +171,8 @@ def saying_nothing() -> Iterator[Callable[[str], None]]:
     try:
         yield say_if_heard
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+        if kept != STDERR:
+            os.dup2(kept, STDERR)
+            os.close(kept)
+        if nowhere is not None:
+            os.close(nowhere)

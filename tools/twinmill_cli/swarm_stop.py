@@ -143,13 +143,12 @@ def stop(
         with _refusing():
             check_network(lcm_url)
         asked, prefix, misread = _read(robots, channel_prefix or "", context.meta.get(MISREAD, ""))
+        fleet = _say_first(lcm_url, prefix, asked)
+        begin_s = time.monotonic()
+        fleet.key, fault = key_if_there(key)
+        deaf = fleet.hear()
         with saying_nothing() as say:
-            connect = partial(open_bus, needs_network=False)
-            fleet = Fleet(lcm_url, prefix, connect)
-            begin_s = time.monotonic()
-            tell.say_stop(fleet, asked)  # before the disk or a name server is asked for anything
-            fleet.key, fault = key_if_there(key)
-            for words in filter(None, [misread, fault]):
+            for words in filter(None, [misread, fault, deaf]):
                 say(words)
             hosts = tell.Hosts(host or ())
             given = tell.stop(
@@ -172,7 +171,7 @@ def stop(
             is_cut_short=is_cut_short,
             reach=fleet.reach,
             to_all=not asked,
-            key_fault=f"No robot's signature could be checked: {fault}" if fault else "",
+            key_fault=deaf or (f"No robot's signature could be checked: {fault}" if fault else ""),
         )
         verdict = of_stop(given, how, is_of_some=bool(asked)).beside(driving(fleet, asked))
         verdict = verdict.more(of_dry_run(given))
@@ -184,6 +183,21 @@ def stop(
         voice.end(code, signals)
     voice.check()
     return code
+
+
+def _say_first(lcm_url: str, prefix: str, asked: set[int]) -> Fleet:
+    """Says stop before the disk, a name server or the system is asked for anything but a socket.
+
+    Raises:
+        ValueError: not even that can be had.
+    """
+    connect = partial(open_bus, needs_network=False, hears=False)
+    try:
+        fleet = Fleet(lcm_url, prefix, connect)
+    except ValueError as error:
+        raise ValueError(f"{error} NOTHING WAS STOPPED.") from error
+    tell.say_stop(fleet, asked)
+    return fleet
 
 
 def _read(robots: str | None, prefix: str, misread: str) -> tuple[set[int], str, str]:

@@ -5,14 +5,18 @@ The receiver of LCM's C library does not check all that a packet claims (program
 1.5.3 ended). Here a packet that is not as it should be is dropped.
 """
 
+import array
+import errno
 import fcntl
 import re
+import resource
 import select
 import socket
 import struct
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
@@ -33,27 +37,43 @@ SKIP_S = 0.01  # beyond a time-out, to get past what nobody subscribed to
 REJOIN_S = 1.0  # networks come and go: Wi-Fi is made anew, a cable is unplugged
 KINDS = ("udpm", "tcpq", "memq", "file")  # of buses that LCM's library has
 # From Linux's <linux/sockios.h>, <net/if.h> and <net/if_arp.h>.
-SIOCGIFFLAGS, SIOCGIFHWADDR = 0x8913, 0x8927
+SIOCGIFCONF, SIOCGIFFLAGS, SIOCGIFHWADDR, SIOCGIFINDEX = 0x8912, 0x8913, 0x8927, 0x8933
+IFREQ_BYTES, NAME_BYTES = 40, 16
+NETWORKS_MAX = 256
+TOO_MANY = (errno.EMFILE, errno.ENFILE)
 IFF_LOOPBACK, IFF_RUNNING, ARPHRD_ETHER = 0x8, 0x40, 1
 
 
-def open_bus(url: str, *, needs_network: bool = True) -> Any:
+def open_bus(url: str, *, needs_network: bool = True, hears: bool = True) -> Any:
     """A UdpBus, or what the library has for other kinds of buses, as file:// and tcpq://.
 
     Args:
         url: of the bus.
         needs_network: else the bus waits for one, and what is said meanwhile fails.
+        hears: as of UdpBus.
 
     Raises:
         RuntimeError: there is no such bus.
     """
     check_url(url)
     if url == "" or url.startswith("udpm:"):
-        bus = UdpBus(url)
+        bus = UdpBus(url, hears=hears)
         if needs_network and not bus.has_network:
             raise RuntimeError("no network")
         return bus
     return lcm.LCM(url)
+
+
+def too_many_files(error: BaseException | None) -> str:
+    """Sentence on the limit that kept something from being opened, and what to do; else empty."""
+    if not (isinstance(error, OSError) and error.errno in TOO_MANY):
+        return ""
+    if error.errno == errno.ENFILE:
+        return "too many files are open on this computer: end what has so many open."
+    most, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    enough = 1024 if hard == resource.RLIM_INFINITY else min(1024, hard)
+    remedy = f"`ulimit -n {enough}` allows more" if enough > most else "a new terminal allows more"
+    return f"too many open files: {most} are allowed to this program; {remedy}."
 
 
 def check_url(url: str) -> None:
@@ -150,11 +170,12 @@ class UdpBus:
         reach: how far that got what was published; another one may be put in its place.
     """
 
-    def __init__(self, url: str = ""):
+    def __init__(self, url: str = "", *, hears: bool = True):
         """Joins the bus.
 
         Args:
             url: udpm://ADDRESS:PORT?ttl=N, as LCM has it.
+            hears: else it only speaks, by one socket, and opens no other file, until `hear`.
 
         Raises:
             RuntimeError: it is no such URL, or there can be no socket.
@@ -164,26 +185,45 @@ class UdpBus:
         self.reach = Reach()
         self._handlers: list[tuple[re.Pattern, Handler]] = []
         self._sequence = 0
+        self._ear: socket.socket | None = None
+        self._joined: set[int] = set()
+        self._join_s = 0.0
         try:
-            self._ear = _listening_socket(self.group[1])
             self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self._ttl)
             self._mouth.setblocking(False)
+            self._names = _networks(self._mouth)
+            if hears:
+                self.hear()
         except OSError as error:
             raise RuntimeError(str(error)) from error
-        self._joined: set[int] = set()
-        self._join_s = 0.0
-        self._renew()
+
+    def hear(self) -> None:
+        """Hears what is said from now on.
+
+        Raises:
+            OSError: there can be no socket.
+        """
+        if self._ear is None:
+            self._ear, self._join_s = _listening_socket(self.group[1]), 0.0
+            self._renew()
+
+    def close(self) -> None:
+        """Says and hears nothing any more."""
+        self._mouth.close()
+        if self._ear:
+            self._ear.close()
+            self._ear = None
 
     @property
     def has_network(self) -> bool:
         """It is on one, be it this computer's own."""
-        return bool(self._joined)
+        return bool(self._joined if self._ear else self._names)
 
     @property
     def fault(self) -> str:
         """Why nothing leaves this computer; empty if something does, or nothing is meant to."""
-        kinds = {name: _kind(name) for _, name in socket.if_nameindex()}
+        kinds = {name: self._kind(name) for name in _networks(self._mouth).values()}
         if self._ttl == 0 or "out" in kinds.values():
             return ""
         return _not_connected(kinds)
@@ -194,19 +234,34 @@ class UdpBus:
         if now_s < self._join_s:
             return
         self._join_s = now_s + REJOIN_S
-        present = {index for index, _ in socket.if_nameindex()}
+        self._names = _networks(self._mouth)
+        present = set(self._names)
+        if self._ear is None:
+            return
         for index in self._joined - present:
             self._member(socket.IP_DROP_MEMBERSHIP, index)
         self._joined &= present
         self._joined |= {i for i in present if self._member(socket.IP_ADD_MEMBERSHIP, i)}
 
     def _member(self, what: int, index: int) -> bool:
+        assert self._ear
         request = struct.pack("=4s4si", socket.inet_aton(self.group[0]), bytes(4), index)
         try:
             self._ear.setsockopt(socket.IPPROTO_IP, what, request)
         except OSError:
             return index in self._joined
         return True
+
+    def _kind(self, name: str) -> str:
+        """A network: this computer's "own", "out" of it, "lost" its carrier, or "none"."""
+        flags = _asked(self._mouth, SIOCGIFFLAGS, name)
+        if flags & IFF_LOOPBACK:
+            return "own"
+        if flags & IFF_RUNNING:
+            return "out"
+        # Kernels make tunnels that nobody set up.
+        is_wire = _asked(self._mouth, SIOCGIFHWADDR, name) == ARPHRD_ETHER
+        return "lost" if is_wire else "none"
 
     def subscribe(self, channels: str, handler: Handler) -> None:
         """Has a function called with channel and payload of each message.
@@ -224,8 +279,8 @@ class UdpBus:
             OSError: it could be said on none.
         """
         packet, errors, took = self._packet(channel, data), {}, set()
-        names = dict(socket.if_nameindex())
-        for index in sorted(self._joined):
+        names = self._names
+        for index in sorted(self._joined if self._ear else names):
             interface = struct.pack("=4s4si", bytes(4), bytes(4), index)
             try:
                 self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
@@ -239,8 +294,8 @@ class UdpBus:
 
     def _note(self, took: set[str], errors: dict[str, str]) -> None:
         """Keeps how far a message got: a network without a carrier takes all, and loses it."""
-        kinds = {name: _kind(name) for name in took}
-        faults = [f"{n}: {why}" for n, why in errors.items() if _kind(n) != "none"]
+        kinds = {name: self._kind(name) for name in took}
+        faults = [f"{n}: {why}" for n, why in errors.items() if self._kind(n) != "none"]
         faults += filter(None, [_not_connected(kinds)])
         out = {name for name, kind in kinds.items() if kind == "out"}
         if self._ttl == 0 and took:
@@ -273,6 +328,9 @@ class UdpBus:
         while time.monotonic() <= end_s + SKIP_S:
             self._renew()
             left_s = max(0.0, end_s - time.monotonic())
+            if self._ear is None:
+                time.sleep(left_s)
+                return False
             if not select.select([self._ear], [], [], min(left_s, REJOIN_S))[0]:
                 if left_s == 0:
                     return False
@@ -308,25 +366,29 @@ def _parse_url(url: str) -> tuple[Address, int]:
     return address, ttl
 
 
-def _kind(name: str) -> str:
-    """A network by its name: this computer's "own", "out" of it, "lost" its carrier, or "none"."""
-    flags = _asked(SIOCGIFFLAGS, name)
-    if flags & IFF_LOOPBACK:
-        return "own"
-    if flags & IFF_RUNNING:
-        return "out"
-    # Kernels make tunnels that nobody set up.
-    return "lost" if _asked(SIOCGIFHWADDR, name) == ARPHRD_ETHER else "none"
+def _networks(asker: socket.socket) -> dict[int, str]:
+    """Names of this computer's networks by their numbers.
+
+    Where no file more can be opened only those that have an address of IPv4: by `asker` alone.
+    """
+    with suppress(OSError):
+        return dict(socket.if_nameindex())
+    room = array.array("B", bytes(NETWORKS_MAX * IFREQ_BYTES))
+    address, length = room.buffer_info()
+    answer = fcntl.ioctl(asker, SIOCGIFCONF, struct.pack("iP", length, address))
+    used = struct.unpack("iP", answer)[0]
+    entries = [room[k : k + NAME_BYTES].tobytes() for k in range(0, used, IFREQ_BYTES)]
+    names = {entry.split(b"\0")[0].decode() for entry in entries}
+    return {_asked(asker, SIOCGIFINDEX, name, "i"): name for name in names}
 
 
-def _asked(request: int, name: str) -> int:
-    """Answer of the kernel, a number of two bytes; 0 of a network that is gone."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker:
-        try:
-            answer = fcntl.ioctl(asker, request, struct.pack("16sH22x", name.encode(), 0))
-        except OSError:
-            return 0
-    (number,) = struct.unpack_from("H", answer, 16)
+def _asked(asker: socket.socket, request: int, name: str, kind: str = "H") -> int:
+    """Answer of the kernel, a number of that kind of `struct`; 0 of a network that is gone."""
+    try:
+        answer = fcntl.ioctl(asker, request, struct.pack("16s24x", name.encode()))
+    except OSError:
+        return 0
+    (number,) = struct.unpack_from(kind, answer, NAME_BYTES)
     return number
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import turbopi
 
 from twinmill.arguments import option
-from twinmill.data.bus import Reach, Senders, open_bus
+from twinmill.data.bus import Reach, Senders, open_bus, too_many_files
 from twinmill.defaults import URL
 from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
@@ -423,11 +423,23 @@ class Fleet:
             channels = f"{re.escape(channel_prefix)}(R[0-9]{{2,3}}_({kinds})|{commands})"
             self.bus.subscribe(channels, self._on_message)
         except RuntimeError as error:
+            if words := too_many_files(error.__cause__):
+                raise ValueError(f"robots cannot be spoken to: {words}") from error
             raise ValueError(
                 f"{option('lcm_url', url)}: cannot be joined ({error}); is there a network with a "
                 "route for "
                 "multicast (ip route add 224.0.0.0/4 dev DEVICE)?"
             ) from error
+
+    def hear(self) -> str:
+        """Begins to hear where the bus only spoke. Returns a sentence on why it cannot, if so."""
+        try:
+            if hasattr(self.bus, "hear"):
+                self.bus.hear()
+        except OSError as error:
+            why = too_many_files(error) or f"{error.strerror}."
+            return f"No robot can be heard: {why}"
+        return ""
 
     def _on_message(self, channel: str, data: bytes) -> None:
         name, _, kind = channel.removeprefix(self._prefix).partition("_")
