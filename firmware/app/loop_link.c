@@ -44,12 +44,17 @@ void loop_link_start_by_hand(struct loop *loop)
     loop_start(loop);
 }
 
+bool loop_link_is_held(const struct loop *loop)
+{
+    const struct loop_link *state = &loop->operator_link;
+    return loop_now_us(loop) - state->heard_us <= (int64_t)state->timeout_ms * 1000;
+}
+
 void loop_link_watch(struct loop *loop)
 {
     struct loop_link *state = &loop->operator_link;
     const bool drives = loop->running || loop->plan.waits;
-    if (drives && state->timeout_ms > 0 &&
-        loop_now_us(loop) - state->heard_us > (int64_t)state->timeout_ms * 1000)
+    if (drives && state->timeout_ms > 0 && !loop_link_is_held(loop))
     {
         loop_stop(loop);
         state->lost = true;

@@ -21,6 +21,10 @@ void loop_link_start_by_hand(struct loop *loop);
 // Stops a robot whose operator has not been heard for too long.
 void loop_link_watch(struct loop *loop);
 
+// An operator started the robot, and may still be there: whoever ends now could not tell him that it
+// stands.
+bool loop_link_is_held(const struct loop *loop);
+
 // Keeps an answer until the motor board was told.
 void loop_link_answer(struct loop *loop, const struct link_ack *ack);
 

@@ -9,6 +9,7 @@
 #include "devices.h"
 #include "loop.h"
 #include "loop_commands.h"
+#include "loop_link.h"
 #include "options.h"
 #include "priority.h"
 #include "radio/seal.h"
@@ -49,7 +50,7 @@ static void play(struct loop *loop, const struct options *options, int stop_fd)
 {
     const bool once = options->config.script[0] != '\0';
     while (supervisor_asked_to_end(stop_fd) == 0 && !loop->camera_over &&
-           !(once && loop->script_over))
+           !(once && loop->script_over && !loop_link_is_held(loop)))
     {
         loop_step(loop);
     }

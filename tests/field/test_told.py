@@ -278,6 +278,17 @@ FAULTS = {
         ("R02 is not heard any more", "NOT ALL STAND: R02: no stop was confirmed."),
         1,
     ),
+    "script_ends": Fault(
+        "the script ends that the held robot's own file names (from its last row)",
+        ("R01 stands: its script is over", "All stand: R01: its script is over"),
+        0,
+        is_brief=True,
+    ),
+    "script_ends_beside_another": Fault(
+        "the same beside a robot that drives on; then Ctrl-C",
+        ("R01 stands: its script is over", "All stand; R01 stood before: its script is over"),
+        130,
+    ),
     "camera_lost": Fault(
         "one robot's camera is lost and comes back; then Ctrl-C",
         ("R01 has a fault: camera lost", "R01 drives.", "All stand."),

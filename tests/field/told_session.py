@@ -43,6 +43,7 @@ CLOCK = (
 CTRL_C, CTRL_S, CTRL_Z = b"\x03", b"\x13", b"\x1a"
 LINK_TIMEOUT_S = 2.0
 TRIES = 3  # to start
+SCRIPT_S = 2.0
 STAYS_S = 0.5  # a robot that was stopped
 SIGNALLED = 128  # and the number of the signal by which a program ended, in a shell
 HELD = "they stop by themselves"  # said once robots drive
@@ -135,9 +136,11 @@ class Field:
         self.robots = {i: self.robot(i, str(i)) for i in IDS}
         self.operator: Operator | None = None
 
-    def robot(self, robot_id: int, name: str, machine: Machine | None = None) -> Robot:
+    def robot(
+        self, robot_id: int, name: str, machine: Machine | None = None, settings: tuple = ()
+    ) -> Robot:
         (self.folder / name).mkdir()
-        words = ["--lcm-url", URL, *robot_options(self.folder, robot_id)]
+        words = ["--lcm-url", URL, *robot_options(self.folder, robot_id), *settings]
         # Frames are not missed for ten seconds: it is the fault alone that stops the wheels.
         words += ["--set", "restart_ms=100", "--set", "frame_timeout_ms=10000"]
         # Its own file has no say in how long it drives on without its operator.
@@ -340,6 +343,50 @@ class Field:
         row = self.row(fault_s, operator.end()) | {"after_s": self.stood_after(fault_s, [2])}
         self.robots[2] = self.robot(2, "2 again")
         return row
+
+    def script_ends(self) -> dict:
+        """Of the one robot that is held: its own file names the script."""
+        with self._of_a_script():
+            begin_s = time.monotonic()
+            self.operator = Operator(
+                self.key_file, "start", "--arm", "--robots", "1", terminal=False
+            )
+            code = self.operator.end(40)
+            return self.row(self._script_over_s(begin_s), code, [1])
+
+    def script_ends_beside_another(self) -> dict:
+        """R02 drives on until Ctrl-C, which comes seconds after the script's end."""
+        with self._of_a_script():
+            begin_s = time.monotonic()
+            operator = self.start(terminal=False)
+            wait_until(lambda: "its script is over" in operator.plain, 20)
+            after_s = self.stood_after(self._script_over_s(begin_s), [1])
+            time.sleep(GONE_S + LINK_TIMEOUT_S)
+            drove = self.robots[2].duties() != ZERO
+            operator.process.send_signal(signal.SIGINT)
+            row = self.row(time.monotonic(), operator.end(40), [2])
+            return row | {"after_s": max(after_s, row["after_s"]), "drove": drove}
+
+    @contextmanager
+    def _of_a_script(self):
+        """R01 plays one, once, instead of its table."""
+        script = self.folder / "once.csv"
+        script.write_text(f"t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,10,10,10,10\n{SCRIPT_S},0,0,0,0\n")
+        self.robots[1].process.terminate()
+        self.robots[1].process.wait()
+        name = f"1 by its script {len(list(self.folder.iterdir()))}"
+        self.robots[1] = self.robot(1, name, settings=("--set", f"script={script}"))
+        time.sleep(1)
+        yield
+        self.robots[1].process.terminate()
+        self.robots[1].process.wait()
+        self.robots[1] = self.robot(1, f"{name}, over")
+        time.sleep(1)
+
+    def _script_over_s(self, begin_s: float) -> float:
+        """By its first move."""
+        rows = self.robots[1].rows()
+        return next(t for t, duties in rows if t > begin_s and duties != ZERO) + SCRIPT_S
 
     def camera_lost(self) -> dict:
         operator = self.held(terminal=False)
