@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Standard streams: which of them failed, and which lead nowhere."""
 
+import errno
 import os
 import stat
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ from contextlib import contextmanager
 
 STDOUT_NAME, STDERR_NAME = "standard output", "standard error"
 STDOUT, STDERR = 1, 2  # their handles
+closed_at_first: set[int] = set()  # those that this program began without (`>&-`)
 
 
 @contextmanager
@@ -27,6 +29,12 @@ def leads_nowhere(handle: int) -> bool:
     except OSError:
         return True
     return stat.S_ISCHR(file.st_mode) and file.st_rdev == os.stat(os.devnull).st_rdev
+
+
+def refuse_closed(handle: int, stream: str) -> None:
+    """Raises OSError if this program began without a stream: what is written there is lost."""
+    if handle in closed_at_first:
+        raise OSError(errno.EBADF, "closed (>&-), so nobody gets what is printed", stream)
 
 
 def file_of(stream: str) -> str:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is shown in terminals: foreign text as it is, tables and progress of any width uncut."""
 
+import errno
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -43,6 +44,13 @@ class PlainConsole(Console):
         """Rich's; an OSError names the stream."""
         with naming(STDERR_NAME if self.stderr else STDOUT_NAME):
             super().print(*objects, **options)
+
+    def on_broken_pipe(self) -> None:
+        """Nobody reads any more: that is told like any failure.
+
+        Rich's SystemExit would end no more than a thread that writes, and without a word.
+        """
+        raise BrokenPipeError(errno.EPIPE, "nobody reads it any more")
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None

@@ -333,6 +333,43 @@ FAULTS = {
         0,
         is_brief=True,
     ),
+    "start_without_standard_files": Fault(
+        "`swarm start` without standard input, output and error (`>&- 2>&-`)", (), 1, NEVER
+    ),
+    "start_of_an_object_that_nobody_gets": Fault(
+        "`swarm start --json >&-`",
+        ("standard output: closed (>&-), so nobody gets what is printed",),
+        1,
+        NEVER,
+        is_brief=True,
+    ),
+    "stop_of_an_object_that_nobody_gets": Fault(
+        "`swarm stop --json >&-` (from its first packet)",
+        ("All stand.", "standard output: closed (>&-), so nobody gets what is printed"),
+        1,
+    ),
+    "nobody_reads_on": Fault(
+        "`swarm start | true`: nobody reads its table (from the first move)",
+        ("Started at", "All stand.", "standard output: nobody reads it any more."),
+        1,
+        is_brief=True,
+    ),
+    "start_not_in_utf_8": Fault(
+        "`swarm start --behavior` with a word that is not in UTF-8",
+        ("is not in UTF-8; type it anew",),
+        1,
+        NEVER,
+    ),
+    "stop_not_in_utf_8": Fault(
+        "`swarm stop --robots` with such a word (from its first packet)",
+        ("must be numbers in 0..99", "So all robots are told to stop.", "All stand."),
+        2,
+    ),
+    "late_network": Fault(
+        "all that robots say comes 0.2 s late, by clocks that are right; Ctrl-C",
+        ("The network is late, as answers show", "Started at", "All stand."),
+        130,
+    ),
     "stop_of_a_host_that_is_not_there": Fault(
         "`swarm stop --host` with a wrong address (from its first packet)",
         (

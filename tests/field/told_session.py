@@ -40,6 +40,9 @@ CLOCK = (
     "import time; now, now_ns = time.time, time.time_ns; "
     "time.time, time.time_ns = lambda: now() + {0}, lambda: now_ns() + {0} * 10**9; "
 )
+# All that others say comes late.
+LATE = "import late_network; late_network.begin({0}); "
+LATE_S = 0.2
 CTRL_C, CTRL_S, CTRL_Z = b"\x03", b"\x13", b"\x1a"
 LINK_TIMEOUT_S = 2.0
 TRIES = 3  # to start
@@ -64,9 +67,11 @@ class Operator:
         terminal: bool = True,
         clock_ahead_s: int = 0,
         elsewhere: bool = False,
+        late_s: float = 0.0,
         **options,
     ):
         program = (CLOCK.format(clock_ahead_s) if clock_ahead_s else "") + COMMAND
+        program = (LATE.format(late_s) if late_s else "") + program
         command = [sys.executable, "-c", program, "swarm", *words, "--key", str(key)]
         if elsewhere:  # a computer without any network
             command = ["unshare", "--net", *command]
@@ -468,6 +473,57 @@ class Field:
             resource.setrlimit(resource.RLIMIT_NOFILE, (FEW_FILES, FEW_FILES))
 
         return self._stopped_by(preexec_fn=limit)
+
+    def start_without_standard_files(self) -> dict:
+        """Of a fault nobody could be told."""
+        begin_s = time.monotonic()
+        self.operator = Operator(
+            self.key_file, *START, terminal=False, preexec_fn=lambda: os.closerange(0, 3)
+        )
+        return self._unmoved(begin_s, self.operator.end())
+
+    def start_of_an_object_that_nobody_gets(self) -> dict:
+        begin_s = time.monotonic()
+        self.operator = Operator(
+            self.key_file, *START, "--json", terminal=False, preexec_fn=lambda: os.close(1)
+        )
+        return self._unmoved(begin_s, self.operator.end())
+
+    def stop_of_an_object_that_nobody_gets(self) -> dict:
+        return self._stopped_by("--json", preexec_fn=lambda: os.close(1))
+
+    def nobody_reads_on(self) -> dict:
+        """As `swarm start | true`: its table has no reader, its sentences do."""
+        read, write = os.pipe()
+        os.close(read)
+        begin_s = time.monotonic()
+        self.operator = operator = Operator(
+            self.key_file, *START, terminal=False, stdout=write, stderr=subprocess.PIPE
+        )
+        os.close(write)
+        assert wait_until(lambda: self.drive_since(begin_s), 20)
+        begun_s = min(
+            next(t for t, duties in self.robots[i].rows() if t > begin_s and duties != ZERO)
+            for i in IDS
+        )
+        _, said = operator.process.communicate(timeout=20)
+        operator.said = said.decode()
+        return self.row(begun_s, operator.process.returncode)
+
+    def start_not_in_utf_8(self) -> dict:
+        begin_s = time.monotonic()
+        self.operator = Operator(self.key_file, "start", "--behavior", "\udcfc", terminal=False)
+        return self._unmoved(begin_s, self.operator.end())
+
+    def stop_not_in_utf_8(self) -> dict:
+        return self._stopped_by("--robots", "\udcfc")
+
+    def late_network(self) -> dict:
+        """What robots say comes so late; their clocks are right."""
+        operator = self.held(terminal=False, late_s=LATE_S)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        return self.row(fault_s, operator.end())
 
     def stop_of_a_host_that_is_not_there(self) -> dict:
         operator = self.held(terminal=False)

@@ -203,7 +203,20 @@ def test_a_stop_is_said_before_a_file_is_read(monkeypatch, twinmill):
     assert order == ["stop", "key"]
 
 
-@pytest.mark.parametrize("words", [["stop"], ["swarm", "stopp"], ["robot", "stop"], ["STPO"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["stop"],
+        ["swarm", "stopp"],
+        ["robot", "stop"],
+        ["STPO"],
+        ["swarm", "stop-all"],
+        ["swarm", "pause"],
+        ["swarm", "--robots", "1"],
+        ["stop_robots"],
+        ["halt"],
+    ],
+)
 def test_a_stop_in_words_that_are_no_command_says_that_nothing_was_stopped(twinmill, words):
     code, _, err = twinmill(*words)
     assert code == 2 and "NOTHING WAS STOPPED: `twinmill swarm stop` stops robots." in err

@@ -9,13 +9,14 @@ import subprocess
 import sys
 import termios
 import time
+from contextlib import suppress
 
 import pytest
 
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.terminal import PlainConsole
-from twinmill_cli.swarm_signals import ended_by_signals
+from twinmill_cli.swarm_signals import commanding, ended_by_signals
 from twinmill_cli.voice import Voice
 
 BLOCKED_S = 0.3
@@ -26,7 +27,10 @@ class SilentBus:
     """Nobody speaks; what is said is counted."""
 
     def __init__(self, _=""):
-        self.said = 0
+        self.said, self.closed = 0, False
+
+    def close(self):
+        self.closed = True
 
     def subscribe(self, *_):
         pass
@@ -50,6 +54,35 @@ def wait_until_idle(voice):
     end_s = time.monotonic() + 10
     while not voice.is_idle and time.monotonic() < end_s:
         time.sleep(0.01)
+
+
+def test_a_reader_that_is_gone_silences_no_other_sentence(monkeypatch, capfd):
+    """Rich leaves its program where a pipe breaks: that would be the writer's thread alone."""
+    reads, writes = os.pipe()
+    os.close(reads)
+    voice = Voice()
+    with os.fdopen(writes, "w", closefd=False) as pipe:
+        voice.tell(lambda: PlainConsole(file=pipe).print("a table"))
+        voice.say("robots stand")
+        wait_until_idle(voice)
+        voice.end(0)
+        with pytest.raises(BrokenPipeError):
+            voice.check()
+        with pytest.raises(BrokenPipeError):
+            pipe.close()
+    os.close(writes)
+    assert "robots stand" in capfd.readouterr().err
+
+
+def test_a_command_leaves_the_bus_however_it_ends():
+    for error in (None, ValueError("refused"), KeyboardInterrupt()):
+        fleet = Fleet("", connect=SilentBus)
+        with suppress(ValueError, KeyboardInterrupt):
+            with commanding("status", lambda fleet=fleet: fleet, as_json=False):
+                assert not fleet.bus.closed
+                if error:
+                    raise error
+        assert fleet.bus.closed
 
 
 def test_who_gives_words_never_waits_until_they_are_written(voice):

@@ -16,7 +16,7 @@ import typer
 
 from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import STDERR, STDOUT
+from twinmill.streams import STDERR, STDOUT, closed_at_first
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.output import begin_telling, decided_or, has_told, print_object, say
 
@@ -24,6 +24,8 @@ WRONG_COMMAND_LINE = 2
 LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
 QUOTED = 80  # letters of what a sentence quotes
 TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
+OF_SWARM = (*TO_ROBOTS, "metrics", "plot", "watch", "compare", "phase", "matters", "ask")
+HALTS = ("halt", "abort", "kill", "off")  # other words for it
 NO_ROOM = {  # why a file takes no more, and what to do
     errno.ENOSPC: "no space is left there; make room, then do it again",
     errno.EDQUOT: "your quota of that disk is used up; make room, then do it again",
@@ -85,6 +87,7 @@ def _end_untouched() -> None:
 def _take_standard_files() -> None:
     """Else what is opened first has a number of theirs, and gets what is printed."""
     while (handle := os.open(os.devnull, os.O_RDWR)) <= STDERR:
+        closed_at_first.add(handle)
         os.set_inheritable(handle, True)
     os.close(handle)
     sys.stdout = sys.stdout or io.TextIOWrapper(io.FileIO(STDOUT, "w", closefd=False))
@@ -97,11 +100,17 @@ def _is_stop(words: list[str]) -> bool:
 
 
 def _of_no_stop(words: list[str]) -> str:
-    """To whoever asked for a stop by words that are no command, as `stop` or `swarm stopp`."""
+    """To whoever may have asked for a stop by words that are no command, as `swarm stop-all`."""
     asked = [word.lower() for word in words[:2] if not _is_stop(words)]
-    if not any(difflib.get_close_matches(word, ["stop"], cutoff=LIKE_STOP) for word in asked):
+    is_no_verb = asked[:1] == ["swarm"] and not {*asked[1:]} & {*OF_SWARM}
+    if not (is_no_verb or any(_means_stop(word) for word in asked)):
         return ""
     return " NOTHING WAS STOPPED: `twinmill swarm stop` stops robots."
+
+
+def _means_stop(word: str) -> bool:
+    is_like = bool(difflib.get_close_matches(word, ["stop"], cutoff=LIKE_STOP))
+    return is_like or "stop" in word or word in HALTS
 
 
 def _check_encoding(words: list[str]) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, TextIO
 import typer
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import STDERR_NAME, STDOUT_NAME, naming
+from twinmill.streams import STDERR_NAME, STDOUT, STDOUT_NAME, naming, refuse_closed
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -69,6 +69,7 @@ def print_object(data: dict) -> None:
     """One JSON object on stdout, in one line."""
     from twinmill.files import plain  # not for --help
 
+    refuse_closed(STDOUT, STDOUT_NAME)
     with naming(STDOUT_NAME):
         print(json.dumps(plain(data), allow_nan=False), flush=True)
     _told_on[:] = [sys.stdout]

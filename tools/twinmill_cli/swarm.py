@@ -54,7 +54,7 @@ if working():  # not for --help
         of_start,
         of_stop,
     )
-    from twinmill_cli.voice import Voice
+    from twinmill_cli.voice import Voice, refuse_deaf
 
 Behavior = Annotated[str | None, typer.Option("--behavior", "-b", help="Select it first.")]
 
@@ -114,6 +114,7 @@ def _start(
         raise typer.BadParameter("give one of them.", param_hint="--untethered, --link-timeout-s")
     asked, behavior = parse_robots(robots), check_behavior(behavior, "'--behavior'")
     check_bus(lcm_url, channel_prefix)
+    refuse_deaf()
     timeout_ms = 0 if untethered else round(1e3 * (link_timeout_s or LINK_TIMEOUT_MS / 1e3))
     options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
     with commanding("start", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
@@ -294,7 +295,7 @@ def _status(
     channel_prefix: BusPrefix = None,
     as_json: AsJson = False,
 ) -> int:
-    """Show who is there and how they are, until Ctrl-C.
+    """Show who is there and how they are: at a terminal until Ctrl-C, else one table.
 
     Example: twinmill swarm status
     """

@@ -44,6 +44,9 @@ def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_j
     text = Group(*([answer_table(given)] if given else []), verdict.sentence)
     try:
         deliver(data, text, as_json)
+    except BrokenPipeError as error:  # of which Typer says nothing
+        say(verdict.sentence)
+        raise OSError(f"{error.filename}: nobody reads it any more.") from error
     except OSError:
         say(verdict.sentence)
         raise

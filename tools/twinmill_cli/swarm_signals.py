@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from twinmill.defaults import URL
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import STDERR, STDOUT
+from twinmill.streams import STDERR, STDOUT, STDOUT_NAME, refuse_closed
 from twinmill_cli.output import print_object, say
 
 if TYPE_CHECKING:
@@ -139,6 +139,8 @@ def commanding(
     fleet = None
     with counting_signals(numbers) as asked:
         try:
+            if as_json:
+                refuse_closed(STDOUT, STDOUT_NAME)
             fleet = make()
             with watched(fleet, asked):
                 yield fleet
@@ -149,6 +151,9 @@ def commanding(
                 print_object({"verb": verb, "ok": False, "sentence": sentence, "robots": []})
             say(sentence)
             raise
+        finally:
+            if fleet:
+                fleet.close()
 
 
 @contextmanager

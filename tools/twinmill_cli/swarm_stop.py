@@ -163,6 +163,7 @@ def stop(
             reached_s = tell.reached_s(fleet, passed_s)
             if asked:
                 fleet.listen(tell.OTHERS_S)
+        fleet.close()
         is_cut_short = _ends_a_stop(signals) and passed_s < timeout_s
         how = Saying(
             passed_s=passed_s if is_cut_short else timeout_s,

@@ -19,7 +19,7 @@ from rich.live import Live
 from rich.text import Text
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import STDERR, STDOUT, leads_nowhere
+from twinmill.streams import STDERR, STDOUT, closed_at_first, leads_nowhere
 from twinmill.terminal import PlainConsole
 from twinmill_cli.exit_now import exit_now
 
@@ -39,12 +39,19 @@ def can_be_heard() -> bool:
     """Stdout or stderr is a file, or has somebody at its other end.
 
     Both have lost him, as when a connection by ssh breaks that had no terminal: no signal comes.
+    Or neither ever had one (`>&- 2>&-`).
     """
     poll = select.poll()
     for stream in STREAMS:
         poll.register(stream, 0)  # that nobody is there is told unasked
-    gone = [stream for stream, what in poll.poll(0) if what & (select.POLLERR | select.POLLHUP)]
-    return len(gone) < len(STREAMS)
+    gone = {stream for stream, what in poll.poll(0) if what & (select.POLLERR | select.POLLHUP)}
+    return len(gone | closed_at_first & {*STREAMS}) < len(STREAMS)
+
+
+def refuse_deaf() -> None:
+    """Raises OSError if nobody can be told anything any more."""
+    if not can_be_heard():
+        raise OSError(errno.EPIPE, NOBODY)
 
 
 class Voice:
@@ -134,10 +141,9 @@ class Voice:
             raise ValueError(f"what is to be told cannot be: {self.failure}") from self.failure
 
     def check_listener(self) -> None:
-        """Raises as check() does, and OSError if nobody can be told anything any more."""
+        """Raises as check() does, and as refuse_deaf() does."""
         self.check()
-        if not can_be_heard():
-            raise OSError(errno.EPIPE, NOBODY)
+        refuse_deaf()
 
     def end(self, code: int, signals: Sequence[int] = ()) -> None:
         """Waits until all is written. Who does not want to wait any more (Ctrl-C) need not.

@@ -431,6 +431,11 @@ class Fleet:
                 "multicast (ip route add 224.0.0.0/4 dev DEVICE)?"
             ) from error
 
+    def close(self) -> None:
+        """Leaves the bus; other buses than a UdpBus leave by themselves."""
+        if hasattr(self.bus, "close"):
+            self.bus.close()
+
     def hear(self) -> str:
         """Begins to hear where the bus only spoke. Returns a sentence on why it cannot, if so."""
         try:
