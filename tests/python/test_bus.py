@@ -9,7 +9,16 @@ import time
 import pytest
 
 from twinmill.data import bus as buses
-from twinmill.data.bus import HEADER, MAGIC_SHORT, SKIP_S, Reach, UdpBus, check_url, open_bus, too_many_files
+from twinmill.data.bus import (
+    HEADER,
+    MAGIC_SHORT,
+    SKIP_S,
+    Reach,
+    UdpBus,
+    check_url,
+    open_bus,
+    too_many_files,
+)
 
 WAIT_MS = 200
 SLACK_S = 0.3  # the machine may be busy with other tests

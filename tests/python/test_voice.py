@@ -77,11 +77,11 @@ def test_a_reader_that_is_gone_silences_no_other_sentence(monkeypatch, capfd):
 def test_a_command_leaves_the_bus_however_it_ends():
     for error in (None, ValueError("refused"), KeyboardInterrupt()):
         fleet = Fleet("", connect=SilentBus)
-        with suppress(ValueError, KeyboardInterrupt):
-            with commanding("status", lambda fleet=fleet: fleet, as_json=False):
-                assert not fleet.bus.closed
-                if error:
-                    raise error
+        joined = commanding("status", lambda fleet=fleet: fleet, as_json=False)
+        with suppress(ValueError, KeyboardInterrupt), joined:
+            assert not fleet.bus.closed
+            if error:
+                raise error
         assert fleet.bus.closed
 
 
