@@ -21,8 +21,7 @@ void loop_link_start_by_hand(struct loop *loop);
 // Stops a robot whose operator has not been heard for too long.
 void loop_link_watch(struct loop *loop);
 
-// An operator started the robot, and may still be there: whoever ends now could not tell him that it
-// stands.
+// An operator started the robot, and may still be there: ended, it could not say that it stands.
 bool loop_link_is_held(const struct loop *loop);
 
 // Keeps an answer until the motor board was told.

@@ -46,21 +46,20 @@ def test_a_stop_that_nobody_hears_says_at_once_what_it_waits_for(monkeypatch, tm
     assert "No robot was heard" in out and "--host" in out
 
 
-def test_a_stop_outlives_the_terminal_that_it_came_from(monkeypatch, tmp_path, twinmill):
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGUSR1, signal.SIGALRM, signal.SIGXCPU])
+def test_a_stop_outlives_the_terminal_that_it_came_from(monkeypatch, tmp_path, twinmill, number):
     """As where ssh breaks off while robots out of reach have not yet signed."""
     monkeypatch.setenv("HOME", str(tmp_path))
     ended = []
-    monkeypatch.setattr(
-        swarm_stop, "waiting_words", lambda *_: os.kill(os.getpid(), signal.SIGHUP) or ""
-    )
-    before = signal.signal(signal.SIGHUP, lambda *_: ended.append("hung up"))
+    monkeypatch.setattr(swarm_stop, "waiting_words", lambda *_: os.kill(os.getpid(), number) or "")
+    before = signal.signal(number, lambda *_: ended.append("hung up"))
     try:
         code, out, _ = twinmill("swarm", "stop", "--lcm-url", "memq://", "--timeout-s", "2")
         assert code == 1 and "No robot was heard" in out and not ended
-        os.kill(os.getpid(), signal.SIGHUP)
+        os.kill(os.getpid(), number)
         assert ended == ["hung up"]
     finally:
-        signal.signal(signal.SIGHUP, before)
+        signal.signal(number, before)
 
 
 def test_who_never_commanded_a_robot_gets_no_key_by_stopping_or_looking(

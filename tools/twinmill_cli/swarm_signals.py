@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     from twinmill.robots.fleet import Fleet
 
 # All by which a terminal, a shell or a session that ends asks a program to end or to pause.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+ENDING = (
+    signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP,
+    # of others, which end a program by default: a robot would drive until it has lost its operator
+    signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF,
+    signal.SIGXCPU, signal.SIGPWR, signal.SIGIO,
+)  # fmt: skip
 # What became of robots where a command was ended that had said something, by its verb.
 BECAME = {
     "start": "nothing was started; robots were told that they may be (--arm)",
