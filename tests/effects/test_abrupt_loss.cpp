@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "drive.h"
 
 namespace twin::test
@@ -19,6 +21,19 @@ TEST(AbruptLoss, LosesFromItsMomentOn)
             player.Play(kForward, 10);
             EXPECT_NEAR(player.state.pose.x_m, kFull_mps * (10 - loss * (10 - from_s)), 1e-6);
         }
+}
+
+// The integral of 1 / (1 + exp(-t / e)) is e ln(1 + exp(t / e)).
+TEST(AbruptLoss, ComesOverSeconds)
+{
+    for (const double edge_s : {0.5, 2.0})
+    {
+        Player player(With("abrupt_loss", {0.3, 0, 4, edge_s}), 0.02);
+        player.Play(kForward, 10);
+        const auto until = [edge_s](double t_s) { return std::log1p(std::exp(t_s / edge_s)); };
+        const double lost_s = 0.3 * edge_s * (until(10 - 4) - until(0 - 4));
+        EXPECT_NEAR(player.state.pose.x_m, kFull_mps * (10 - lost_s), 1e-5);
+    }
 }
 
 TEST(AbruptLoss, SlowsTurnsAndSidewaysAlike)

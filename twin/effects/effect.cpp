@@ -41,12 +41,12 @@ void BoundEffect::Set(Body &body) const
         on->set(body, numbers());
 }
 
-double Begun(double since_s)
+double Begun(double since_s, double edge_s)
 {
-    constexpr double kEdge_s = 0.1, kOver_s = 4;  // then it is 0 or 1 but for less than 1e-17
-    if (std::abs(since_s) > kOver_s)
+    constexpr double kOver = 40;  // edges: then it is 0 or 1 but for less than 1e-17
+    if (std::abs(since_s) > kOver * edge_s)
         return since_s > 0;
-    return 1 / (1 + std::exp(-since_s / kEdge_s));
+    return 1 / (1 + std::exp(-since_s / edge_s));
 }
 
 const EffectSpec *FindEffect(std::string_view name)

@@ -20,6 +20,7 @@ const char *RoleName(Role role)
         case Role::kSize: return "size";
         case Role::kPlace: return "place";
         case Role::kMoment: return "moment";
+        case Role::kDuration: return "duration";
         case Role::kLateness: return "lateness";
         case Role::kLimit: return "limit";
         case Role::kRadius: return "radius";

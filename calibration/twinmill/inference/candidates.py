@@ -11,6 +11,7 @@ from twinmill.data.track import Track
 from twinmill.inference.candidate import Candidate, with_limits, with_sizes
 from twinmill.inference.steps import Steps
 from twinmill.model.parameters import (
+    DURATION,
     LAG,
     MOTION_STAGES,
     WHERE_OR_WHEN,
@@ -71,7 +72,7 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
     """
     model = model.copy()
     model.add_effect(name)
-    parameters = effect_parameters(model, newest_instance(model, name), fresh=True)
+    parameters = effect_parameters(model, newest_instance(model, name), fresh=True, gradual=True)
     roles = [p.role for p in parameters]
     if "limit" in roles:
         return with_limits(name, parameters, model, steps)
@@ -79,8 +80,9 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
     on = np.array([p.usual for p in parameters])
     where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN]
     if where:
-        masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
-        on[where] = _everywhere([parameters[k] for k in where], steps)
+        own = [parameters[k] for k in where]
+        masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, own)
+        on[where] = _everywhere(own, steps)
     return with_sizes(name, parameters, model, steps, on=on, masks=masks, ends=ends, at=at)
 
 
@@ -88,7 +90,9 @@ def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
     """Values at which an effect of a place or a while acts in the whole log."""
     if where[0].role == "place":
         return [*steps.place.mean(axis=0), where[2].max]
-    return [0.0, where[-1].max][: len(where)]
+    moments = [p for p in where if p.role == "moment"]
+    begins_ends = [0.0, moments[-1].max][: len(moments)]
+    return [*begins_ends, *(p.usual for p in where[len(moments) :])]
 
 
 def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
@@ -113,13 +117,23 @@ def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
     return inside[used].astype(float), None, at[used]
 
 
-def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
-    """Masks (M, W) of times from a moment on, (G, 2) pairs of these, and (G, count) times in s."""
+def _whiles(
+    steps: Steps, where: list[Parameter]
+) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    """Masks (M, W) of times from a moment on, (G, 2) pairs of these, and (G, P) times in s.
+
+    What begins and ends does so at once here.
+    """
+    at_once_s = np.array([p.usual for p in where if p.role == DURATION])
     t_s, begin_s = steps.t_s, steps.logs[0].measurement.track.command_t_s[0]
     grid_s = np.linspace(t_s[0], t_s[-1], MOMENTS + 2)[1:-1]
     masks = (t_s >= grid_s[:, None]).astype(float)
-    if count == 1:
-        return masks, None, (grid_s - begin_s)[:, None]
+    if sum(p.role == "moment" for p in where) == 1:
+        return masks, None, _beside((grid_s - begin_s)[:, None], at_once_s)
     ends = np.column_stack(np.triu_indices(len(grid_s), 1))
     ends = ends[grid_s[ends[:, 1]] - grid_s[ends[:, 0]] >= LEAST_S]
-    return masks, ends, grid_s[ends] - begin_s
+    return masks, ends, _beside(grid_s[ends] - begin_s, at_once_s)
+
+
+def _beside(times_s: np.ndarray, at_once_s: np.ndarray) -> np.ndarray:
+    return np.column_stack([times_s, np.tile(at_once_s, (len(times_s), 1))])

@@ -32,6 +32,7 @@ CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between 
 FINE_GRID_S = np.arange(-0.05, 0.0501, 0.002)  # about that, where logs are set side by side
 CLOCK_REACH_S = 0.3  # about the best of the grid
 NO_LAG_S = 1e-3
+UNSEEN = 0.01  # variance of a column over that of noise: it moves the evidence by a 200th
 TOLD_BY = {  # what a thing depends on that is mistaken for an effect, by what its card needs
     "steady_speed": ("speed", "coupling of turns"),
     "poses": ("coupling of turns",),
@@ -142,11 +143,11 @@ def problem_of(
     bare.set(CLOCK, model.get(CLOCK))
     motion = _motion(steps, bare, always)  # as in its own log: weights belong to these columns
     found = discrepancy.kernels(motion)
+    noise = _begin_noise(steps, motion, model_file, always)
     if always is not None:
         prior = with_always(prior, always, found)
-        for columns in _missed_by_formulas(steps, model, motion, always.effects):
-            prior = prior.with_columns(columns)
-    noise = _begin_noise(steps, motion, model_file, always)
+        missed = _missed_by_formulas(steps, model, motion, always.effects)
+        prior = prior.with_columns(_seen(missed, noise))
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
@@ -161,19 +162,30 @@ def problem_of(
 
 def _missed_by_formulas(
     steps: Steps, model: native.Model, motion: Motion, effects: Sequence[str]
-) -> list[np.ndarray]:
-    """Arrays (K, W, 3): what the formulas of a model's effects may miss, each of usual size.
+) -> np.ndarray:
+    """(K, W, 3) columns of what the formulas of a model's effects may miss, of usual size.
 
     An effect is off in one of its forms by a size that is exponentially distributed; of this
     mixture the normal distribution has the variance.
     """
-    whole, found = steps.predicted(model), []
+    whole = steps.predicted(model)
+    found = [np.zeros((0, *whole.shape))]
     for name in effects:
         less = model.copy()
         less.remove_effect(effect_names(less).index(newest_instance(less, name)))
         forms = discrepancy.forms_of(whole - steps.predicted(less), motion)
         found += [np.sqrt(2 / len(forms)) * PRIORS.form * f for f in forms]
-    return found
+    return np.concatenate(found)
+
+
+def _seen(columns: np.ndarray, noise: Noise) -> np.ndarray:
+    """(K', W, 3) fewer columns of a Gaussian process: its principal components that noise leaves.
+
+    Karhunen-Loeve expansion; Rasmussen and Williams 2006, ch. 4.3.
+    """
+    white = noise.whiten(columns)
+    variance, ways = np.linalg.eigh(white @ white.T)
+    return np.tensordot(ways.T[variance > UNSEEN], columns, 1)
 
 
 def _set_to(model: native.Model, prior: Prior, always: Always) -> None:

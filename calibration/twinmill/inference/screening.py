@@ -13,12 +13,13 @@ from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.problem import Steps
 from twinmill.inference.settings import PRIORS
-from twinmill.model.parameters import WHERE_OR_WHEN, key_of, newest_instance
+from twinmill.model.parameters import DURATION, WHERE_OR_WHEN, key_of, newest_instance
 
 CELL = 4  # reaches by which a place or a while is moved make a step of the grid, as ...
 REACH_S, REACH = 0.5, 0.25  # ... they are of a moment, and of a place and its radius, over this
 NEARER, NEAREST = 0.5, 0.2  # factor on the reach where no move is better, and the last
 MOVES = 8  # at most
+AT_ONCE = 0.5  # chance that a change is at once, and that it is gradual: none is the usual one
 PLACES = 9  # decimals in which two points of a place or a while are the same
 Whiten = Callable[[np.ndarray], np.ndarray]
 
@@ -93,6 +94,7 @@ def nearby(
     names = [f"{instance}.{key_of(p.name)}" for p in c.parameters]
     where = [k for k, p in enumerate(c.parameters) if p.role in WHERE_OR_WHEN]
     low, high = (np.array([getattr(c.parameters[k], end) for k in where]) for end in ("min", "max"))
+    gradual = np.array([c.parameters[k].role == DURATION for k in where])
     ways = np.array(list(product((0, -1, 1), repeat=len(where))), float)  # the first stays
 
     usual = np.array([p.usual for p in c.parameters])
@@ -133,7 +135,8 @@ def nearby(
         alone = np.abs(ways).sum(axis=1) == 1
         falls = [gains[0] - gains[alone & (ways[:, k] != 0)].mean() for k in range(len(where))]
         widths = share * np.sqrt(np.pi / np.maximum(falls, 1e-9)) / CELL
-        log_share = float(np.log(np.minimum(widths, 1)).sum())
+        shares = np.minimum(np.where(gradual & (at == low), 1, widths), 1)
+        log_share = float(np.log(np.where(gradual, AT_ONCE, 1) * shares).sum())
         found.append((float(gains[best]), _start(c, weights[best], at, where), log_share))
     return max(found, key=lambda f: f[0] + f[2])[1:]
 

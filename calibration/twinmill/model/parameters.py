@@ -47,7 +47,9 @@ BASE_STEP = {
 GAIN_STEP = 0.004
 # Which part of a robot's lateness an effect changes, by its stage; "lag" at the others.
 LATE_PARTS = {"duty": "delay", "observe": "clock"}
-WHERE_OR_WHEN = ("place", "moment")  # roles of what says where an effect is, or from when on
+DURATION = "duration"  # role of how long an effect takes to come
+# Roles of what says where an effect is, or from when on.
+WHERE_OR_WHEN = ("place", "moment", DURATION)
 PHASE = "phase"  # role of where a formula's period is when a log begins
 NO_SIZE = (*WHERE_OR_WHEN, "radius", PHASE)  # roles that say nothing of how strong an effect is
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
@@ -396,8 +398,12 @@ def _told_lever(p: Parameter) -> Parameter:
     return replace(p, std=max(p.std, abs(p.value))) if of_lever else p
 
 
-def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -> list[Parameter]:
+def effect_parameters(
+    model: native.Model, instance: str, fresh: bool = False, gradual: bool = False
+) -> list[Parameter]:
     """Free quantities of one effect of a model; a fresh one begins at its defaults.
+
+    How long an effect takes to come is free if it may be `gradual`.
 
     Of a formula only those parameters that it names are free, but for its phases, which are of one
     log; nothing is known of their size but that they are no larger by far than 1, or than they are
@@ -410,7 +416,7 @@ def effect_parameters(model: native.Model, instance: str, fresh: bool = False) -
     for p in catalogue_of(model)[name]["parameters"]:
         if texts and not any(p["name"] in words(text) for text in texts.values()):
             continue
-        if p["name"] in own:
+        if p["name"] in own or (p["role"] == DURATION and not gradual):
             continue
         full = f"{instance}.{p['name']}"
         strength = p["default"] - p["neutral"]

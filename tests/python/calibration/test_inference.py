@@ -127,7 +127,10 @@ def test_a_patch_whose_centre_was_never_driven_to_is_found(
 def test_the_share_of_a_cell_is_that_of_the_evidence_over_it(
     measure, tanh_robot, one_clock_base, own
 ):
-    """Fits at 61 moments over the 2 s of a cell, averaged, against the Laplace approximation."""
+    """Fits at 61 moments over the 2 s of a cell, averaged, against the Laplace approximation.
+
+    That it comes at once is as likely as that it does not.
+    """
 
     class Slower(tanh_robot):
         def hindered(self, motion):
@@ -138,11 +141,12 @@ def test_the_share_of_a_cell_is_that_of_the_evidence_over_it(
     linear, c = told.linear(fitter), p.columns(told, ("abrupt_loss",))["abrupt_loss"]
     starts = screened(linear, {c.name: c}, fitter.whiten)[c.name].starts
     found, log_share = nearby(c, starts, told, linear, steps=p.steps, whiten=fitter.whiten)
-    at_s = found[2] + np.linspace(-1, 1, 61)
-    each = [fitter.with_effect(told, c, np.r_[found[:2], t_s], 0.0) for t_s in at_s]
+    at = np.tile(found, (61, 1))
+    at[:, 2] += np.linspace(-1, 1, 61)
+    each = [fitter.with_effect(told, c, values, 0.0) for values in at]
     logs = np.array([h.log_evidence(h.linear(fitter)) for h in each])
     averaged = logsumexp(logs) - np.log(len(logs)) - logs.max()
-    assert log_share == pytest.approx(averaged, abs=0.7)
+    assert log_share == pytest.approx(averaged - np.log(2), abs=0.7)
 
 
 @pytest.mark.parametrize("begins_s", [(12.0,), (6.0, 24.0)], ids=["once", "again"])
@@ -165,6 +169,27 @@ def test_a_loss_is_named_and_one_that_comes_again_depends_on_time(
     else:
         assert found.verdict == "outside_catalogue"
         assert next(iter(found.depends_on)) == "time"
+
+
+@pytest.mark.parametrize("course", ["ramp", "bump"])
+def test_a_loss_that_comes_slowly_is_one_loss(measure, tanh_robot, one_clock_base, own, course):
+    """20 % slower after a straight ramp of 6 s, or about a maximum, as half a wave of 16 s."""
+
+    class Slower(tanh_robot):
+        def hindered(self, motion):
+            t_s = np.arange(len(motion)) * STEP_S
+            ramp = np.clip((t_s - 14) / 6, 0, 1)
+            bump = np.sin(np.pi * np.clip((t_s - 12) / 16, 0, 1)) ** 2
+            return motion * (1 - 0.2 * {"ramp": ramp, "bump": bump}[course])[:, None]
+
+    found = infer([measure(Slower(), 13)], one_clock_base, [own]).answer
+    assert found.verdict in ("effect_missing", "ambiguous")
+    # one that lasts to the end of the log may have been for a while
+    told = found.findings[0]
+    assert set(told.group) <= {"abrupt_loss", "transient_loss"}
+    assert {"ramp": "abrupt_loss", "bump": "transient_loss"}[course] in told.group
+    value, std = number(found, told.effect, "loss")
+    assert abs(value - 0.2) < 3 * std
 
 
 def test_the_written_model_predicts_another_log_and_nothing_is_missing_then(

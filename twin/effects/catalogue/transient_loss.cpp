@@ -11,8 +11,8 @@ constexpr Card kCard = {
     .drives = kAnyDrive,
     .summary = "For a while the wheels bring less, and then as much as before.",
     .equation =
-        "v' = v (1 - loss w), w = 1 / (1 + exp(-(t - from) / 0.1 s)) - "
-        "1 / (1 + exp(-(t - until) / 0.1 s)); t since the log's first command",
+        "v' = v (1 - loss w), w = 1 / (1 + exp(-(t - from) / edge)) - "
+        "1 / (1 + exp(-(t - until) / edge)); t since the log's first command",
     .leaves_out = "what comes more than once; sides that lose differently; times of several logs",
     .measure =
         "drives that come by the same places at several times: a floor does the same to one visit",
@@ -30,6 +30,9 @@ constexpr ParameterSpec kParameters[] = {
      "", 3, Role::kMoment},
     {"until_s", "s", 100000, 6, 0, 100000, "when all is as before again; means nothing at no loss",
      "", "", 3, Role::kMoment},
+    {"edge_s", "s", kAtOnce_s, kAtOnce_s, kAtOnce_s, kSlowest_s,
+     "how gradual the change is: 0.1 s is at once; means nothing at no loss", "", "", 3,
+     Role::kDuration},
 };
 
 void Step(RollSignals &s, const Numbers &v, double *)
@@ -37,7 +40,7 @@ void Step(RollSignals &s, const Numbers &v, double *)
     if (v[0] == 0)
         return;
     const double t_s = s.t_s + s.dt_s / 2;
-    const double whole = Begun(t_s - v[1]) - Begun(t_s - v[2]);
+    const double whole = Begun(t_s - v[1], v[3]) - Begun(t_s - v[2], v[3]);
     for (int k = 0; k < s.robot.wheels; ++k)
         s.radius_ratio[k] *= 1 - v[0] * whole;
 }

@@ -14,6 +14,7 @@ enum class Role
     kSize,      // how strong the effect is
     kPlace,     // where in the room it acts, how far: a search starts from several places
     kMoment,    // when it begins: a search starts from several
+    kDuration,  // how long it takes to come: no fit moves it unless told to
     kLateness,  // how late a response comes: only the sum with other such parameters is firm
     kLimit,     // beyond which something happens, with no trace below: a search starts from several
     kRadius,    // of a wheel, by which its angle grows: the errors of a log tell where to start
