@@ -112,7 +112,7 @@ def _with(form: Hidden, **values: float) -> Hidden:
 
 
 def recorded(number: int, duration_s: float) -> dict:
-    """What all runs of one robot tell: healthy ones, then those with a weak wheel."""
+    """Recordings of all runs of one robot: healthy ones, then those with a weak wheel."""
     with TemporaryDirectory() as folder:
         drawn = draw(number, Path(folder))
         random = np.random.default_rng([number, 1])
@@ -189,7 +189,7 @@ def _told(found: Alarm, wheel: str, wheels: str) -> dict:
 
 
 def rates(tests: list[dict]) -> list[str]:
-    """What came of it, in sentences."""
+    """Rates of alarms and misses, in sentences."""
     told = []
     for calibrated in (False, True):
         same = [t for t in tests if t["calibrated"] == calibrated]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Of hidden effects that `diagnose` names from a motion capture's poses, how many from a film.
+"""Share of hidden effects that `diagnose` names though poses come from a film.
 
     nice .venv/bin/python benchmarks/film.py --n 40 --seed 1 --out film
 
@@ -96,7 +96,7 @@ def view_of(shot: Shot, random: np.random.Generator) -> View:
 
 
 def tracked(shot: Shot) -> RobotPath:
-    """What `twinmill track` finds in the film."""
+    """Path of the robot that `twinmill track` finds in the film."""
     steps_s = np.arange(len(shot.motion.pose)) * STEP_S
 
     def path(t_s: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def miss_of(shot: Shot, robot: RobotPath) -> dict:
 
 
 def judged(shot: Shot, folder: Path, seed: int) -> dict:
-    """What is said of a case from both."""
+    """Answers to a case from motion capture and from film, side by side."""
     case = shot.case
     base = tm.Model.load(base_of(folder, case.robot, case.plan.robot, seed, duration_s=BASE_S))
     capture, film = (folder / f"{case.number}_{what}.lcmlog" for what in ("capture", "film"))

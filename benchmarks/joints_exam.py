@@ -175,7 +175,7 @@ Push = Callable[[mujoco.MjData, float], None]
 
 @dataclass(frozen=True)
 class Case:
-    """What is planted.
+    """Planted defect of a joint model.
 
     Attributes:
         names: answers that are right, one set for each cause.
@@ -518,7 +518,7 @@ def record(robot: str, case: Case, seed: int) -> JointLog:
 
 
 def judged(case: Case, found) -> dict[str, bool]:
-    """What of an answer is right."""
+    """Marks each part of an answer as right or wrong."""
     names = [f.effect for f in found.findings]
     groups = [{f.effect, *f.group} for f in found.findings]
     sure = [f.effect for f in found.findings if f.certainty == "sure"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same swarms here and in swarmsim 1.2.5, from the same starts, judged by the same metrics.
+"""Swarms run here and in swarmsim 1.2.5 from equal starts, judged by equal metrics.
 
     python3.12 -m venv other && other/bin/pip install swarmsim==1.2.5
     .venv/bin/python benchmarks/parity.py --other other/bin/python --runs 200

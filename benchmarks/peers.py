@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same decision by OpenCV: as TurboPi robots usually take it, and as an expert would.
+"""Decision from one picture by OpenCV: as TurboPi robots usually make it, and as an expert would.
 
 The published sequence is in GMU-ASRC/turbopi-root,
 hiwonder_common/src/hiwonder_common/camera_binary_program.py, and in the vendor's Camera.py. Left

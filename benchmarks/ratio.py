@@ -24,7 +24,7 @@ class Ratio:
 
     @property
     def met(self) -> bool:
-        """Whether the median is where it should be."""
+        """True if the median lies where the benchmark promises."""
         too_low = self.at_least is not None and self.ratio < self.at_least
         too_high = self.at_most is not None and self.ratio > self.at_most
         return not (self.skipped or too_low or too_high)
@@ -49,6 +49,6 @@ def single(name: str, a: float, b: float, unit: str, **goal: float | str) -> Rat
 
 
 def skipped(name: str, why: str) -> Ratio:
-    """What could not be measured here."""
+    """Row that gives the reason why nothing could be measured here."""
     nothing = float("nan")
     return Ratio(name, nothing, nothing, "", nothing, nothing, nothing, skipped=why)

@@ -53,7 +53,7 @@ class Robot:
         return begin_us
 
     def rows(self) -> np.ndarray:
-        """What the board was told: (N, 5) monotonic time in us and four duties in percent."""
+        """Duties that the board received: (N, 5) monotonic time in us, four duties in percent."""
         return np.loadtxt(self._record, delimiter=",", dtype=np.int64, ndmin=2)
 
     def driver(self) -> int:

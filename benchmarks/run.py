@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Part(StrEnum):
-    """What can be measured by itself."""
+    """Benchmark that can run by itself."""
 
     DECISION = "decision"
     DELAY = "delay"

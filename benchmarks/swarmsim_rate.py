@@ -21,7 +21,7 @@ TURN_RADPS = math.radians(45)
 
 
 def rate(seed: int) -> float:
-    """Of one world, per second of processor time."""
+    """World-seconds that one world advances in a second of processor time."""
     draw = random.Random(seed)
     world = RectangularWorld(RectangularWorldConfig(size=[10, 10], time_step=STEP_S, seed=seed))
     for k in range(ROBOTS):

@@ -23,7 +23,7 @@ ROBOTS, GOAL = "blue", "goal"
 
 
 class SeesWhatItStandsIn(BinaryFOVSensor):
-    """The same, but a region that the robot stands in is seen whatever is ahead."""
+    """Sensor that also sees a region in which the robot stands, whatever is ahead."""
 
     def checkForLOSCollisions(self, world: RectangularWorld) -> None:
         """As the sensor it is of, then within the regions of its team."""

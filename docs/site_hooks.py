@@ -38,7 +38,7 @@ def commands_of(page: str) -> list[str]:
 
 
 def run(command: str, folder: Path) -> str:
-    """What a command prints on stdout.
+    """Standard output of a command that must succeed.
 
     Raises:
         RuntimeError: it failed; its own words.

@@ -161,7 +161,7 @@ def _case(out: Path, base: Path, case: Case, seed: int) -> dict:
 
 
 def _recordings(out: Path, console: Console) -> list[dict]:
-    """What each rival says of each recording; none, with the reason, where they are not there."""
+    """Answers of each rival for each recording; none, with the reason, where none are there."""
     rows = []
     try:
         for recording in recordings.recordings(out / "recordings"):
@@ -196,7 +196,7 @@ def _kept(out: Path, rival: Rival, parts: list) -> Path:
 
 
 def _found(asked: argparse.Namespace, results: list[dict], real: list[dict]) -> dict:
-    """What is printed as JSON: rows of the table, then every case. The same for the same seed."""
+    """JSON output: rows of the table, then every case; equal seeds give equal bytes."""
     rows = [
         {
             "rival": rival.name,

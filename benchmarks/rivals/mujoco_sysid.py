@@ -103,7 +103,7 @@ def _lag_names(model: native.Model) -> list[str]:
 
 
 def _lags_s(model: native.Model) -> tuple[float, float]:
-    """Of travel and of turns."""
+    """Time constants of travel and of turns."""
     lags_s = {name: model.get(name) for name in _lag_names(model)}
     turn_s = sum(lags_s.values())
     travel_s = turn_s - lags_s.get(YAW_EXTRA, 0.0)

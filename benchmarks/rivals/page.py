@@ -80,7 +80,7 @@ def _key(r: dict) -> tuple[str, str]:
 
 
 def _rates(found: dict, times_s: dict) -> Table:
-    """What was told, named, said of the rest; how long it took."""
+    """Table of each rival's rates (told, named, said of the rest) and its time."""
     rows = []
     for r in found["rows"]:
         time_s = times_s[r["rival"]]["median"]

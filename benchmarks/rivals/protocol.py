@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every rival gets and gives."""
+"""Interface of all rivals: the problem that each gets and the answer that it gives."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -49,7 +49,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a rival says of a problem.
+    """Reply of a rival to a problem.
 
     Attributes:
         told: something is missing.

@@ -66,7 +66,7 @@ def recordings(out: Path) -> Iterator[Recording]:
 
 
 def told(recording: Recording, answer: Answer) -> tuple[str, bool]:
-    """What an answer says in words, and whether it is right."""
+    """Answer in words, and True beside it if it is right."""
     names = list(answer.names)
     if answer.said:
         names = [" or ".join(sorted({f.effect, *f.group})) for f in said(answer.said)]

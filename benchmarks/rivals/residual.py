@@ -155,7 +155,7 @@ def _with_pose(known: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 
 def _known(measurement, model, t_s, body, *, step_s):
-    """What commands, battery and clock tell of each step: columns, their names and groups."""
+    """Regressors of each step from commands, battery and clock: columns, their names and groups."""
     axes = ("forward", "left", "turn")
     change = np.diff(body, axis=0, prepend=body[:1]) / step_s
     keep = np.exp(-step_s / MEMORY_S)

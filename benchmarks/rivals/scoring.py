@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What rivals said beside what was hidden: each rival, each setting, every column.
+"""Scores of rivals against the hidden truth: each rival, each setting, every column.
 
 Names and dependence are judged by the rules of `twinmill lab challenge`; a rival's answer is put
 into the form of `twinmill diagnose --json` for that.
@@ -96,7 +96,7 @@ def row(cases: Iterable[dict]) -> dict:
 
 
 def _within(case: dict) -> bool:
-    """Whether every error of a case's predictions is near the truth's."""
+    """True if every error of a case's predictions is near the truth's."""
     return all(case[column.key] <= WITHIN for column in ERRORS)
 
 

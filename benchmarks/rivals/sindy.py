@@ -63,7 +63,7 @@ class Sparse:
 
     @property
     def names(self) -> list[str]:
-        """Of the library's terms."""
+        """Names of the library's terms, in the order of its columns."""
         return self.model.get_feature_names()
 
     def __call__(self, features: np.ndarray) -> np.ndarray:

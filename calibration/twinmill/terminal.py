@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is shown in terminals: foreign text as it is, tables and progress of any width uncut."""
+"""Rules of terminal output: foreign text as it is, tables and progress of any width uncut."""
 
 import errno
 from collections.abc import Iterable, Sequence
@@ -166,7 +166,7 @@ def progress_bar(counted: bool = True) -> Progress:
 
 
 def progress_words(transient: bool = True) -> Progress:
-    """What is being done and for how long, on stderr if that is a terminal.
+    """Progress display of the task under way and its time, on stderr if that is a terminal.
 
     Args:
         transient: it is gone when the work is done.
@@ -181,10 +181,10 @@ def _shown(columns: list[ProgressColumn], transient: bool = True) -> Progress:
 
 
 def _words() -> TextColumn:
-    """What is being done; it wraps."""
+    """Column for the task under way; it wraps."""
     return TextColumn("{task.description}", markup=False, table_column=Column(overflow="fold"))
 
 
 def _whole() -> Column:
-    """Of numbers, which do not wrap."""
+    """Column for numbers, which do not wrap."""
     return Column(no_wrap=True)

@@ -45,7 +45,7 @@ def heard_again(fleet: Fleet) -> bool:
 
 
 def armed(fleet: Fleet, listener: Fleet | None = None) -> list:
-    """What the robot answers to an arm that is signed with the fleet's key.
+    """Sends the robot an arm that is signed with the fleet's key; its answers.
 
     One with an old key hears no new session: a listener does, and the signature alone is wrong.
     """

@@ -46,7 +46,7 @@ def full_pipe():
 
 @contextlib.contextmanager
 def terminal():
-    """What runs a command at a terminal of its own, and that terminal's other end."""
+    """Pair: runner of a command at a terminal of its own, and that terminal's other end."""
     master, line = pty.openpty()
     begin = "import os, sys; os.open(sys.argv[1], os.O_RDWR); os.execvp(sys.argv[2], sys.argv[2:])"
     yield [sys.executable, "-c", begin, os.ttyname(line)], master
@@ -153,14 +153,14 @@ class Robot:
             return []
 
     def rows(self) -> list[tuple[float, tuple[int, ...]]]:
-        """What the board was told: monotonic time in s and four duties."""
+        """Duties that the board received: monotonic time in s and four duties."""
         if not self.record.exists():
             return []
         rows = [tuple(map(int, line.split(","))) for line in self.record.open() if "\n" in line]
         return [(row[0] / 1e6, row[1:]) for row in rows]
 
     def duties(self) -> tuple[int, ...]:
-        """What the board was told last."""
+        """Last duties that the board received."""
         rows = self.rows()
         return rows[-1][1] if rows else ZERO
 

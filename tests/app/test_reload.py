@@ -42,7 +42,7 @@ class Card:
         self.path.write_text("\n".join([*text, *lines, ""]))
 
     def runs(self):
-        """What the robot said of itself, by number of the robot."""
+        """Run messages of the robot, by number of the robot."""
         events = lcm.EventLog(str(self.log), "r") if self.log.exists() else []
         runs = [turbopi.run_t.decode(e.data) for e in events if e.channel.endswith("_RUN")]
         return {run.robot_id: run for run in runs}

@@ -108,7 +108,7 @@ def holds(pid, path):
 
 
 def test_a_driver_that_cannot_write_is_helped_and_a_lost_board_let_go(driving):
-    """What was unplugged gets its name back only when nobody has it open any more."""
+    """The unplugged board gets its name back only when nobody has it open any more."""
     pids = processes(driving)
     assert wait_until(lambda: all(holds(pid, driving.record) for pid in pids.values()))
     begin_s = time.monotonic()
@@ -317,7 +317,7 @@ def test_stop_waits_for_no_pipe(tmp_path):
 
 
 def test_stop_ends_the_program_that_drives(driving):
-    """What that had under way may come after the first zero: the last comes once it has ended."""
+    """The other program's last words may follow the first zero: a zero comes after its end."""
     done = stop("--config", "/dev/null", "--board", f"stub:{driving.record}")
     rows_at_end = driving.rows()
     code, _ = driving.end()

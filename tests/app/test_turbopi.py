@@ -127,7 +127,7 @@ def test_dead_program_is_started_again(tmp_path):
 
 
 def test_no_autostart_where_a_stop_could_not_be_kept_in_mind(tmp_path):
-    """What stopped it may have been forgotten: the robot waits, and says why."""
+    """The reason for the stop may be forgotten: the robot waits, and says why."""
     options = ("--set", "autostart=true", "--set")
     with Robot(TURBOPI, tmp_path, *options, f"run_dir={tmp_path}") as robot:
         assert robot.wait_for(LEFT)
@@ -222,7 +222,7 @@ def write_frames(path: Path, seed: int, count: int):
 
 @dataclass
 class Played:
-    """What went through the program, and what it wrote of it."""
+    """Frames that went through the program, and its log of them."""
 
     frames: Path
     telemetry: list
@@ -400,7 +400,7 @@ def test_systemd_is_told(tmp_path):
 
 @pytest.fixture(scope="module")
 def bus_session(tmp_path_factory):
-    """What happened in a network of its own: see bus_session.py."""
+    """Record of a session in a network of its own: see bus_session.py."""
     script = Path(__file__).with_name("bus_session.py")
     done = subprocess.run(
         [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the documentation shows is what happens: commands, notebook, pages and their links."""
+"""Documentation tells the truth: commands, notebook, pages and their links."""
 
 import json
 import re
@@ -27,7 +27,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def outputs(folder) -> dict[str, str]:
-    """What each command of the tutorial prints; it fails if one does."""
+    """Output of each command of the tutorial; it fails if one does."""
     page = (ROOT / "docs/tutorial.md").read_text()
     return {command: run(command, folder) for command in commands_of(page)}
 

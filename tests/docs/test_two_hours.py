@@ -47,7 +47,7 @@ def test_what_takes_seconds_runs(tmp_path):
 
 
 def body_velocity(kind, driven):
-    """Of a robot whose driven wheels roll forward at 1 rad/s: the least squares without slip."""
+    """Velocity with wheels rolling forward at 1 rad/s: least squares without slip."""
     text = (
         f'name = "m"\n[base]\ndrive = "wheel_speed"\nwheels = "{kind}"\ncontrol_period_s = 0.02\n'
     )

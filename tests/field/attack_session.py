@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What somebody else on the network may try: replays, forgeries, floods, a robot's twin brother.
+"""Attacks from elsewhere on the network: replays, forgeries, floods, a robot's twin brother.
 
 Usage: attack_session.py FOLDER, in a network of its own, with TURBOPI set. Prints what happened as
 JSON. The attacker hears everything, says anything, and has no key.

@@ -41,7 +41,7 @@ def swarm_words(found: Path, name: str, behaviors: Path) -> tuple[str, ...]:
 
 
 def metrics_of(log: Path, found: Path) -> dict:
-    """What `twinmill metrics` says of a log."""
+    """Output of `twinmill metrics` for a log."""
     words = ("metrics", log, "--model", found / "model.toml", "--json")
     done = subprocess.run([TWINMILL, *words], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)

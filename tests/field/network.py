@@ -16,12 +16,12 @@ NETWORK = (
 
 
 def run_session(script: str, *arguments) -> dict:
-    """What a session of this folder found, as it printed it; skips where networks cannot be."""
+    """Findings of a session of this folder, as it printed them; skips where networks cannot be."""
     return run_session_at(Path(__file__).with_name(script), *arguments)
 
 
 def run_session_at(script: Path, *arguments, timeout_s: float = 200) -> dict:
-    """The same of a session that lies anywhere."""
+    """Findings of a session that lies anywhere."""
     command = ["unshare", "--net", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
     command += ["sh", "-c", NETWORK, "sh", sys.executable, script]
     try:
@@ -40,7 +40,7 @@ def run_session_at(script: Path, *arguments, timeout_s: float = 200) -> dict:
 
 
 def run_twin_session(script: str, *arguments) -> dict:
-    """The same of a session that starts the twin; skips where it is not named."""
+    """Findings of a session that starts the twin; skips where it is not named."""
     if not os.environ.get("TWIN_RUN"):
         pytest.skip("TWIN_RUN does not name the program")
     return run_session(script, *arguments)

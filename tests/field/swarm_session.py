@@ -115,7 +115,7 @@ def own_table_round() -> dict:
 
 
 def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
-    """What a robot answers to each command of PROTOCOL after one that it obeyed."""
+    """Robot's answer to each command of PROTOCOL after one that it obeyed."""
     fleet = Fleet(URL, prefix, key=KEY)
     fleet.listen(0.5)
     given = {}
@@ -132,7 +132,7 @@ def answers_to_bad_commands(prefix: str, robot_id: int) -> dict:
 
 
 def behaviors(fleet: Fleet) -> list:
-    """What each says that it does; None before it says so."""
+    """Behaviour that each robot says it has; None before it says so."""
     return [r.run and r.run.behavior for r in fleet.robots.values()]
 
 

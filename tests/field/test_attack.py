@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is not mine does not move my robots, and nobody says for them that they stand."""
+"""Strangers do not move my robots, and nobody says for them that they stand."""
 
 import os
 
@@ -14,7 +14,7 @@ LINK_TIMEOUT_S, SLACK_S = 0.8, 0.6  # the machine may be busy with other tests
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see attack_session.py."""
+    """Record of the session: see attack_session.py."""
     return run_session("attack_session.py", tmp_path_factory.mktemp("attack"))
 
 

@@ -24,7 +24,7 @@ CUT_SHORT = (
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see characterise_session.py."""
+    """Record of the session: see characterise_session.py."""
     return run_session("characterise_session.py", tmp_path_factory.mktemp("characterise"))
 
 

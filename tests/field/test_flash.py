@@ -26,7 +26,7 @@ FAILURES = (
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see flash_session.py."""
+    """Record of the session: see flash_session.py."""
     missing = [name for name in REQUIRED if not shutil.which(name)]
     missing += [name for name in ("TURBOPI", "TWIN_RUN") if not os.environ.get(name)]
     if missing:

@@ -87,7 +87,7 @@ class Robot:
         return dict(line.split("=", 1) for line in lines)
 
     def packages(self) -> str:
-        """What dpkg knows, half-installed packages among it."""
+        """Packages that dpkg knows, half-installed ones among them."""
         return self.run(
             "dpkg-query", "-W", "-f", "${Package} ${Version} ${Status}\n"
         ).stdout.decode()

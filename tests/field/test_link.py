@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see link_session.py."""
+    """Record of the session: see link_session.py."""
     if os.geteuid() != 0:
         pytest.skip("only root may join two network namespaces")
     return run_session("link_session.py", tmp_path_factory.mktemp("link"))

@@ -24,7 +24,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def session(folder):
-    """What happened: see metrics_session.py."""
+    """Record of the session: see metrics_session.py."""
     return run_twin_session("metrics_session.py", folder)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people do with a shell: the wheels stand, and words and exit code say so."""
+"""People use a shell: the wheels stand, and words and exit code say so."""
 
 import os
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ BY_SIGINT = -2  # a shell that dies so has ended its script: nothing of that fol
 
 @dataclass(frozen=True)
 class Case:
-    """What is true of one.
+    """Facts that hold for one way of stopping.
 
     Attributes:
         said: parts of what is told, in this order.
@@ -66,7 +66,7 @@ RUN = [name for name, case in CASES.items() if ALL or case.is_brief]
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see shell_session.py."""
+    """Record of the session: see shell_session.py."""
     script = Path(__file__).with_name("shell_session.py")
     return run_session_at(script, tmp_path_factory.mktemp("shell"), *RUN, timeout_s=30 * len(RUN))
 

@@ -20,7 +20,7 @@ STILL, FORWARD = [0, 0, 0, 0], [100, 100, 100, 100]
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see swarm_session.py."""
+    """Record of the session: see swarm_session.py."""
     return run_session("swarm_session.py", tmp_path_factory.mktemp("swarm"))
 
 

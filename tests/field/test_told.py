@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the operator is told is what the wheels do: faults on his side, each with sentence and code.
+"""The operator is told how the wheels turn: faults on his side, each with sentence and code.
 
 `make check` runs those that need the least time; with FAULTS=all, as in `make check-long`, all are
 run, and the table for firmware/README.md is written.
@@ -408,7 +408,7 @@ RUN = [name for name, fault in FAULTS.items() if ALL or fault.is_brief]
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    """What happened: see told_session.py."""
+    """Record of the session: see told_session.py."""
     script = Path(__file__).with_name("told_session.py")
     folder = tmp_path_factory.mktemp("told")
     rows = run_session_at(script, folder, *RUN, timeout_s=30 * len(RUN))

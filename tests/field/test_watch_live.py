@@ -23,7 +23,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def session(folder):
-    """What happened: see watch_session.py."""
+    """Record of the session: see watch_session.py."""
     return run_twin_session("watch_session.py", folder)
 
 
@@ -35,7 +35,7 @@ def payloads(log):
 
 
 def logged(folder, driver):
-    """Of the robots or twins themselves; truth and the operator's link are not for watchers."""
+    """Robots or twins on the bus alone; truth and the operator's link are not for watchers."""
     said = payloads(folder / driver)
     return {c: d for c, d in said.items() if "TRUTH" not in c and not c.endswith("_LINK")}
 

@@ -171,7 +171,7 @@ class Field:
         return all(self.moved(i, begin_s) for i in IDS)
 
     def held(self, **options) -> Operator:
-        """The same, and said so."""
+        """Operator who holds the robots, and was told so."""
         operator = self.start(**options)
         if not wait_until(lambda: HELD in operator.plain, 10):
             raise RuntimeError(operator.plain)
@@ -776,7 +776,7 @@ class Field:
         return self._unmoved(begin_s, code) | {"commands": len(commands)}
 
     def stop_without_a_network(self) -> dict:
-        """Of its own computer alone: nothing that it says can reach a robot."""
+        """Stops from a computer without a network: nothing that it says can reach a robot."""
         begin_s = time.monotonic()
         self.operator = Operator(
             self.key_file, "stop", "--timeout-s", "1", terminal=False, elsewhere=True
@@ -929,7 +929,7 @@ class Field:
             thread.join()
 
     def flood_of_other_packets(self) -> dict:
-        """Of channels that nobody subscribed to: a stop that is not answered ends in its time."""
+        """Floods channels that nobody subscribed to: an unanswered stop ends in its time."""
         begin_s, over = time.monotonic(), threading.Event()
 
         def flood():

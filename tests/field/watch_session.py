@@ -45,7 +45,7 @@ def listen(heard: Path) -> list[str]:
 
 
 def watch(save: Path) -> dict:
-    """What the command says of a few seconds of the bus."""
+    """Output of the command for a few seconds of the bus."""
     words = ["watch", "--lcm-url", URL, "--duration-s", str(LISTEN_S), "--save", save, "--json"]
     start = "from twinmill_cli.main import run; import sys; run(sys.argv[1:])"
     done = subprocess.run(

@@ -56,7 +56,7 @@ class CannotRun(Exception):
 
 @dataclass(frozen=True)
 class Duties:
-    """What the board's four motor registers held since t_s (guest's CLOCK_MONOTONIC)."""
+    """Contents of the board's four motor registers since t_s (guest's CLOCK_MONOTONIC)."""
 
     t_s: float
     wire: tuple[int, ...]
@@ -98,7 +98,7 @@ def prepare() -> Path:
 
 
 def prepare_system() -> Path:
-    """The same, with a whole Debian that has the package's file in its root."""
+    """Builds a whole Debian with the package's file in its root. Returns the initramfs."""
     prepare()
     return Path(_script("build_system"))
 

@@ -166,7 +166,7 @@ def give_environment(rig: Rig, environment: tuple[str, ...]):
 
 
 class Service(Watched):
-    """The same program as systemd runs it, driving since its button was pressed."""
+    """Program run by systemd, driving since its button was pressed."""
 
     def __init__(
         self,

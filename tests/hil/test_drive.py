@@ -12,7 +12,7 @@ EMPTY_MV = 6800
 
 
 def level(rig, line):
-    """What the program shows at a line now."""
+    """Level that the program drives a line to now."""
     values = [change.value for change in rig.levels if change.line == line]
     return values[-1] if values else 0
 

@@ -77,7 +77,7 @@ def table():
 
 @pytest.fixture(scope="module")
 def guest(request):
-    """What the program runs in."""
+    """Guest that the program runs in."""
     guest = request.getfixturevalue("installed" if BY_SERVICE else "rig")
     yield guest
     if BY_SERVICE:
@@ -286,7 +286,7 @@ def test_write_that_is_torn(guest, drive, table):
 
 
 def test_board_refuses_everything(guest, drive, table):
-    """What no program can mend; it says so, and the first that the board hears is a stop."""
+    """No program can mend that; it says so, and the first that the board hears is a stop."""
     robot = drive(*PATIENT)
     guest.board(b"N", ALL)
     robot.show_until(lambda: robot.has(UNCONFIRMED))

@@ -32,7 +32,7 @@ def driving(rig):
 
 @pytest.fixture
 def blind(rig):
-    """The same, but it would drive on for ten seconds without a frame."""
+    """Robot under way that would drive on for ten seconds without a frame."""
     patience = ("--set", "frame_timeout_ms=10000", "--set", "watchdog_ms=300")
     with Robot(rig, "--start", "--set", "restart_ms=-1", *patience) as robot:
         robot.drive_until(LEFT)

@@ -63,7 +63,7 @@ def test_stopping_the_service_stops_the_motors(driving):
 
 
 def test_reloading_the_service_stops_the_motors_and_keeps_it(driving):
-    """The same main process; its button starts the robot again."""
+    """The main process stays; its button starts the robot again."""
     begin_s = driving.since(0)[-1].t_s
     run(driving.rig, "/bin/sh", "-c", f"systemctl show -P MainPID {SERVICE} > /before")
     driving.rig.systemctl("reload", SERVICE)

@@ -14,11 +14,9 @@ import shlex
 import subprocess
 import sys
 import tempfile
-import tomllib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from graphlib import CycleError, TopologicalSorter
-from itertools import chain
 from pathlib import Path
 
 FOLDERS = (
@@ -33,6 +31,7 @@ FOLDERS = (
     "benchmarks",
     "tests",
     "cmake",
+    "docs",
 )
 CODE_SUFFIXES = {".c", ".h", ".cpp", ".py"}
 # What the core may ask of its surroundings: no heap, clock or I/O is among it.
@@ -182,12 +181,16 @@ def licence_line(args: argparse.Namespace) -> Iterator[str]:
             yield f"{path}: the first line is not the SPDX line"
 
 
+def is_python(path: Path) -> bool:
+    """Tells Python by its suffix, or a script by its first line."""
+    if path.suffix:
+        return path.suffix == ".py"
+    return re.match(rb"#!.*\bpython", path.read_bytes()) is not None
+
+
 def docstring_openings(args: argparse.Namespace) -> Iterator[str]:
-    """Docstrings of the commands and of what is typed strictly begin with what the thing is."""
-    project = tomllib.loads((args.root / "pyproject.toml").read_text(encoding="utf-8"))
-    typed = [args.root / name for name in (*project["tool"]["mypy"]["files"], "tools")]
-    found = (sorted(path.rglob("*.py")) if path.is_dir() else [path] for path in typed)
-    for path in chain.from_iterable(found):
+    """Docstrings, of modules too, begin with what the thing is."""
+    for path in filter(is_python, ours(args.root)):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             told = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
             if opening := OPENING.match(told or ""):

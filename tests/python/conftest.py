@@ -187,7 +187,7 @@ def twinmill(monkeypatch, capsys):
 
 @pytest.fixture(scope="session")
 def brief_coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
-    """The same for 45 s with fewer poses, where numbers need not be sharp."""
+    """Coasting robot for 45 s with fewer poses, where numbers need not be sharp."""
     return _coasting(tmp_path_factory.mktemp("brief"), model_text, 45, 0.025)
 
 

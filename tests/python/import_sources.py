@@ -16,7 +16,7 @@ LATE_NS = 5_000_000  # of receipt, against the headers
 
 @dataclasses.dataclass(frozen=True)
 class Drive:
-    """What a robot was told and where it was seen, at the same times; world z up.
+    """Commands of a robot and its places, at equal times; world z up.
 
     Attributes:
         t_s: (N,); pose_t_s (N,), likewise.

@@ -32,7 +32,7 @@ def driven(line=False):
 
 
 def seen(place_m, heading, tag):
-    """The same in the camera's frame."""
+    """Place and heading of a tag in the camera's frame."""
     robot = Rotation.from_euler("z", heading[:, None])
     return TILT.apply(place_m - CAMERA_M), TILT * robot * tag
 
@@ -60,7 +60,7 @@ ARRAY = "std_msgs/Header header\napriltag_ros/AprilTagDetection[] detections\n"
 
 @pytest.fixture
 def bag(tmp_path):
-    """Of rosbag1: tags 3 and 8 by apriltag_ros, commands of robots 3 and 8."""
+    """Bag of rosbag1: tags 3 and 8 by apriltag_ros, commands of robots 3 and 8."""
     store = get_typestore(Stores.ROS1_NOETIC)
     for text, name in ((DETECTION, "Detection"), (ARRAY, "DetectionArray")):
         store.register(get_types_from_msg(text, f"apriltag_ros/msg/AprilTag{name}"))

@@ -89,7 +89,7 @@ def test_plain_forms_have_the_catalogues_names_and_numbers():
 
 
 def test_what_is_hidden_in_two_wheels_is_the_same_for_both_of_a_side():
-    """Of a robot on two wheels the plants have each twice: its poses tell their mean alone."""
+    """A robot on two wheels has each twice in the plants: its poses tell their mean alone."""
     robot = next(r for r in ROBOTS if r.wheels == "differential" and r.drive == "duty")
     for h in catalogue_forms(robot, np.random.default_rng(1)):
         front = {k[1:]: v for k, v in h.values.items() if k.startswith(("fl", "fr"))}

@@ -96,7 +96,7 @@ def _one(robots, *words, fatal=True):
 
 
 def _by_encoders(robot):
-    """The same robot's log with the speeds that its wheels are to have, rad/s, for duties."""
+    """Log with the speeds that its wheels are to have, rad/s, in the place of duties."""
     rim_mps = TOP_MPS * np.sign(robot.command) * np.abs(robot.command) ** 0.7
     return replace(robot, command_kind="wheel_speed", command=rim_mps / RADIUS_M)
 
@@ -231,7 +231,7 @@ def test_clocks_far_apart_are_told_with_the_shift(robot, late_s):
 
 @pytest.mark.parametrize("by_s", [-0.493, 0.3, 2.0])
 def test_a_clock_that_was_set_within_the_log_is_told_with_time_and_step(robot, by_s):
-    """What was seen at one time is stamped in order; a step back leaves two streams mixed."""
+    """Poses of one time are stamped in order; a step back leaves two streams mixed."""
     stamps_s = robot.pose_t_s + np.where(robot.pose_t_s < 30, 0, by_s)
     order = np.argsort(stamps_s, kind="stable")
     (f,) = _findings([replace(robot, pose_t_s=stamps_s[order], pose=robot.pose[order])])
@@ -248,7 +248,7 @@ def test_a_clock_that_was_set_within_the_log_is_told_with_time_and_step(robot, b
     ("by_s", "from_s"), [(0.06, 30), (0.12, 30), (-0.3, 30), (0.4, 30), (0.08, 15), (-0.08, 45)]
 )
 def test_commands_that_act_later_from_a_moment_on_are_no_clock(robot, by_s, from_s, drive):
-    """What the robot does at 30 s it does `by_s` later; each pose is stamped when it was taken.
+    """The robot's deeds of 30 s come `by_s` later; each pose is stamped when it was taken.
 
     It is neither a drift, which would be mended by a rate, nor a clock that was set, which leaves
     the poses' beat broken.
@@ -708,7 +708,7 @@ def test_one_valid_pose_is_not_told_as_none(robot):
 
 
 def _mixed_up(robot: RobotLog, begin_s: float, end_s: float) -> RobotLog:
-    """The same with the commands of a while in another order than they were driven."""
+    """Log with the commands of a while in another order than they were driven."""
     legs = np.floor(robot.command_t_s / 0.7 + 1e-9).astype(int)
     own = np.unique(legs[(robot.command_t_s >= begin_s) & (robot.command_t_s < end_s)])
     command, driven = robot.command.copy(), np.random.default_rng(4).permutation(own)
@@ -726,7 +726,7 @@ def test_commands_that_were_mixed_up_for_a_while_are_told_and_cut():
 
 
 def _pose_held(robot: RobotLog, begin_s: float, end_s: float, share: float) -> RobotLog:
-    """The same, with a robot that goes a share of its way for a while."""
+    """Log with a robot that goes a share of its way for a while."""
     slow = (robot.pose_t_s >= begin_s) & (robot.pose_t_s < end_s)
     heading = robot.pose[:, 2]
     step = np.diff(robot.pose, axis=0, prepend=robot.pose[:1])

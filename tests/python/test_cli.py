@@ -384,7 +384,7 @@ def test_a_stream_that_takes_no_more_is_named(cause, why, stream):
 
 
 def test_a_file_that_takes_no_more_is_named_behind_its_stream(tmp_path):
-    """Of a full quota: it says which disk is meant."""
+    """A full quota's message says which disk is meant."""
     file, limit = tmp_path / "said.txt", resource.RLIMIT_FSIZE
     with file.open("w") as out:
         ended = subprocess.run(
@@ -472,7 +472,7 @@ def test_a_newcomer_sees_about_twelve_commands_and_reaches_all_from_them():
     [("effects", "twin effects"), ("optitrack", "track optitrack"), ("metrics", "swarm metrics")],
 )
 def test_a_command_has_two_names(twinmill, flat, words):
-    """What its help says is the same under both, but for the name."""
+    """Both names have equal help, but for the name."""
     (code, out, _), (also, told, _) = twinmill(flat, "--help"), twinmill(*words.split(), "--help")
     assert (code, also) == (0, 0)
     assert f"twinmill {words}" in told and f"twinmill {flat} " in out

@@ -49,7 +49,7 @@ def test_known_offset_and_lag_are_found(steps, offset_s):
 
 @pytest.mark.parametrize("every", [4, 5])
 def test_a_slow_camera_shows_the_offset_too(steps, every):
-    """Of 120 Hz only 30 or 24 Hz are kept: neighbours are farther apart than the usual window."""
+    """Only 30 or 24 of 120 Hz are kept: neighbours are farther apart than the usual window."""
     robot = steps(0.05)
     slow = {k: getattr(robot, k)[::every] for k in ("pose_t_s", "pose", "z_m", "valid")}
     found = estimate_offset(make_track(replace(robot, **slow)))
@@ -75,7 +75,7 @@ def test_constant_commands_are_refused(driven):
 
 
 def test_steps_of_lateness_are_those_of_an_exhaustive_search():
-    """Of all ways to part eight stretches into pieces of two or more, one shift each."""
+    """All ways to part eight stretches into pieces of two or more are tried, one shift each."""
     left = np.random.default_rng(3).random((5, 8))
     for found in _stepwise(left, np.arange(5.0))[:4]:
         ways = [

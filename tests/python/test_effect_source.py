@@ -78,7 +78,7 @@ EQUATIONS = {
 
 @pytest.fixture
 def copy(tmp_path) -> Path:
-    """What `effects new` looks at of the project's source."""
+    """Part of the project's source that `effects new` looks at."""
     for part in ("twin/effects", "tests/effects"):
         shutil.copytree(ROOT / part, tmp_path / "source" / part)
     return tmp_path / "source"
@@ -127,7 +127,7 @@ def test_what_is_written_compiles_and_is_listed(name, copy, model):
     ("name", "is_first_order"), [("stored_turn", False), ("overshoot", False), ("tiles", True)]
 )
 def test_the_written_test_compiles(name, is_first_order, copy, model):
-    """What holds the place over a step is right to first order, which the test says."""
+    """Holding the place over a step is right to first order, which the test says."""
     words = ["effects", "new", name, "--from", str(model(EQUATIONS[name]))]
     run([*words, "--into", str(copy)])
     test = copy / f"tests/effects/test_{name}.cpp"
@@ -186,7 +186,7 @@ FORMULAS = [
 
 
 def test_cpp_gives_a_formula_the_value_that_the_model_gives_it(tmp_path):
-    """Of muParser itself: a comparison is a number there, and a division by one no crash."""
+    """In muParser itself a comparison is a number, and a division by one no crash."""
     lines = [f'  show({in_cpp(text, {"x", "y"})}, "{text}");' for text in FORMULAS]
     (tmp_path / "both.cpp").write_text(BOTH.replace("LINES", "\n".join(lines)))
     program = tmp_path / "both"

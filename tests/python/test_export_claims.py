@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a file for another simulator is said to carry of each effect is what is in the file."""
+"""A file for another simulator carries of each effect as much as it is said to."""
 
 import ctypes.util
 import re
@@ -119,7 +119,7 @@ def test_a_file_differs_by_an_effect_exactly_if_it_is_said_to_carry_it(
 
 
 def held_by_sdformat(path):
-    """What Gazebo's library holds of a file; it reads URDF by urdfdom."""
+    """Contents of a file by Gazebo's library, which reads URDF by urdfdom."""
     library = ctypes.util.find_library("sdformat12")
     if not library:
         pytest.skip("libsdformat12 is not installed (Debian: libsdformat12-12)")
@@ -158,7 +158,7 @@ def test_joints_have_the_top_speed_that_wheel_limit_tells(
 @pytest.mark.parametrize("to", ["urdf", "sdf", "ros2_control"])
 @pytest.mark.parametrize("drive", ["twist", "wheel_speed"])
 def test_a_model_without_a_top_speed_says_so_and_what_to_set(drive, to, folder, text_of):
-    """What the sentence says is done by hand, and then the file has limits, and nothing is said."""
+    """The sentence's advice is done by hand; then the file has limits, and nothing is said."""
     text = text_of(drive, "differential")
     (why,) = [why for name, why in export(text, to).items() if "top speed" in name]
     assert "knows none" in why

@@ -246,7 +246,7 @@ def test_what_the_file_says_of_its_delay_holds_in_mujoco(folder, model_text):
 
 
 def speed_in(path, rim_mps):
-    """Of a robot in MuJoCo after 0.1 s, all rims told the same."""
+    """Speed of a robot in MuJoCo after 0.1 s, all rims told one speed."""
     model = mujoco.MjModel.from_xml_path(path)
     data = mujoco.MjData(model)
     data.ctrl[:] = rim_mps
@@ -573,7 +573,7 @@ def root_link(path):
 def test_odometry_moves_the_root_of_the_urdf_so_no_frame_has_two_parents(
     wheels, folder, model_text
 ):
-    """What controllers publish is the transform from odom to base_frame_id, in tf a tree."""
+    """Controllers publish the transform from odom to base_frame_id, in tf a tree."""
     open_text(folder, model_text("m").replace("mecanum", wheels))
     for to in ("urdf", "ros2_control"):
         run(["export-model", "m.toml", "--to", to])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people report of their own logs is told rightly, at the door.
+"""Reports of people about their own logs are answered rightly, at the door.
 
 The logs are simulated without Twinmill; each expected value is that of the simulation, or follows
 from the table by a regression, as the README in each folder says.
@@ -37,7 +37,7 @@ def cases(data_dir) -> Path:
 
 @pytest.fixture
 def judged(cases, tmp_path):
-    """What is judged of two tables of a folder, with a model of the robot; raises what refuses."""
+    """Verdict on two tables of a folder, with a model of the robot; raises a refusal."""
 
     def make(folder, poses="poses", commands="commands", model="twist", **options):
         own = cases / folder

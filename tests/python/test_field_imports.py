@@ -66,7 +66,7 @@ def test_one_table_of_two_topics_is_read_as_the_two(case, imported, name, pose, 
 
 
 def test_a_sign_is_changed_in_a_bag_and_in_an_export_of_vicon(case, imported, tmp_path):
-    """What was written into them has vy of the wrong sign, and in Vicon y as well."""
+    """Both files were written with vy of the wrong sign, and in Vicon y as well."""
     folder = tmp_path / "bag"
     shutil.copytree(case("options_ignored"), folder)
     subprocess.run([sys.executable, folder / "bag.py"], check=True)

@@ -93,7 +93,7 @@ def test_two_recordings_under_one_name_are_two_whole_files(tmp_path):
 
 
 def test_a_sweep_is_written_by_one_command_at_a_time(tmp_path):
-    """Of two that wrote the same parts one had ended with the number of an error."""
+    """Two that wrote one part: one had ended with the number of an error."""
     request = make_request("milling", "paper.toml", ["v_mps=0.1,0.2"], seeds=2, duration_s=1.0)
     with (
         alone_in(tmp_path),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a fit tells, against ordinary least squares, SciPy and algebra."""
+"""Results of a fit against ordinary least squares, SciPy and algebra."""
 
 import pickle
 import tomllib

@@ -110,7 +110,7 @@ def test_a_wrong_model_scores_worse_than_it_expects_and_its_misses_are_told():
 
 
 def test_cells_that_tell_nothing_come_last():
-    """Of three cells one parts the models, one the models from the base rate, one nothing."""
+    """One of three cells parts the models, one the models from the base rate, one nothing."""
     parts, sure, even = ([0.96, 0.01], [0.01, 0.96]), ([0.01, 0.96],) * 2, ([0.485, 0.485],) * 2
     draws = np.array([[[*of[d], 0.01, 0.01, 0.01] for of in (even, sure, parts)] for d in (0, 1)])
     expected = Forecast(np.arange(3.0)[:, None], draws.mean(axis=0), draws)

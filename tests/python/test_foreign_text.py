@@ -94,7 +94,7 @@ def test_messages_of_strangers_are_rows_of_a_table(source, version, behavior, re
 
 
 def letters(text: str) -> str:
-    """What is left of a text without blanks and what may not be shown."""
+    """Text less its blanks and the characters that may not be shown."""
     return "".join(c for c in text if c.isprintable() and not c.isspace()).replace("\ufffd", "")
 
 

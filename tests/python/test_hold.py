@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is said of robots that are held: by what they have signed, which all else may contradict."""
+"""Verdicts on held robots follow their signed words, which all else may contradict."""
 
 import io
 import time

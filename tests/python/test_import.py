@@ -247,7 +247,7 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(put, tmp_path, poses, 
 def test_one_robot_of_no_run_is_left_out_with_the_reason(
     put, tmp_path, their_poses, their_commands, why
 ):
-    """What is judged of the others is what it would be without it, and so is what cameras saw."""
+    """The others' verdict is as it would be without it, and so are the cameras' detections."""
     poses = POSES + "".join(f"{t},7,0,0,0\n" for t in their_poses)
     told = "t_s,robot_id,vx_mps,vy_mps,omega_radps\n0,4,0,0,0\n0.1,4,0.1,0,0.5\n"
     commands = told + "".join(f"{t},7,0.1,0,0\n" for t in their_commands)

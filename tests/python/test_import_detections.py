@@ -80,7 +80,7 @@ def test_what_was_seen_comes_back_as_written(folder):
 
 
 def test_a_camera_as_the_model_says_agrees_and_another_does_not(folder, capsys):
-    """Of 780 pictures the few at the cone's edges may differ: 13 crossings, one picture each."""
+    """A few of 780 pictures at the cone's edges may differ: 13 crossings, one picture each."""
     import_all()
     capsys.readouterr()
     run(["compare", "o.lcmlog", "--model", "m.toml", "--json"])

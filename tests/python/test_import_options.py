@@ -46,12 +46,12 @@ def run(folder, words, *options):
 
 
 def said(done) -> str:
-    """What a command prints, or the sentence that it ends with."""
+    """Output of a command, or the sentence that it ends with."""
     return " ".join(f"{done.output} {done.exception or ''}".split())
 
 
 def held(path):
-    """What a log holds, but for the words on where it comes from."""
+    """Contents of a log, but for the words on where it comes from."""
     log = read_log(path)
     series = ("pose_t_s", "pose", "z_m", "valid", "command_t_s", "command")
     return log.t0_utime_us, {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What matters for a swarm: a planted case whose truth an independent program knows."""
+"""Weights for a swarm: a planted case whose truth an independent program knows."""
 
 import json
 from dataclasses import replace
@@ -54,7 +54,7 @@ def planted_text(effects=EFFECTS) -> str:
 
 
 def independent(without: str | None) -> np.ndarray:
-    """Whether each of 60 swarms of points mills that have all of EFFECTS but one, by formulas."""
+    """True for each of 60 swarms of points that mills without one of EFFECTS, by formulas."""
 
     def has(name: str) -> bool:
         return name != without

@@ -42,7 +42,7 @@ def file(brief_coasting_robot):
 
 @pytest.fixture(scope="module")
 def modelled(brief_coasting_robot, file):
-    """Of a log and the model that it was made with."""
+    """Log and the model that it was made with."""
     (opened,) = open_measurements(load_measurements([brief_coasting_robot.log], file.model), file)
     return opened.modelled()
 
@@ -88,7 +88,7 @@ def test_a_slope_that_is_chance_is_told_from_one_that_is_not(slope, known):
 
 
 def test_what_a_known_number_takes_is_what_conditioning_leaves():
-    """Of normal numbers: the variance of the outcome less that given one of them (Schur)."""
+    """Normal numbers: the variance of the outcome less that given one of them (Schur)."""
     columns = np.random.default_rng(4).normal(size=(3, 3))
     covariance, slope = columns @ columns.T, np.array([1.0, -2.0, 0.5])
     found = Spread(NAMES, covariance, np.array([0.2, 0.8]), slope)
@@ -197,7 +197,7 @@ def refit(modelled, moves, gains, seed):
 
 
 def test_a_refit_knows_the_outcome_best_after_the_run_that_was_designed_for_it(modelled, file):
-    """Of runs as long: that for the other gain, and moves at random. The outcome is planted."""
+    """Runs as long: that for the other gain, and moves at random. The outcome is planted."""
     random = np.random.default_rng(3)
     truths = 1 + STDS[:2] * random.normal(size=(40, 2))
     slope = np.array([0.3, 3.0])

@@ -34,7 +34,7 @@ def turned(about):
 
 
 def listen(motive, view=None, multicast=None, frames=60, listens_s=LONGEST_S):
-    """What was heard in so many frames, and the poses."""
+    """Messages heard in so many frames, and the poses."""
     server = find_server("127.0.0.1", port=motive.port)
     robots, poses = Robots(Stream(server, multicast), view or View()), []
     try:

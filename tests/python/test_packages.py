@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Twinmill needs of others: hashes of all versions, lower bounds, and licences.
+"""Twinmill's needs of others: hashes of all versions, lower bounds, and licences.
 
 Run as a program it writes docs/licences.md: `make format`.
 """
@@ -130,7 +130,7 @@ def licence_of(package: str) -> str:
 
 
 def page() -> str:
-    """What docs/licences.md has to say."""
+    """Text that docs/licences.md must have."""
     packages = sorted(pins((ROOT / "requirements.txt").read_text(encoding="utf-8")))
     rows = [f"| {name} | {licence_of(name)} | {REASONS.get(name, '')} |" for name in packages]
     debian = [f"| {name} | {licence} |" for name, (licence, _) in sorted(DEBIAN.items())]
@@ -159,7 +159,7 @@ def test_licences_of_debian_packages_are_in_their_copyright_files(package):
 
 
 def test_a_wheel_has_the_licences_of_what_it_brings(tmp_path):
-    """Of a wheel with LCM's library alone, as auditwheel leaves it, and of twin_run's libraries."""
+    """The wheel has LCM's library alone, as auditwheel leaves it, and twin_run's libraries."""
     info, bill = "twinmill-0.1.0.dist-info", {"components": [{"name": "twinmill"}]}
     wheel = tmp_path / "twinmill-0.1.0-cp311-cp311-linux_x86_64.whl"
     program = find_program("twin_run")

@@ -84,7 +84,7 @@ def test_each_bit_of_a_robot_is_a_row_of_its_own(driven):
 
 
 def test_bodies_of_a_world_are_drawn_where_they_are(write_log, message):
-    """Of a wall's outline all points are as far from its line as it is thick, its ends included."""
+    """All points of a wall's outline are as far from its line as it is thick, ends included."""
     start, end = np.array([1.0, 2.0]), np.array([4.0, 6.0])
     told = [
         message("body", utime_us=k, name="wall", from_m=start, to_m=end, radius_m=0.1)

@@ -134,7 +134,7 @@ class Robot:
         return command_t_s, command, self.responds(told) * (1 + slips)
 
     def run(self, early_s, seed=1):
-        """What is read of its log, declared to be of one clock, with poses stamped early."""
+        """Reading of its log, declared to be of one clock, with poses stamped early."""
         rng = np.random.default_rng(seed)
         command_t_s, command, speed = self.driven(rng)
         heading_rad = np.cumsum(speed[:, 1]) * STEP_S

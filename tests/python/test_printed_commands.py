@@ -72,7 +72,7 @@ def lines_of(page: Path) -> Iterator[str]:
 
 
 def words_of(line: str) -> list[str]:
-    """Of a command line, without comments, pipes and redirections."""
+    """Words of a command line, without comments, pipes and redirections."""
     lexer = shlex.shlex(line, posix=True, punctuation_chars="|>;&")
     lexer.whitespace_split = True
     words = list(lexer)
@@ -123,7 +123,7 @@ def test_examples_in_help_can_be_typed():
 
 
 def check_named(line: str) -> None:
-    """What stands between back quotes may leave files out, so options alone are looked at."""
+    """Commands between back quotes may leave files out, so options alone are looked at."""
     program, *words = line.split()
     given = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
     if program == "twinmill" and words[0] in ("--help", "--install-completion"):
@@ -183,7 +183,7 @@ def test_options_that_the_library_names_exist():
 
 
 def test_commands_named_in_messages_exist_with_their_options():
-    """Of the programs in Python, C and C++, of pages that they write, and of scripts."""
+    """Programs in Python, C and C++, pages that they write, and scripts are looked at."""
     found = {line for path in SOURCES for line in QUOTED.findall(path.read_text())}
     assert len(found) > 30
     for line in found:

@@ -86,7 +86,7 @@ def test_the_plant_drives_by_it(added, tmp_path):
 
 
 def test_a_prior_decides_where_data_do_not(carpet):
-    """Of a product of two numbers the data know one: 0.8 and 0.5 are a gain of 0.4, or others."""
+    """Data know the product of two numbers: 0.8 and 0.5 are a gain of 0.4, or others."""
     log, model = carpet
 
     @tm.python_effect("omega_radps", {"a": tm.Number(prior=(0.5, 1e-4)), "b": tm.Number()})

@@ -21,7 +21,7 @@ SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
 
 
 class Page(HTMLParser):
-    """What a browser would fetch, and the text of the page."""
+    """Resources that a browser would fetch, and the text of the page."""
 
     def __init__(self, text):
         super().__init__()
@@ -129,7 +129,7 @@ def test_no_word_of_a_table_is_lost_in_a_narrow_terminal(section, columns):
 
 
 def noise_told(sensor_m, model_text, tmp_path):
-    """What a table says of the noise of arcs by algebra, each place `sensor_m` off."""
+    """Noise of arcs by a table and by algebra, each place `sensor_m` off."""
     period_s, rng = 0.02, np.random.default_rng(1)
     commands_t_s = np.arange(0, 40, 2.0)
     commands = np.column_stack(

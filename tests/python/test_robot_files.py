@@ -39,7 +39,7 @@ def imported(tmp_path):
 
 
 def _are(robots, numbers):
-    """Whether the k-th robot has the k-th number, in its poses and in its commands."""
+    """Asserts that the k-th robot has the k-th number, in its poses and in its commands."""
     assert sorted(robots) == sorted(numbers)
     for k, number in enumerate(numbers):
         assert robots[number].pose[-1, 0] == pytest.approx(SPEEDS_MPS[k] * T_S[-1], abs=1e-5)

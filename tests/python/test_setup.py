@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `make build` and `make check` ask of a Debian, with an apt that has what the test says."""
+"""Requests of `make build` and `make check` to a Debian, with an apt that plays the test's."""
 
 import os
 import re

@@ -37,7 +37,7 @@ def diagnosis(opened):
 
 @pytest.fixture
 def diagnosed(diagnosis, monkeypatch):
-    """What explain begins with was done before: only what follows is run."""
+    """Skips the beginning of explain, done before: only the rest is run."""
     done = replace(diagnosis, search=copy(diagnosis.search))
     monkeypatch.setattr(explaining, "diagnose", lambda *_, **__: done)
 

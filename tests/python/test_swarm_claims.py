@@ -35,7 +35,7 @@ SEEDS = 100
 
 @pytest.fixture(scope="module", autouse=True)
 def published_once():
-    """What the published equations give depends on their arguments alone: it is computed once."""
+    """Published equations depend on their arguments alone: each result is computed once."""
     run_anew = claims.Points.run
     run_once = cache(run_anew)
 
@@ -328,7 +328,7 @@ def test_bodies_in_contact_are_no_mill_however_round():
 
 
 def test_intervals_of_a_spread_hold_what_they_promise():
-    """Of 3000 samples of four robots, 95 % of the intervals hold the spread they were drawn with.
+    """Intervals of 3000 samples of four robots hold their true spread in 95 %.
 
     One that is symmetric about the sample's, by the formula of large samples, holds it in 80 %.
     """

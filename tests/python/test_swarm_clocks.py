@@ -116,7 +116,7 @@ def test_where_nothing_is_answered_both_are_said_to_be_possible(monkeypatch):
 
 
 def test_a_tool_that_was_halted_tells_neither():
-    """What had waited here for 7 s was said to be 2.28 s late by the clock."""
+    """Messages that had waited here for 7 s were said to be 2.28 s late by the clock."""
     fleet = fleet_behind(delay_s=0.0, ahead_s=0.0)
     time.sleep(1.0)
     for _ in range(4):  # of some sixty that wait

@@ -87,7 +87,7 @@ def test_a_command_is_told_with_the_time_at_which_it_was_said():
     ],
 )
 def test_status_tells_of_a_link_only_where_a_robot_drives(mode, timeout_ms, says):
-    """What holds of one that stands, the next start says: 0.0 was taken for untethered."""
+    """A standing robot's status holds for its next start: 0.0 was taken for untethered."""
     data = robot(1, mode, timeout_ms).to_json()
     assert (data["link_timeout_s"], data["tethered"], data["held"]) == says
 
@@ -200,7 +200,7 @@ def test_who_drives_already_is_said_with_who_holds_it():
 
 
 def test_arming_shows_for_whom_it_waits(monkeypatch, key_file, twinmill):
-    """Of three robots one was switched off: five seconds without a word."""
+    """One of three robots was switched off: five seconds without a word."""
     shown = []
 
     @contextmanager

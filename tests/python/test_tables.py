@@ -48,7 +48,7 @@ POSES, COMMANDS = _driven()
 
 @pytest.fixture
 def imported(tmp_path):
-    """What came of two tables: the robots of the log, and the warnings."""
+    """Result of two tables: the robots of the log, and the warnings."""
 
     def make(poses=POSES, commands=COMMANDS, options=None, **how):
         for name, table in (("p.csv", poses), ("c.csv", commands)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a small file unpacks to is bounded by its size, and lines have an end.
+"""Unpacked size of a small file is bounded by its size, and lines have an end.
 
 Files are a little above the limit: packed by the writers of each format, of zeros.
 """

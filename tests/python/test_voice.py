@@ -226,7 +226,7 @@ WHAT_ENDS = (
 
 
 def _asked_at_a_terminal(change) -> str:
-    """What is said to stop robots, at a terminal of its own that was changed before."""
+    """Words on stopping robots, at a terminal of its own that was changed before."""
     keyboard, far = pty.openpty()
     change(far)
     command = ["setsid", "--ctty", sys.executable, "-c", WHAT_ENDS]

@@ -170,7 +170,7 @@ def test_bad_input_is_one_sentence_and_nothing_is_written(log, tmp_path):
 
 
 def test_the_score_is_that_of_compare(brief_coasting_robot):
-    """Of one stretch; its first 1.5 s, which need commands of before, are not judged here."""
+    """One stretch; its first 1.5 s, which need commands of before, are not judged here."""
     model = ModelFile.load(str(brief_coasting_robot.model))
     said = compare(load_measurements([brief_coasting_robot.log], model.model), model).score
     robot = read_log(brief_coasting_robot.log).robots[3]

@@ -141,7 +141,7 @@ def test_of_two_motors_each_side_is_told_apart(
 def test_the_command_writes_the_script_and_reads_its_log(
     tmp_path, monkeypatch, capsys, model_text, write_log, message
 ):
-    """Of a robot that is told velocities and turns the wrong way; from messages on."""
+    """The robot is told velocities and turns the wrong way; from messages on."""
     monkeypatch.chdir(tmp_path)
     text = model_text("m").replace('drive = "duty"', 'drive = "twist"')
     text = text.replace("duty_pct = [0, 100]\nwheel_speed_mps = [0, 0.36]\n", "")

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(not TWIN_RUN, reason="TWIN_RUN does not name the
 
 
 def ring(folder, plant: str, seed: int) -> dict:
-    """What twin_run says of the last of 120 s."""
+    """Output of twin_run for the last of 120 s."""
     command = [TWIN_RUN, "--plant", plant, "--n", 8, "--duration-s", 120, "--json"]
     command += ["--seed", seed, "--pose-rate-hz", 1, "--log", folder / "run.lcmlog", "--force"]
     told = subprocess.run(list(map(str, command)), capture_output=True, check=True, timeout=600)

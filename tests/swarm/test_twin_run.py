@@ -44,7 +44,7 @@ def test_nan_is_refused_by_the_name_of_its_option(tmp_path, option):
 
 
 def test_a_file_that_hides_the_installed_robot_is_named_and_the_robot_too(tmp_path):
-    """What the sentence says is done, and it drives."""
+    """The sentence's advice is done, and it drives."""
     body = "<body><joint name='x'/><geom size='1'/></body>"
     (tmp_path / "turbopi.xml").write_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
     command = [TWIN_RUN, "--n", "1", "--duration-s", "0.1", "--log", "a.lcmlog"]
@@ -316,7 +316,7 @@ def _with_equation(tmp_path, equation, plant):
 
 
 def _refused(tmp_path, equation, plant):
-    """What a run of that model says as it ends."""
+    """Last words of a run of that model."""
     log = tmp_path / "a.lcmlog"
     model = _with_equation(tmp_path, equation, plant)
     refused = run("--n", 2, "--duration-s", 20, "--log", log, model=model, plant=plant)

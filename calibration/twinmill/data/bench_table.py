@@ -55,7 +55,7 @@ TO_NAME = "duty_pct, duty_unit (-1 to 1) or duty_pwm (-255 to 255)"
 
 
 def is_bench(header: list[str]) -> bool:
-    """Whether a table has duties and speeds of wheels, and no places."""
+    """True if a table has duties and speeds of wheels, and no places."""
     kinds = {_kind(column) for column in header}
     names = [plain_name(column) for column in header]
     placed = "m" in {_quantity(column) for column in header} or {"x", "y"} <= {*names}
@@ -112,7 +112,7 @@ def _quantity(column: str) -> str:
 
 
 def _kind(column: str) -> str:
-    """Whether a column holds a "duty" or a "speed" of wheels; else empty."""
+    """Role of a column of wheels: "duty", "speed", or empty if it is neither."""
     name, quantity = plain_name(column), _quantity(column)
     if quantity == "pct" or (not quantity and ("duty" in name or "pwm" in name)):
         return "duty"

@@ -62,7 +62,7 @@ def longest_gap_s(robot: RobotLog, used: np.ndarray | None = None) -> float:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a step of one robot's poses can be by noise alone, and by speeds it may have.
+    """Largest steps of one robot's poses that noise alone, or speeds it may have, can make.
 
     Attributes:
         usual: m/s, rad/s.
@@ -178,7 +178,7 @@ def _excursions(
 
 
 def _links(robot: RobotLog, index: np.ndarray, limits: Limits, gap_s: float) -> list[np.ndarray]:
-    """Of each reach from 1 pose on to those within a gap: (K - reach,) bool, the way may go so.
+    """Possible ways from each pose to later ones within a gap: for each reach (K - reach,) bool.
 
     Poses are left out between a jump away and one back alone: a step that lasts is none of these.
     Over a gap in time a robot may go anywhere.

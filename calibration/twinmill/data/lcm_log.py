@@ -166,7 +166,7 @@ def decode(
 
 
 def few_broken(count: int, of: int) -> bool:
-    """Whether so many messages that cannot be read are damage, and no other type of message."""
+    """True if so many unreadable messages are damage, and not messages of another type."""
     return count <= most_broken(of)
 
 

@@ -42,7 +42,7 @@ def lost_commands(robot: RobotLog) -> np.ndarray:
 
 
 def keeps_beat(t_s: np.ndarray) -> bool:
-    """Whether stamps come at a beat, and not when something changes."""
+    """True if stamps come at a beat, and not when something changes."""
     steps_s = np.diff(t_s)
     return bool(len(steps_s) and _on_the_beat(steps_s).mean() >= BEAT)
 
@@ -68,7 +68,7 @@ def words(robot: RobotLog, lost_s: np.ndarray) -> str:
 
 
 def _says_again(robot: RobotLog, longest_s: float) -> bool:
-    """Whether one command is repeated for as long as a hole lasts, here and there."""
+    """True if one command is repeated for as long as a hole lasts, here and there."""
     t_s = robot.command_t_s
     changes = (np.diff(robot.command, axis=0) != 0).any(axis=1) | (np.diff(t_s) > longest_s)
     begin = np.flatnonzero(np.concatenate([[True], changes]))
@@ -78,7 +78,7 @@ def _says_again(robot: RobotLog, longest_s: float) -> bool:
 
 
 def _stands(robot: RobotLog, begin_s: float, end_s: float) -> bool:
-    """Whether the robot is seen to stand, once it has come to rest."""
+    """True if the robot is seen to stand, once it has come to rest."""
     rest_s = begin_s + HOLE_S
     within = robot.valid & (robot.pose_t_s > rest_s) & (robot.pose_t_s < end_s)
     if np.count_nonzero(within) < 2:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is compared with a model: the cleaned runs of each robot in each log."""
+"""Measurements that are compared with a model: the cleaned runs of each robot in each log."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +60,7 @@ class Measurement:
 
     @classmethod
     def live(cls, track: Track) -> "Measurement":
-        """Of a robot that is heard now: from no file."""
+        """Measurement of a robot that is heard now, from no file."""
         return cls("live", "", track, track.notes, 0)
 
     @property
@@ -100,7 +100,7 @@ class Measurement:
         return not all(f.steady for f in self.findings)
 
     def punctual(self) -> "Measurement":
-        """The same run with its commands when they acted, had all come as late as the first."""
+        """Run whose commands act when they did, had all come as late as the first."""
         if self.lateness is None:
             return self
         acting_s = self.lateness.acting_s(self.track.command_t_s)
@@ -116,7 +116,7 @@ class Measurement:
 
     @cached_property
     def started(self) -> native.Track:
-        """The same with smoothed headings, for predictions over windows.
+        """Track with smoothed headings, for predictions over windows.
 
         A prediction goes where its first heading points, and one reading of it is noisier than the
         few around it.
@@ -131,7 +131,7 @@ class Measurement:
         return {k: v for k, v in vars(self).items() if k not in ("played", "started")}
 
     def with_pose(self, pose: np.ndarray) -> "Measurement":
-        """The same run with other poses (N, 3)."""
+        """Run with other poses (N, 3), all else unchanged."""
         smooth_rad = self.track.heading_smooth
         if self.track.has_heading:
             t_s, segment = self.track.pose_t_s, self.track.segment
@@ -140,7 +140,7 @@ class Measurement:
         return replace(self, track=track)
 
     def without(self, stretches_s: list[tuple[float, float]], why: str) -> "Measurement":
-        """The same run cut: poses within stretches of capture's clock are not used."""
+        """Run less the poses within stretches of capture's clock."""
         t_s, segment = self.track.pose_t_s, self.track.segment
         inside = np.zeros(len(t_s), bool)
         for begin_s, end_s in stretches_s:
@@ -171,7 +171,7 @@ def _taken_into_account(finding: InputFinding) -> str:
 
 
 class Measurements(list[Measurement | SteadyTable]):
-    """What can be judged, and what is to be said of the input.
+    """Usable measurements, and the findings about the input.
 
     Attributes:
         excluded: one sentence on each robot, log or table that cannot be judged.
@@ -235,7 +235,7 @@ class BadInputError(LogError):
 
 
 def findings_of(error: LogError) -> list[InputFinding]:
-    """What an error says of the input, whatever it was that could not be judged."""
+    """Findings about the input that an error carries; none if it is of another kind."""
     if isinstance(error, BadInputError):
         return error.findings
     said = " ".join(str(error).split()).removesuffix(".")
@@ -268,7 +268,7 @@ def load_measurements(
 def clean_measurements(
     paths: Sequence[Path | Log | SteadyTable], model: native.Model | None = None
 ) -> Measurements:
-    """The same, but commands are not yet checked against the motion, which takes longest."""
+    """Measurements cleaned but not checked against the motion, which takes longest."""
     judged: list[Measurement | SteadyTable] = []
     excluded: list[LogError] = []
     findings: list[InputFinding] = []

@@ -142,7 +142,7 @@ class Table:
     constants: frozenset[str] = frozenset()  # columns that the file lacks, of one value
 
     def under(self, sources: dict) -> "Table":
-        """The same cells under other names and in other units; columns that nobody names stay."""
+        """Table renamed and in other units; columns that nobody names stay."""
         place = {name: k for k, name in enumerate(self.header)}
         taken = {source.column for source in sources.values()}
         rest = [name for name in self.header if name not in taken and name not in sources]
@@ -165,7 +165,7 @@ class Table:
         )
 
     def has(self, *columns: str) -> bool:
-        """Whether all these columns are there."""
+        """True if all these columns are there."""
         return set(columns) <= set(self.header)
 
     @property
@@ -214,7 +214,7 @@ class Table:
     def _numbers_in(
         self, cells: list[str], column: str, begin: int, empty_is_nan: bool
     ) -> np.ndarray:
-        """Of some cells of a column; the first is of row `begin`."""
+        """Numbers in some cells of a column; the first is of row `begin`."""
         if empty_is_nan:
             cells = ["nan" if cell.strip().lower() in LOST else cell for cell in cells]
         try:
@@ -247,7 +247,7 @@ class Table:
         return self.finite(column)
 
     def is_dated(self, column: str) -> bool:
-        """Whether a column holds dates with times, or times of day."""
+        """True if a column holds dates with times, or times of day."""
         first = self.rows[0][self._place(column)].strip()
         kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
         return any(kind.match(first) for kind in kinds) or bool(DIGITS.fullmatch(first))
@@ -355,7 +355,7 @@ def _of_digits(cells: list[str]) -> list[str]:
 
 
 def _quantity(name: str) -> str:
-    """What a column holds by the unit in its name, as one of our units; empty if it has none."""
+    """Quantity by the unit in a column's name, as one of our units; empty if it has none."""
     unit = split_unit(name)[1]
     return UNITS[unit][0] if unit else ""
 
@@ -478,7 +478,7 @@ def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str, str]:
 
 
 def _between_values(line: str) -> str:
-    """What stands between numbers or times in a line that holds nothing else; else empty."""
+    """Separator between numbers or times in a line that holds nothing else; else empty."""
     for delimiter in (";", "\t", "|", ",", " "):
         cells = _split(line, delimiter)
         if len(cells) > 1 and all(map(_is_value, cells)):
@@ -497,7 +497,7 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 
 def _delimiter(header: str) -> str:
-    """What stands between the names most often; spaces where nothing else does."""
+    """Separator found most often between the names; spaces if there is no other."""
     best = max(",;\t|", key=header.count)
     return best if best in header else " " if " " in header.strip() else ","
 
@@ -545,14 +545,14 @@ def _with_units(header: list[str], row: list[str]) -> list[str] | None:
 
 
 def _remembered(lines: Iterator[str], last: list[str]) -> Iterator[str]:
-    """The same lines; `last[0]` is the newest."""
+    """Passes lines on; `last[0]` is the newest."""
     for line in lines:
         last[0] = line
         yield line
 
 
 def _has_decimal_commas(rows: PackedRows, delimiter: str) -> bool:
-    """Whether commas in cells are decimal points: some are, and no cell has a point as well.
+    """True if commas in cells are decimal points: some are, and no cell has a point as well.
 
     Between commas cells with a comma stand in quotes; those that all have three digits behind it
     may be thousands.
@@ -566,7 +566,7 @@ def _has_decimal_commas(rows: PackedRows, delimiter: str) -> bool:
 
 
 def _ends_short(rows: PackedRows) -> bool:
-    """Whether the last cell of all is shorter than any above it."""
+    """True if the last cell of all is shorter than any above it."""
     *above, last = (len(cell.strip()) for cells in rows.parts(-1) for cell in cells)
     return len(above) >= FEWEST_ROWS and last < min(above)
 
@@ -576,7 +576,7 @@ def _cut(name: str, line: int) -> str:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell can be read as a number."""
+    """True if a cell can be read as a number."""
     try:
         float(cell)
     except ValueError:

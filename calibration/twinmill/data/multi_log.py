@@ -49,7 +49,7 @@ def read_multi_log(path: Path) -> MultiLog:
 
 
 def multi_log_of(events: Events, path: Path, sha256: str = "") -> MultiLog:
-    """The same of events; `path` names them in messages."""
+    """Log of several robots from events; `path` names them in messages."""
     present = [
         p for p in PREFIXES if any(re.match(rf"{p}R\d{{2,4}}_", c) for c in events.by_channel)
     ]

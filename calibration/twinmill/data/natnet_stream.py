@@ -36,7 +36,7 @@ class StreamError(ValueError):
 
 @dataclass(frozen=True)
 class Server:
-    """What Motive says of itself and of its stream.
+    """Motive's description of itself and of its stream.
 
     Attributes:
         address, local: its address; ours on the way to it.

@@ -46,7 +46,7 @@ class Check:
 
 
 def _is_pose(position_m: tuple, orientation: np.ndarray) -> bool:
-    """Whether these are numbers and a turn; Motive sends zeros for what it never saw."""
+    """True if these are numbers and a turn; Motive sends zeros for a body it never saw."""
     unit = abs(np.linalg.norm(orientation) - 1) < UNIT_OFF
     return bool(unit and np.isfinite(position_m).all())
 
@@ -114,7 +114,7 @@ class Robots:
         return message
 
     def checks(self) -> list[Check]:
-        """What is well and what is not, in the order in which to mend it."""
+        """Results of the checks, good and bad, in the order in which to mend them."""
         server = self.stream.server
         how = (
             f"multicast to {server.group}:{server.data_port}"

@@ -50,7 +50,7 @@ FEWEST_KEYS = 3  # lines of a message in YAML
 
 
 def other_file(beginning: bytes) -> tuple[str, str] | None:
-    """What a file is that begins so, and what to do about it; None if it may be what it should.
+    """Kind of file with this beginning, and advice; None if it may be the kind that is wanted.
 
     Args:
         beginning: its first LOOKED_AT bytes, or fewer.
@@ -88,7 +88,7 @@ def _zipped(beginning: bytes) -> tuple[str, str]:
 
 
 def _is_echo(beginning: bytes) -> bool:
-    """Whether all lines are keys, values of lists and ends of messages."""
+    """True if all lines are keys, values of lists and ends of messages."""
     lines = [line.rstrip() for line in beginning.splitlines()[:-1] if line.strip()]
     lines = lines or [beginning.strip()]
     keys = sum(bool(KEY.fullmatch(line)) for line in lines)

@@ -57,7 +57,7 @@ class PackedRows(Sequence[list[str]]):
         yield [row[place] for row in self._newest]
 
     def hold(self, text: str) -> bool:
-        """Whether any cell holds it."""
+        """True if any cell holds the text."""
         packed = any(text in column for part in self._packed for column in part)
         return packed or any(text in cell for row in self._newest for cell in row)
 
@@ -75,7 +75,7 @@ class PackedRows(Sequence[list[str]]):
         return found
 
     def rearranged(self, columns: Sequence[int | str]) -> "PackedRows":
-        """The same rows with other columns: by their places, or a text that all rows hold."""
+        """Rows with other columns: by their places, or a text that all rows hold."""
         found = PackedRows()
         whole = [_packed([c] * ROWS) if isinstance(c, str) else "" for c in columns]
         found._packed = [
@@ -88,7 +88,7 @@ class PackedRows(Sequence[list[str]]):
         return found
 
     def changed(self, change: Callable[[str], str]) -> "PackedRows":
-        """The same rows with each cell changed."""
+        """Rows with a change applied to each cell."""
         return PackedRows([change(cell) for cell in row] for row in self)
 
 

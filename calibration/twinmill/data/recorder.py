@@ -48,7 +48,7 @@ class Recorder:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: TracebackType | None) -> None:
-        """What was heard is kept, unless a ValueError says that nothing was begun."""
+        """Keeps the recording, unless a ValueError says that nothing was begun."""
         self._log.close()
         if kind is None or not issubclass(kind, ValueError):
             self._keep_whole_events()

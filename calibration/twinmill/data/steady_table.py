@@ -85,7 +85,7 @@ class SteadyTable:
 
     @property
     def of_wheels(self) -> bool:
-        """Whether it is of wheels on a bench, which tell nothing of how the robot moves."""
+        """True if it is of wheels on a bench, which tell nothing of how the robot moves."""
         return self.columns != MOTION
 
     def __repr__(self) -> str:
@@ -93,7 +93,7 @@ class SteadyTable:
 
 
 def is_steady_table(path: Path) -> bool:
-    """Whether a file is such a table, by its name."""
+    """True if the name of a file is that of a table of steady speeds."""
     return Path(path).name.endswith((".csv", ".csv.gz"))
 
 

@@ -56,7 +56,7 @@ def from_log(path: Path, warnings: list[str]) -> list[tuple[int, Batch]]:
 def from_bus(
     url: str, duration_s: float, say: Callable[[str], None] = lambda sentence: None
 ) -> Iterator[tuple[int, Batch]]:
-    """The same of what is heard from now on, for some time or until Ctrl-C.
+    """Batches heard on the bus from now on, for some time or until Ctrl-C.
 
     Args:
         url: of the bus.

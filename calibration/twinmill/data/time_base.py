@@ -32,7 +32,7 @@ LEAST_EXPLAINED = 0.8
 
 @dataclass(frozen=True)
 class TimeBase:
-    """What one second of the log lasted, in seconds of capture, and where the log begins.
+    """Length of the log's second in seconds of capture, and the log's begin.
 
     `explained` is the share of the motion that the commands explain with it.
     """
@@ -150,7 +150,7 @@ class _Regression:
         return float(1 - share)
 
     def stepped_loss(self, offsets_s: np.ndarray) -> float:
-        """The same of the log's own seconds with one offset up to a time, and another from it."""
+        """Loss if the log's own seconds had one offset up to a time, and another from it."""
         edges = np.arange(PARTS) * len(self.grid_s) // PARTS
         moments = np.array(
             [

@@ -82,7 +82,7 @@ class Gunzip:
 
     @property
     def unused_data(self) -> bytes:
-        """What follows it."""
+        """Bytes that follow the compressed stream."""
         return self._stream.unused_data
 
     def decompress(self, data: bytes, max_length: int) -> bytes:
@@ -132,7 +132,7 @@ class BoundedText(io.RawIOBase):
 
 
 def decompressors() -> dict[str, Callable[[], Any]]:
-    """What makes the decompressors of bags, by the names that these have for them."""
+    """Makers of the decompressors of bags, by the names that these have for them."""
     from lz4.frame import LZ4FrameDecompressor
     from rosbags.rosbag2.storage_mcap import zstd
 
@@ -167,7 +167,7 @@ def _unpack_sized(make: Callable[[], Any], data: bytes, size: int) -> bytes:
 
 
 class _BoundedZstd:
-    """What the reader of bags of version 2 uses of zstd: for single messages and whole files."""
+    """Part of zstd that the reader of bags of version 2 uses: single messages and whole files."""
 
     def __init__(self, zstd: Any) -> None:
         self._zstd = zstd

@@ -25,7 +25,7 @@ NEARLY_NONE = 0.05  # of the excess of a squared score
 def best_of(
     before: Trial, trials: list[Trial], first_excess: float, settings: Settings
 ) -> Trial | None:
-    """Of those with enough evidence, and that matter, the one with the least held-out cost.
+    """Cheapest on held-out data of the trials that matter and have enough evidence.
 
     Of two that do as well, the one with fewer numbers; of two that are the same, see `rank`.
     """
@@ -52,7 +52,7 @@ def best_of(
 
 
 def _was_far(before: Trial, refit: Trial) -> bool:
-    """Whether the base was far off, so that whatever moves all speeds takes nearly all."""
+    """True if the base was so far off that whatever moves all speeds takes nearly all."""
     left, first = (t.held_score**2 - 1 for t in (refit, before))
     return before.held_score > FAR and left < NEARLY_NONE * first
 
@@ -75,7 +75,7 @@ def when_s(trial: Trial, name: str) -> list[float]:
 
 
 def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
-    """Whether the base's numbers take what each robot's own gains took, and all took alike.
+    """True if the base's numbers take as much as each robot's own gains took, and all took alike.
 
     That makes no prediction better; it is far more likely than as many robots that are no usual
     ones.
@@ -86,7 +86,7 @@ def _is_common(before: Trial, refit: Trial, settings: Settings) -> bool:
 
 
 def _matters(before: Trial, trial: Trial, first_excess: float, settings: Settings) -> bool:
-    """Whether the addition is worth its words, by the fall of the squared score or detections."""
+    """True if the addition is worth its words, by the fall of the squared score or detections."""
     if before.state.of_cameras:
         return _changes_enough_bits(before, trial, settings)
     fall = before.held_score**2 - trial.held_score**2
@@ -96,7 +96,7 @@ def _matters(before: Trial, trial: Trial, first_excess: float, settings: Setting
 
 
 def _changes_enough_bits(before: Trial, trial: Trial, settings: Settings) -> bool:
-    """Whether it changes more detections than clock errors of a few ms and blurred poses do."""
+    """True if it changes more detections than clock errors of a few ms and blurred poses do."""
     seen = before.fit.in_view
     least = min(settings.bits, settings.bits_in_view * min(seen, 1 - seen))
     own = [e for e in trial.fit.shared_estimates() if instance_of(e.name) in trial.names]
@@ -122,7 +122,7 @@ def cost(trial: Trial, settings: Settings) -> float:
 
 
 def rank(trial: Trial, settings: Settings) -> tuple:
-    """What trials are compared by: cost, and of those that are the same a clock comes last.
+    """Key that sorts trials: cost, then, among equals, clocks last.
 
     A clock that is off and a robot that acts later shift the same poses, so that their costs differ
     by how a prediction is stepped.

@@ -49,7 +49,7 @@ class Differing:
 
     @property
     def middle(self) -> float:
-        """Of all."""
+        """Middle of all values."""
         return float(np.mean([*self.values.values()]))
 
     @property
@@ -59,7 +59,7 @@ class Differing:
 
     @property
     def words(self) -> str:
-        """What differs, from where to where."""
+        """Difference in words: the quantity, from where to where."""
         low, high = (of(self.values, key=self.values.get) for of in (min, max))
         told = " to ".join(f"{self._told(self.values[who])} of {who}" for who in (low, high))
         return f"{'motor lag' if self.name == LAG else GAIN_WORDS[self.name]} ({told})"
@@ -148,7 +148,7 @@ def _missed(datasets: Sequence[Trajectory], before: Comparison) -> tuple[str, ..
 
 
 def of_runs(found: Apart | None) -> bool:
-    """Whether runs were found to differ, and not robots."""
+    """True if runs were found to differ, and not robots."""
     return found is not None and found.whose == "runs"
 
 
@@ -174,7 +174,7 @@ def runs_with_own(
 
 
 def tells_more(own: Trial, alike: Trial) -> bool:
-    """Whether runs with numbers of their own leave little of what one set for all leaves.
+    """True if numbers of each run leave little of the error that one set for all leaves.
 
     What acts at some commands, at a place or from a moment on makes runs differ, too, if each has
     its own share of it; but then much is left within them. Two runs show least of that.
@@ -233,7 +233,7 @@ def _differing(state: State) -> tuple[Differing, ...]:
 def _of_each(
     told: Sequence[tuple[int, str, ParameterEstimate]],
 ) -> tuple[dict[str, float], float, float]:
-    """What each robot or run has of a number that is a sum of a robot's part and a run's.
+    """Splits a number into a robot's part and a run's: values, and the two scatters.
 
     Args:
         told: robot, whose, and estimate; where robots differ, one robot for all.
@@ -278,7 +278,7 @@ def _whose(datasets: Sequence[Trajectory]) -> tuple[list[str], dict[str, str]]:
 
 
 def _alike(opened: Sequence[Opened], state: State) -> State:
-    """The same with one set of numbers for all, free; of runs that differ robots keep gains."""
+    """State with one set of numbers for all, free; of runs that differ robots keep gains."""
     middle_s = float(np.mean([m.get(LAG) for m in state.models]))
     models = [_of_all(m, middle_s) for m in state.models]
     by_run = any(isinstance(d, Trajectory) and d.by_run for d in state.datasets)

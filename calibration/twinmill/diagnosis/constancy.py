@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a parameter that was found is one number, or changes with what the robot was doing.
+"""Tests if a parameter that was found is one number, or changes with the robot's state.
 
 An effect that stands in for other physics fits each kind of drive with another strength. Each
 parameter gets a companion that is proportional to it and to what the robot was doing; a score test
@@ -61,7 +61,7 @@ class Change:
 
     @property
     def why(self) -> str:
-        """What the change means, as a clause for reports."""
+        """Reason for the change, as a clause for reports."""
         way = "grows" if self.relative > 0 else "falls"
         way = "changes" if self.on in ("heading", PLACE) else way
         return (
@@ -137,7 +137,7 @@ def changes_of(trial: Trial) -> dict[str, Change | OneHeading]:
 
 
 def _may_change(parameter: Parameter, on: str, way: str) -> bool:
-    """Whether a change of a number with something tells that it is not one number."""
+    """True if such a change of a number tells that it is not one number."""
     instance, key = instance_of(parameter.name), key_of(parameter.name)
     effect = catalogue_name(instance)
     if on == RIM:

@@ -176,7 +176,7 @@ def _diagnosed(
     *,
     course: Course,
 ) -> Diagnosis:
-    """The same, with what there is by now written down in its course."""
+    """Runs the diagnosis and writes its progress down in its course."""
     progress("finding the noise floor")
     opened = open_measurements(measurements, model_file)
     before = comparison(model_file, opened)
@@ -369,7 +369,7 @@ def _concluded(
     runs_off: Sequence[Outlier],
     lags_s: float,
 ) -> Diagnosis:
-    """What the search of the motion tells, before cameras are looked at."""
+    """Diagnosis from the search of the motion, before cameras are looked at."""
     hashes = [o.measurement.log_sha256 for o in known]
     without = less_each(done, known)
     less, formulas = without.less, without.formulas
@@ -511,7 +511,7 @@ def _concluded(
 
 
 def thinned_to_search(opened: Sequence[Opened]) -> list[Opened]:
-    """The same with as many starts of predictions as a search looks at."""
+    """Measurements with as many starts of predictions as a search looks at."""
     data = [o.data for o in opened]
     return thinned(opened, thinning(data, SETTINGS.starts, SETTINGS.starts_apart_s))
 
@@ -557,7 +557,7 @@ def _drift(given: float, first: State, start: State, last: Trial) -> Finding | N
 def _gains_nothing(
     proven: Formula, findings: Sequence[Finding], whole: ScoreFit, first: ScoreFit
 ) -> bool:
-    """Whether left-out data do not bear a formula out, once the base is refitted beside it.
+    """True if left-out data do not bear a formula out, once the base is refitted beside it.
 
     Args:
         proven: the formula.
@@ -672,7 +672,7 @@ def _next(
     *,
     same_clock: bool,
 ) -> dict | None:
-    """What to drive next, in words; the script itself is designed by `twinmill next`."""
+    """Next drive in words; the script itself is designed by `twinmill next`."""
     tied = next((f.group for f in findings if f.group), None)
     if verdict == "ambiguous" and tied:
         clocks = "" if same_clock else ", on clocks tied by a calibration log"

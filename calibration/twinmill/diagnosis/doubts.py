@@ -170,7 +170,7 @@ def instead_of_moment(done: Search, name: str) -> list[str]:
 
 
 def _may_not_end(last: Trial, name: str) -> bool:
-    """Whether the end of an effect of a while may lie beyond its log."""
+    """True if the end of an effect of a while may lie beyond its log."""
     if not lasts_for_a_while(name):
         return False
     key = with_role(name, "moment")[-1]
@@ -180,14 +180,14 @@ def _may_not_end(last: Trial, name: str) -> bool:
 
 
 def _is_even(last: Trial, name: str) -> bool:
-    """Whether one size says all of an effect: a loss that is one of both sides."""
+    """True if one size says all of an effect: a loss that is one of both sides."""
     card, own = catalogue_of(last.state.model)[name], estimates_of(last, name)
     sizes = [(e, away) for e, p, away in _sizes(card, own) if p["role"] == "size"]
     return sum(away > SETTINGS.within * e.std for e, away in sizes) < 2
 
 
 def _in_a_place_of_its_own(last: Trial, name: str) -> bool:
-    """Whether the robot, while an effect of a moment is there, drives where it drives at no other.
+    """True if the robot, during a momentary effect, drives where it drives at no other time.
 
     Then the floor there may be as it is, and no log of this drive tells. When it begins and ends is
     known to a part of its while, so that the middle of it decides.
@@ -348,7 +348,7 @@ def _visits(last: Trial, less: Trial, instance: str) -> int | None:
 
 
 def _stands_alone(done: Search, name: str) -> bool:
-    """Whether nothing is left beside an effect, and no other comes near to what it takes.
+    """True if nothing is left beside an effect, and no other comes near to its share.
 
     Then it is right though its size is none that is usual.
     """
@@ -359,7 +359,7 @@ def _stands_alone(done: Search, name: str) -> bool:
 
 
 def _beats(done: Search, one: Trial, other: Trial) -> bool:
-    """Whether one is better by what an addition must bring, also without its best block."""
+    """True if one is better by as much as an addition must bring, also without its best block."""
     evidence, without_best, _ = one.fit.against(other.fit)
     least = done.settings
     return evidence > least.evidence and without_best > least.without_best
@@ -401,7 +401,7 @@ def _same(
 
 
 def _is_bounded(trial: Trial) -> bool:
-    """Whether a number of a trial of one effect ended at its bound."""
+    """True if a number of a trial of one effect ended at its bound."""
     return any(e.at_bound for e in estimates_of(trial, trial.names[0]))
 
 
@@ -628,7 +628,7 @@ def _is_beside_larger_group(
 
 
 def _leaves_its_own(finding: Finding, found: Sequence[Finding], rest: Rest) -> Finding | None:
-    """What is left still depends on what the finding acts by.
+    """Finding that is doubtful since the rest still depends on the quantity that it acts by.
 
     A robot comes to other places as time goes by, so that a place may stand for the time, and a
     while for a place.
@@ -679,7 +679,7 @@ FORM_RULES = (
 
 
 def _much_left_by(rest: Rest, group: str) -> bool:
-    """Whether a group takes much of what is left; of one without formulas that is not known."""
+    """True if a group takes much of the rest; without formulas for it that is not known."""
     taken = (rest.left_over or {}).get(group, 1.0)
     return rest.share > SETTINGS.nothing_left and taken > SETTINGS.form_takes
 
@@ -709,7 +709,7 @@ def _alike_losses(found: Sequence[Finding]) -> list[Finding]:
 
 
 def _adjoin(one: Finding, other: Finding) -> bool:
-    """Whether one of two findings of a moment ends where the other begins."""
+    """True if one of two findings of a moment ends where the other begins."""
     (begin_s, *end_s), (again_s, *over_s) = map(_when_s, (one, other))
     pairs = [*((e, again_s) for e in end_s), *((o, begin_s) for o in over_s)]
     return one is not other and any(abs(a - b) < PAUSE_S for a, b in pairs)
@@ -797,7 +797,7 @@ def of_many(found: Sequence[Finding]) -> list[Finding]:
 
 
 def acted_on(found: Sequence[Finding], least: float) -> list[str]:
-    """What the first of the doubtful findings that take so much depends on; none if that is none.
+    """Dependences of the first doubtful finding that takes so much; empty if there is none.
 
     A robot comes to other places as time goes by: beside what is of a place, what is of a moment
     tells nothing.
@@ -815,39 +815,39 @@ def _depends_on(effect: str) -> str:
 
 
 def _acts_by(effect: str) -> set[str]:
-    """What the effect's card says of it in this respect; nothing for a refit, which has none."""
+    """Quantities that the effect's card names as causes; none for a refit, which has no card."""
     card = catalogue().get(effect, {"identify": (), "needs": "", "family": ""})
     return {*card["identify"], card["needs"], card["family"]}
 
 
 def _is_late(effect: str) -> bool:
-    """Whether all of the motion comes late, at every change of the command."""
+    """True if all of the motion comes late, at every change of the command."""
     always = {"changes", "steps"} <= _acts_by(effect) and "spin" not in _acts_by(effect)
     return bool(late_part(effect)) or always
 
 
 def _is_placed(effect: str) -> bool:
-    """Whether it changes with the place in the room."""
+    """True if it changes with the place in the room."""
     return "places" in _acts_by(effect)
 
 
 def _is_event(effect: str) -> bool:
-    """Whether it is at a place or from a moment on."""
+    """True if it is at a place or from a moment on."""
     return any(with_role(effect, role) for role in WHERE_OR_WHEN)
 
 
 def _rubs(effect: str) -> bool:
-    """Whether it is friction that a drive straight ahead shows at several speeds."""
+    """True if it is friction that a drive straight ahead shows at several speeds."""
     return {"friction", "straight", "levels"} <= _acts_by(effect)
 
 
 def _is_timed(effect: str) -> bool:
-    """Whether it changes with the time that the robot has been driving."""
+    """True if it changes with the time that the robot has been driving."""
     return bool(BY[TIME] & _acts_by(effect))
 
 
 def _is_slow(effect: str) -> bool:
-    """Whether it changes all the time that the robot has been driving, from no moment on."""
+    """True if it changes all the time that the robot has been driving, from no moment on."""
     return _is_timed(effect) and not with_role(effect, "moment")
 
 

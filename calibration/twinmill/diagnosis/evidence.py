@@ -64,7 +64,7 @@ class Evidence:
         self.weighed(np.ones(len(self._left)))
 
     def _divide(self) -> None:
-        """Of rows that are kept: stretches, blocks of one sign, channels, when they begin."""
+        """Divides the kept rows into stretches and blocks of one sign, with channels and begins."""
         kept, stretch, block, longest, begin_s = [], [], [], [], []
         self._inside = []  # (W, HORIZONS, 3) of each log: rows that are kept, of these horizons
         first_stretch = first_block = 0
@@ -147,11 +147,11 @@ class Evidence:
         return (self.weight * np.concatenate(list(changes))[self.kept])[:, None]
 
     def seen(self, raw: np.ndarray) -> np.ndarray:
-        """The same of (R, K) raw columns; zero where next to nothing is left."""
+        """Projects (R, K) raw columns off the free ones; zero where next to nothing is left."""
         return self._seen(raw)[0]
 
     def _seen(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same, and (K,) lengths with what is free and without."""
+        """Projected columns, and (K,) lengths with the free ones projected out and without."""
         columns = self.scale[:, None] * raw
         before = norms(columns)
         along = self.basis.T @ columns
@@ -163,7 +163,7 @@ class Evidence:
         return columns, before, after
 
     def lifted(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same, each as long as it is with what is free, and (K,) how many times longer.
+        """Projected columns at their full length, and (K,) factors by which they are longer.
 
         A number is unlikely if what is seen of it is large. Of a form that is nearly free little
         is seen, so that by its own size its number would be pulled to nothing.
@@ -176,7 +176,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Sums:
-    """Of T forms, each with the columns beside: grams (S, T, k, k) and moments (S, T, k)."""
+    """Sums for T forms, each with the columns beside: grams (S, T, k, k) and moments (S, T, k)."""
 
     grams: np.ndarray
     moments: np.ndarray
@@ -226,7 +226,7 @@ class Sums:
         return Sums(self.grams[:, wanted], self.moments[:, wanted])
 
     def of_rows_that_weigh(self, times: float) -> "Sums":
-        """The same if all rows weigh so many times what they do."""
+        """Sums if all rows weighed so many times as much."""
         return Sums(times**2 * self.grams, times**2 * self.moments)
 
 
@@ -254,7 +254,7 @@ class Chosen:
 
     @property
     def numbers(self) -> int:
-        """Of all terms."""
+        """Count of the numbers in all terms."""
         return sum(f.numbers for f in self.forms)
 
     @property
@@ -265,7 +265,7 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Proof:
-    """What was chosen, the chance of its fall on the other half, and the share that it takes.
+    """Chosen formula, the chance of its fall on the other half, and the share that it takes.
 
     Attributes:
         scale: (R,) weights of the rows with which it was chosen.

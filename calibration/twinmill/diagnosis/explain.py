@@ -66,12 +66,12 @@ class Explanation:
 
     @property
     def path(self) -> Path | None:
-        """Of the new model; None if there is none."""
+        """Path of the new model; None if there is none."""
         return self.child and self.child.path
 
     @property
     def sentence(self) -> str:
-        """What the model has now, where that is a formula, before what was missing."""
+        """Model's content if that is a formula, as a sentence before the one on the lack."""
         missing = self.diagnosis.sentence
         return f"{self.now} Without it: {missing}" if self.now else missing
 
@@ -90,7 +90,7 @@ class Explanation:
 
     @property
     def left_out(self) -> str:
-        """What was found and is not in the model, in a sentence; empty if nothing is."""
+        """Findings that are not in the model, in a sentence; empty if all are."""
         whys = (
             (
                 self.diagnosis.passing,
@@ -203,7 +203,7 @@ def explain_model(
 
 
 def _with_stale_lag(diagnosis: Diagnosis) -> Diagnosis:
-    """The same with the lag refitted, where effects that make the robot late stand for it alone."""
+    """Diagnosis with the lag refitted, where effects that delay the robot replace it."""
     stale = next((f for f in diagnosis.findings if f.effect == REFIT), None)
     if stale is None or LAG not in {p.name for p in stale.parameters}:
         return diagnosis
@@ -310,7 +310,7 @@ def _anew(diagnosis: Diagnosis, fit: ScoreFit, common: native.Model) -> list[Out
 
 
 def _passes(estimate: ParameterEstimate, diagnosis: Diagnosis) -> bool:
-    """Whether a number is of this run alone: of an effect that passes, or of changing lateness."""
+    """True if a number is of this run alone: of an effect that passes, or of changing lateness."""
     late = bool(diagnosis.rest.events.later) and estimate.name == LAG
     return late or catalogue_name(estimate.name) in diagnosis.passing
 
@@ -346,7 +346,7 @@ def _with_effects(diagnosis: Diagnosis, model_file: ModelFile, own: Candidate) -
 
 
 def _left_over(diagnosis: Diagnosis, kept: Taken | None) -> dict[str, float]:
-    """What the model still leaves, by what it depends on; a formula took its share of all."""
+    """Errors that the model still leaves, by dependence, less the share that a formula took."""
     left = 1 - kept.share if kept else 1.0
     falls = diagnosis.rest.left_over or {}
     return {group: left * fall for group, fall in falls.items() if left > 0}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a diagnosis says of one effect, of a ranking, and of how late the motion is."""
+"""Results of a diagnosis about one effect, a ranking, and the lateness of the motion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -42,7 +42,7 @@ class Finding:
 
     @property
     def passes(self) -> bool:
-        """Whether it is of a moment of its run, or may be: no other run has it.
+        """True if it is, or may be, of a moment of its run: no other run has it.
 
         So is a place that may be a moment, or is in doubt, and a number that changed as time went.
         """

@@ -220,7 +220,7 @@ def slight_lags(done: Search, first: State, score: float) -> dict[str, Parameter
 
 
 def _does_as_much(this: Round, trial: Trial) -> bool:
-    """Whether a trial takes about what the accepted one does."""
+    """True if a trial takes about as much as the accepted one does."""
     before = this.before.held_score**2
     return before - trial.held_score**2 > SETTINGS.rival * (before - this.accepted.held_score**2)
 
@@ -245,7 +245,7 @@ def _late_s(model: native.Model) -> float:
 def _stale_numbers(
     finding: Finding, model: native.Model, lag_std_s: float, stds: Mapping[str, float]
 ) -> list[ParameterEstimate]:
-    """What a finding changes, if the model may well have all of it by its own error; else none."""
+    """Changes that a finding makes, if the model's own error may cover all of them; else none."""
     lag_s = model.get(LAG)
     known_s = lag_std_s or SETTINGS.stated_lag * lag_s
     alike = set(finding.group or ()) <= {*needing("changes")}
@@ -274,7 +274,7 @@ def _stale_clock(
 
 
 def _is_error(own: ParameterEstimate, model: native.Model, stds: Mapping[str, float]) -> bool:
-    """Whether a number that changed did so within the error of the one that the model had."""
+    """True if a number changed by no more than the error that the model gives for it."""
     instance, key = instance_of(own.name), key_of(own.name)
     name = catalogue_name(instance)
     card = next(p for p in catalogue_of(model)[name]["parameters"] if p["name"] == key)
@@ -371,7 +371,7 @@ def _finding(
 
 
 def not_weighed(done: Search) -> list[Finding]:
-    """What a search has found that was stopped, most first; no fit is made for it.
+    """Findings of a search that was stopped, most first; no fit is made for them.
 
     Shares are of the squared held-out score above the noise, each in the round that accepted it.
     """

@@ -76,7 +76,7 @@ FUNCTIONS["max"] = np.maximum
 
 @dataclass(frozen=True)
 class State:
-    """What a form remembers: s goes to `goal` at `rate` per second, texts as the shapes are.
+    """Memory of a form: s goes to `goal` at `rate` per second, texts as the shapes are.
 
     Without a goal it adds up `rate`. Without a rate it swings around the goal, {c} per second, as
     {d} damps it. With a second goal there is one of them along x and another along y of the room.
@@ -105,7 +105,7 @@ class State:
 
     @property
     def second_text(self) -> str:
-        """The same of r; empty where there is none."""
+        """Formula of the second state r; empty if there is none."""
         swings = [f"{C}*{C}*({goal} - s) - 2*{D}*{C}*r" for goal in self.goals]
         return ", ".join(swings) if self.swings else ""
 
@@ -156,7 +156,7 @@ class Form:
 
     @property
     def of_one_value(self) -> bool:
-        """Of the body's motion it changes one quantity, which can be drawn over a variable."""
+        """True if it changes one quantity of the motion, which can be drawn over a variable."""
         return self.of_body and self.adds_to != ROOM
 
     @cached_property
@@ -181,7 +181,7 @@ class Form:
 
     @cached_property
     def rates(self) -> tuple[str, ...]:
-        """Of its states with its constants; none if it has no state."""
+        """Rates of its states with its constants filled in; none if it has no state."""
         texts = (self.state.text, self.state.second_text) if self.state else ()
         return tuple(self.filled(t) for t in texts if t)
 
@@ -193,7 +193,7 @@ class Form:
 
     @property
     def plainer(self) -> "Form | None":
-        """The same without the rate of change of what swings; None if it does not name it."""
+        """Form without the rate of change of a swinging quantity; None if it does not name it."""
         plain = tuple(s for s in self.shapes if s != "r")
         return replace(self, shapes=plain, sizes=()) if plain != self.shapes else None
 
@@ -224,16 +224,16 @@ class Form:
         return USUAL[self.adds_to] / np.array(self.sizes)
 
     def without(self, k: int) -> "Form":
-        """The same without one of its shapes."""
+        """Form less one of its shapes."""
         shapes, sizes = ((*own[:k], *own[k + 1 :]) for own in (self.shapes, self.sizes))
         return replace(self, shapes=shapes, sizes=sizes, column=-1)
 
     def at(self, constant: float) -> "Form":
-        """The same with another constant."""
+        """Form with another value of its constant."""
         return replace(self, constant=float(f"{constant:.4g}"), sizes=())
 
     def near(self, name: str, parts: Sequence[float]) -> list["Form"]:
-        """The same with a constant further off, by parts of what a better one may differ by."""
+        """Forms with the constant further off, by parts of the step to a better one."""
         if name == "constant":
             return [self.at(self.constant * (1 + self.spread * part)) for part in parts]
         tried = np.clip(self.damping * DAMPED ** np.array(parts), LEAST_DAMPED, MOST_DAMPED)
@@ -273,7 +273,7 @@ class Motion:
     def of(
         cls, logs: Sequence[Opened], velocities: Sequence[np.ndarray], horizons: Sequence[int]
     ) -> "Motion":
-        """Of logs and (N, 3) the velocity in each."""
+        """Motion of logs at (N, 3) velocities in each."""
         responses = [own.response for own in logs]
         velocity = np.concatenate(velocities)
         vx, vy, omega = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
@@ -320,7 +320,7 @@ class Motion:
         return self._along(form, "vx")
 
     def _along(self, form: Form, axis: str) -> np.ndarray:
-        """The same, with a speed of the body in the place of the wheels'."""
+        """Rewrites a form of the wheels' speed for a speed of the body."""
         wheels = axis if not form.of_body else ""
         key = (form.adds_to, wheels, form.shapes, form.state, *form.constants.values())
         if key not in self._known:
@@ -354,7 +354,7 @@ class Motion:
         return dict(zip(("s", "r"), self._known[key], strict=True))
 
     def _swings(self, rate: float, damping: float) -> list[Swing]:
-        """Of each log, around any goal."""
+        """Oscillators around any goal, for each log."""
         if (rate, damping) not in self._swinging:
             found = [Swing(self._step_s[part], rate, damping) for part in self.parts]
             self._swinging[rate, damping] = found
@@ -471,7 +471,7 @@ def _turned(response: Response, error_rad: np.ndarray, measured: np.ndarray) -> 
 
 
 def _value(text: str, names: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Of a formula of this file or of the library, which Python and the plant read alike.
+    """Value of a formula of this file or of the library, which Python and the plant read alike.
 
     Constants have names here, so that the forms of many constants are one text.
     """
@@ -550,7 +550,7 @@ def own_forms(
 
 
 def _of_room(every: Mapping[str, np.ndarray], sideways: bool) -> list[Form]:
-    """What depends on place, heading and, where they differ, the direction in which it drives."""
+    """Forms of place, heading and, where they differ, the direction in which it drives."""
     found = []
     for name in ("x", "y"):
         span = np.ptp(every[name])
@@ -573,7 +573,7 @@ def _of_room(every: Mapping[str, np.ndarray], sideways: bool) -> list[Form]:
 
 
 def _of_time(every: Mapping[str, np.ndarray]) -> list[Form]:
-    """What comes and goes, begins, or is there for a while."""
+    """Forms in time: some come and go, some begin, some last for a while."""
     first, span = every["t"].min(), np.ptp(every["t"])
     count = int(min(2 * span / SHORTEST_S, MOST_WAVES))
     found = [
@@ -599,7 +599,7 @@ def _swinging(adds_to: str, name: str, rate: float, spread: float) -> Form:
 
 
 def _of_load() -> list[Form]:
-    """What warms up, empties, recovers or wears: a state that follows how hard the robot drives."""
+    """Forms that warm up, empty, recover or wear: a state that follows how hard it drives."""
     turning = f"{L}*{L}*omega*omega"
     load, rate = f"(vx*vx + vy*vy + {turning})", f"(1/{C})"
     way = f"sqrt(vx*vx + vy*vy + {turning})"
@@ -633,7 +633,7 @@ def _of_speed() -> list[Form]:
 
 
 def _around_a_speed(every: Mapping[str, np.ndarray]) -> list[Form]:
-    """What a motor or the body loses or gains around one speed, as at a resonance."""
+    """Forms of a gain or loss around one speed, as a motor or the body has at a resonance."""
     found = []
     speeds = {
         "vx": ("vx_mps", "vx*", "abs(vx)"),
@@ -659,7 +659,7 @@ def _late_wheels() -> list[Form]:
 
 
 def _late(axis: str) -> list[Form]:
-    """What a speed does after its past: a second lag, and way that each reversal stores first."""
+    """Forms of a speed's past: a second lag, and way that each reversal stores first."""
     to = {"vx": "vx_mps", "vy": "vy_mps", "omega": "omega_radps"}[axis]
     lag, stored = State(axis, f"(1/{C})"), State(f"{C}*sign({axis})", f"(abs({axis})/{C})")
     found = [Form(to, (f"({axis} - s)",), PAST, lag, lag_s, 0.4, "s") for lag_s in LAGS_S]
@@ -712,7 +712,7 @@ def joined(forms: Sequence[Form]) -> dict[str, str]:
 
 
 def tunable(forms: Sequence[Form]) -> dict[str, str]:
-    """The same with all constants as numbers, too: of each form in turn."""
+    """Forms with all constants made numbers, each form in turn."""
     return _with_names(forms, [form.searched for form in forms])
 
 
@@ -741,7 +741,7 @@ def summed(forms: Sequence[Form], numbers: Sequence[str]) -> str:
 
 
 def _sum(adds_to: str, texts: Sequence[str], numbers: Sequence[str]) -> str:
-    """Of numbers times texts; of a push in the room two, along x and along y."""
+    """Sum of numbers times texts; of a push in the room two, along x and along y."""
     terms = [f"{number}*{text}" for number, text in zip(numbers, texts, strict=True)]
     values = [terms[0::2], terms[1::2]] if adds_to == ROOM else [terms]
     return ", ".join(" + ".join(own) for own in values).replace("+ -", "- ")

@@ -61,7 +61,7 @@ NEAR = 10  # best forms: where one of these is of time, all that comes by the cl
 
 @dataclass(frozen=True)
 class Rival:
-    """What a formula must outdo.
+    """Competing explanation that a formula must outdo.
 
     Attributes:
         changes: (R,) of each log's rows by it.
@@ -113,7 +113,7 @@ def formula_of(
 def _borne_out(
     rows: Evidence, pool: Pool, clock: Recurring, proofs: Sequence[Proof]
 ) -> Formula | None:
-    """Of what was proven the one that gains most on both halves, of those that resamplings bear."""
+    """Proven formula that resamplings bear out, of these the one that gains most on both halves."""
     for proof in sorted(proofs, key=lambda p: -_net(rows, p)):
         first = proof.chosen.forms[0]
         rows.weighed(proof.scale)
@@ -164,7 +164,7 @@ def _has(form: Form, part: Form) -> bool:
 
 
 def _net(rows: Evidence, proof: Proof) -> float:
-    """What a proven formula gains on each stretch of both halves, fitted to all others."""
+    """Gain of a proven formula on each stretch of both halves, fitted to all others."""
     rows.weighed(np.ones(len(rows.stretch)))
     every = np.ones(len(rows.parts), bool)
     last = proof.chosen.forms[-1]
@@ -215,7 +215,7 @@ def _proven(
 
 
 def _holds(proof: Proof) -> bool:
-    """Whether the half that judged it bears it out."""
+    """True if the half that judged it bears it out."""
     return proof.chance <= SETTINGS.formula_chance and proof.takes >= SETTINGS.formula_takes
 
 
@@ -233,7 +233,7 @@ def _that_swings(
     rival: Rival | None,
     before: int,
 ) -> list[Proof]:
-    """Of what swings alone, by rows that weigh more, after so many tests of a half."""
+    """Proofs of swinging terms alone, by rows that weigh more, after so many tests of a half."""
     rows.weighed(np.full(len(rows.stretch), HEAVY))
     swinging = np.flatnonzero([f.damping > 0 for f in pool.forms])
     sums = alone.some(swinging).of_rows_that_weigh(HEAVY)
@@ -248,7 +248,7 @@ def _that_swings(
 
 
 def _by_the_clock(rows: Evidence, half: np.ndarray, clock: Recurring) -> Pool:
-    """What is there for a part of each period, chosen again by what noise then remains."""
+    """Pool for part of each period, chosen anew by the noise that then remains."""
     plain = np.ones(len(rows.stretch))
     rows.weighed(plain)
     rows.weighed(_scales(rows, clock.best(half).raw, half))
@@ -286,7 +286,7 @@ def _judged(
 
 
 def _outdone(rows: Evidence, chosen: Chosen, rival: Rival, half: np.ndarray) -> bool:
-    """Whether a rival predicts left-out stretches as well.
+    """True if a rival predicts left-out stretches as well.
 
     Its numbers were fitted to these as well: what each takes there by chance goes off.
     """
@@ -333,7 +333,7 @@ def _chosen(rows: Evidence, pool: Pool, short: Pool, half: np.ndarray) -> Chosen
 
 
 def _worth(more: Chosen, less: Chosen, tried: int) -> bool:
-    """Whether what is chosen beside the rest gains more than the best of so many would."""
+    """True if the choice beside the rest gains more than the best of so many would by chance."""
     rise = more.net - less.net
     if not less.forms:
         return rise > 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is told of a formula that was proven: numbers with intervals, stability, a curve."""
+"""Report of a proven formula: numbers with intervals, stability, a curve."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -60,7 +60,7 @@ def told(rows: Evidence, proof: Proof, tried: int, again: float) -> Formula:
 
 
 def drives_back(rows: Evidence, formula: Formula) -> bool:
-    """Whether a formula of a speed alone turns that speed round, somewhere that these logs reach.
+    """True if a formula of a speed alone turns that speed round, somewhere that these logs reach.
 
     On a drive that repeats itself a few speeds are passed at the same moments alone, and a formula
     of the speed stands for what happens then. Held at that speed the robot would drive backwards.
@@ -87,7 +87,7 @@ def _shapes(forms: Sequence[Form]) -> int:
 
 
 def _curve(rows: Evidence, forms: Sequence[Form], numbers: Sequence[Number]) -> Curve:
-    """What is left in bins of the first variable of the first term, and the formula there."""
+    """Rest in bins of the first variable of the first term, and the formula there."""
     name, carrier = variable_of(forms)
     inside, middles, period = _bins(rows.motion.names[name], name, forms[0])
     by = f"*{carrier}" if carrier else ""

@@ -86,7 +86,7 @@ def library(
 def _judged_together(
     opened: Sequence[Opened], velocities: Sequence[np.ndarray], terms: Sequence[Term]
 ) -> tuple[list[Term], Callable[[int, np.ndarray], list[np.ndarray]]]:
-    """What changes all speeds alike, waves and families, and from the k-th log to its columns.
+    """Terms that change all speeds alike, waves and families; makes each log's columns of them.
 
     Args:
         opened: logs over their floors.
@@ -123,7 +123,7 @@ def norms(columns: np.ndarray) -> np.ndarray:
 
 
 def _terms_of_all_speeds(terms: Sequence[Term]) -> tuple[list[Term], np.ndarray]:
-    """What changes all speeds alike with time, and (T, n) its parts among the body's terms."""
+    """Terms in time that change all speeds alike, and (T, n) their parts among the body's terms."""
     carriers = dict(zip(CHANNELS, SPEEDS, strict=True))
     found: dict[str, dict[int, Term]] = {}
     for k, term in enumerate(terms):
@@ -146,7 +146,7 @@ MOST_WAVES = 20
 
 @dataclass(frozen=True)
 class Waves:
-    """What changes all speeds alike, or one, and comes and goes with time or way.
+    """Changes of all speeds alike, or of one, that come and go with time or way.
 
     Attributes:
         terms: pairs, cosine and sine, of all speeds and of each.
@@ -219,7 +219,7 @@ def _bends(velocities: Sequence[np.ndarray]) -> dict[str, float]:
 
 
 def _middles(opened: Sequence[Opened]) -> dict[str, float]:
-    """Of place, time and voltage over all logs, to four digits, as a formula has them.
+    """Middle of place, time and voltage over all logs, to four digits, as a formula has them.
 
     And moments at which something may have changed for good, `t0` to `t4`.
     """
@@ -249,7 +249,7 @@ def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -
 
 
 def _wheel_terms(opened: Sequence[Opened], model: native.Model) -> list[Term]:
-    """Of each wheel that has a command of its own, and of all at some commands."""
+    """Terms for each wheel that has a command of its own, and for all at some commands."""
     if model.drive not in ("duty", "wheel_speed"):
         return []
     command = np.abs(np.concatenate([own.track.command for own in opened]))

@@ -100,7 +100,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Events:
-    """What the final model misses at some times alone.
+    """Errors that the final model leaves at some times alone.
 
     Attributes:
         moments: single ones, of all logs that have several, in the order of time.
@@ -117,7 +117,7 @@ class Events:
 
     @property
     def sentence(self) -> str:
-        """What happened, for people; empty if nothing did."""
+        """Event in words for people; empty if there was none."""
         told = [change.sentence for change in self.later]
         return " ".join([*told, *([sentence(self.moments)] if self.moments else [])])
 
@@ -170,7 +170,7 @@ def _of_log(own: Opened, errors: np.ndarray, events: Sequence[np.ndarray]) -> li
 
 
 def _at_changes(own: Opened, begins_s: np.ndarray) -> bool:
-    """Whether all events begin at changes of the command, by more than chance.
+    """True if all events begin at changes of the command, by more than chance.
 
     Args:
         own: the log.
@@ -299,7 +299,7 @@ def _ways(data: Trajectory, errors: np.ndarray) -> np.ndarray:
 
 
 def sentence(moments: Sequence[Moment]) -> str:
-    """What happened, for people: what it did in most of them, if that is one thing."""
+    """Events in words for people: their common effect, if most of them have one."""
     most, count = Counter(m.what for m in moments).most_common(1)[0]
     told = "it did something else each time"
     if 2 * count > len(moments):
@@ -333,7 +333,7 @@ def every_s(moments: Sequence[Moment]) -> float:
 
 
 def to_look_at(moments: Sequence[Moment]) -> str:
-    """What to look at before another drive, in a clause; empty where the robot just went less."""
+    """Advice before another drive, in a clause; empty where the robot just went less."""
     asked = [m for m in moments if m.what != "less"]
     if 2 * len(asked) < max(len(moments), 1):
         return ""
@@ -349,6 +349,6 @@ def _listed(moments: Sequence[Moment]) -> str:
 
 
 def did(what: What, way: float) -> str:
-    """What a robot did, in a clause: a share of the way, or so many times that."""
+    """Robot's deed in a clause: a share of the way, or so many times that."""
     size = abs(way)
     return DID[what].format(way=f"{100 * size:.0f} % of" if size <= 1 else f"{size:.1f} times")

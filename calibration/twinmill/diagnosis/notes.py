@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What logs and a fitted base say beside effects: stamps, wheel geometry, irregular motion."""
+"""Notes on logs and a fitted base beside effects: stamps, wheel geometry, irregular motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -92,7 +92,7 @@ def scatters_of(
 
 
 def _no_more_than_left(own: Opened) -> Opened:
-    """The same over a floor that is nowhere above what its model leaves.
+    """Measurement over a floor that is nowhere above the errors that its model leaves.
 
     The smooth response is the same all the time: a loss for a while, or a slew, it cannot follow,
     and has it for noise. What a model explains is none, nor what reaches into a stretch that is
@@ -106,7 +106,7 @@ def _no_more_than_left(own: Opened) -> Opened:
 
 
 def is_random(scatters: Sequence[float], score: float) -> bool:
-    """Whether something random is there that was not when the model's noise was told.
+    """True if randomness is there that was not when the model's noise was told.
 
     Args:
         scatters: of each log, as `scatters_of` has them.

@@ -98,7 +98,7 @@ class Outlier:
         return f"R{self.robot_id:02d}"
 
     def of_run(self, run: Measurement) -> "Outlier":
-        """The same of one run of a robot."""
+        """Outlier from one run of a robot."""
         told = self.sentence.partition(": ")[2]
         return replace(
             self,
@@ -110,13 +110,13 @@ class Outlier:
 
     @property
     def by_gains(self) -> bool:
-        """Whether its gains alone set it apart."""
+        """True if its gains alone set it apart."""
         gains = (*GAINS, *BASE_GAINS)
         return bool(self.parameters) and all(e.name in gains for e in self.parameters)
 
     @property
     def by_own_numbers(self) -> bool:
-        """Whether all its speed, its turning or its motor lag sets it apart, as runs may differ."""
+        """True if all its speed, its turning or its motor lag sets it apart, as runs may differ."""
         return self.effect == LAG_EFFECT or {e.name for e in self.parameters} <= {*GAINS}
 
     def to_json(self) -> dict:
@@ -246,7 +246,7 @@ def _as_robot(own: Opened, number: int) -> Opened:
 
 
 def _is_of_it_alone(own: Alone, off: Outlier, usual: Sequence[Alone]) -> bool:
-    """Whether another run surely has not what sets one apart; what it does not show it may have."""
+    """True if another run surely lacks the oddity; a run that cannot show it may have it."""
     trial = "gains" if off.by_own_numbers else "axes"
     name = trial if off.by_gains else off.effect
     mine, spread = _apart(own.trials[name])
@@ -256,7 +256,7 @@ def _is_of_it_alone(own: Alone, off: Outlier, usual: Sequence[Alone]) -> bool:
 
 
 def _simplest(own: Alone) -> Alone:
-    """The same with gains and lag tried alone, if nothing else does better than one of them."""
+    """Prefers gains and lag tried alone, if nothing else does better than one of them."""
     plain = {name: own.trials[name] for name in ("gains", LAG_EFFECT)}
     plain_cost, cost = (
         min(t.fit.held_cost for t in trials.values()) for trials in (plain, own.trials)
@@ -267,7 +267,7 @@ def _simplest(own: Alone) -> Alone:
 def anew(
     off: Outlier, opened: Sequence[Opened], common: native.Model, lag_std_s: float = 0.0
 ) -> Outlier:
-    """The same robot, its own numbers fitted beside another model of all than it was judged with.
+    """Outlier with its numbers fitted beside another model of all than it was judged with.
 
     What the others have may have moved since; numbers beside what was before would not fit to it.
 
@@ -302,7 +302,7 @@ def anew(
 
 
 def _begun_at(off: Outlier, common: native.Model, effect: str) -> list[Parameter]:
-    """What of an effect is free in another model, begun where it was found."""
+    """Free parameters of an effect in another model, begun where it was found."""
     found = {key_of(e.name): e.value for e in off.parameters}
     free = effect_parameters(common, newest_instance(common, effect))
     return [p.at(found.get(key_of(p.name), p.value)) for p in free]
@@ -360,7 +360,7 @@ def _without_gains(data: Trajectory) -> Trajectory:
 
 
 def _suspects(before: dict[int, Trial], progress: Callable[[str], None]) -> list[str]:
-    """What some robot would take beyond doubt, by the linear screening: few, the surest first.
+    """Effects that some robot would take beyond doubt, by the linear screening: the surest first.
 
     A weak wheel is the most frequent fault, and is always tried.
     """
@@ -403,7 +403,7 @@ def _values(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _apart(trial: Trial) -> tuple[np.ndarray, np.ndarray]:
-    """The same for comparing robots: of wheels how they differ, since speed is the robots' own."""
+    """Changes that compare robots: of wheels how they differ, since speed is the robots' own."""
     values, spread = _values(trial)
     if trial.names != (WHEELS,):
         return values, spread
@@ -463,14 +463,14 @@ def _why(before: float, others: float, effect: str, after: float) -> str:
 
 
 def _own_numbers(trial: Trial) -> list[ParameterEstimate]:
-    """What an effect was told beside: gains and lag; beside wheels no gains, they are in these."""
+    """Gains and lag that stood beside an effect; beside wheels no gains, they are in these."""
     own = trial.fit.own_estimates(0)
     gone = GAINS if trial.names == (WHEELS,) else ()
     return [own[name] for name in OWN if name in own and name not in gone]
 
 
 def _models(trial: Trial, parameters: Sequence[ParameterEstimate]) -> list[native.Model]:
-    """Of each log, with these values; the gains that wheels were told beside are in theirs."""
+    """Model of each log at these values; gains that wheels were told beside are in theirs."""
     if trial.names != (WHEELS,):
         return trial.fit.models
     models = [m.copy() for m in trial.fit.models]
@@ -496,7 +496,7 @@ def _p_value(own: Alone, name: str, alone: Sequence[Alone]) -> float:
 
 
 def _estimates(trial: Trial) -> list[ParameterEstimate]:
-    """Of what a trial added."""
+    """Estimates of the parameters that a trial added."""
     found = trial.fit.shared_estimates()
     if trial.names != (WHEELS,):
         return found
@@ -514,7 +514,7 @@ def _usual(alone: Sequence[Alone]) -> tuple[float, float]:
 
 
 def _stands_out(score: float, alone: Sequence[Alone]) -> bool:
-    """Whether a robot of such a score is missed by far more than the others are."""
+    """True if a robot of such a score is missed by far more than the others are."""
     middle, scale = _usual(alone)
     return np.log(max(score, 1.0)) - middle > max(SETTINGS.odd * max(scale, 0.06), np.log(1.5))
 
@@ -566,7 +566,7 @@ def _plain(robot_id: int, parameters: Sequence[ParameterEstimate], common: nativ
 
 
 def in_words(parameters: Sequence[ParameterEstimate]) -> str:
-    """What the parameters of an effect do to a robot; those that say something."""
+    """Action of an effect's parameters on a robot, in words; only those that say something."""
     of_wheels = {key_of(e.name): e.value for e in parameters if _of_wheel(e)}
     if words := _side_words(of_wheels) or _odd_wheel_words(of_wheels):
         return words

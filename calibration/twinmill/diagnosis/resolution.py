@@ -14,7 +14,7 @@ from twinmill.model.parameters import BASE_GAINS, GAINS, drives_sideways
 
 @dataclass(frozen=True)
 class Resolution:
-    """Of one robot in all its logs.
+    """Smallest visible differences of one robot in all its logs.
 
     Attributes:
         robot_id: whose.
@@ -36,7 +36,7 @@ class Resolution:
 
 
 def resolutions(opened: Sequence[Opened]) -> list[Resolution]:
-    """Of each robot that logs tell of, by its number.
+    """Resolution of each robot that logs tell of, by its number.
 
     Args:
         opened: logs and tables, with the model that is asked about.
@@ -60,7 +60,7 @@ def _of_robot(logs: Sequence[Opened]) -> Resolution:
 def _shown(
     logs: Sequence[Opened], models: Sequence[native.Model], names: Sequence[str]
 ) -> tuple[float | None, ...]:
-    """Of each gain the smallest difference that would have been beyond doubt, as a share of it."""
+    """Smallest difference of each gain that would be beyond doubt, as a share of it."""
     free = wide_gains(models[0], names)
     data = [replace(o.data, own=_clock(o)) for o in logs]
     own = [m.copy() for m in models]
@@ -73,5 +73,5 @@ def _shown(
 
 
 def _clock(own: Opened) -> tuple:
-    """What its log leaves free beside the gains, begun where it is."""
+    """Clock that its log leaves free beside the gains, begun where it is."""
     return tuple(p.at(own.model.get(p.name)) for p in own.data.own if p.name not in GAINS)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left over once the found effects are in the model: how much, how firm, depending on what.
+"""Rest once the found effects are in the model: how much, how firm, depending on which quantity.
 
 How much: the squared error over the floor, above 1. How firm: whether the smooth response of the
 noise floor predicts left-out parts better than the model does, block by block. On what: ridge
@@ -82,7 +82,7 @@ Fresh = Callable[[Tested, np.ndarray, np.ndarray], float]
 
 @dataclass(frozen=True)
 class Rest:
-    """What is left over.
+    """Errors that remain, and their dependences.
 
     Attributes:
         share: of the squared error above the floor that the model as given had.
@@ -391,7 +391,7 @@ def rest_of(
 def _firm(
     logs: list[tuple[int, Opened]], fit: ScoreFit, errors: Callable[[NoiseFloor], np.ndarray]
 ) -> bool:
-    """Whether the response, of which a floor tells errors, predicts left-out blocks better.
+    """True if the response, of which a floor tells errors, predicts left-out blocks better.
 
     By t of the relative fall over blocks; or, where only a few drives show what is missing, by
     blocks of a large fall, of which hardly any are as much worse.
@@ -415,7 +415,7 @@ def _firm(
 
 
 def _in_order(proven: Formula | None, found: Rest, others: Sequence[str]) -> list[str]:
-    """What the rest depends on; a formula's own comes first if it takes no less than the groups."""
+    """Dependences of the rest; a formula's own comes first if it takes no less than the groups."""
     own = proven.depends_on if proven else []
     first = own if not found.depends_on or (proven and proven.takes >= found.family_takes) else []
     return list(dict.fromkeys([*first, *found.depends_on, *others, *own]))
@@ -478,7 +478,7 @@ def _standing_out(groups: Sequence[Dependence]) -> list[Dependence]:
 def _tested(
     terms: list[Term], products: "Products", fresh: Fresh = lambda *_: 1.0
 ) -> list[Dependence]:
-    """What each group brings, by a family or by one formula, and whether that is beyond chance.
+    """Gain of each group by a family or by one formula, with its test against chance.
 
     It is if it is more than the largest of all that is tested is under random signs of blocks, each
     over its own spread there, and if it is evidence enough for one of so many. What wanders by
@@ -659,14 +659,14 @@ def _best_term(terms: list[Term], products: "Products", group: str) -> tuple[Ter
 
 @dataclass(frozen=True)
 class Grams:
-    """Of N sets of k columns with each other: (N, B, k, k) by block, (N, FOLDS, k, k) by fold."""
+    """Products of N sets of k columns: (N, B, k, k) by block, (N, FOLDS, k, k) by fold."""
 
     blocks: np.ndarray
     folds: np.ndarray
 
     @classmethod
     def by_fold(cls, blocks: np.ndarray) -> "Grams":
-        """Of those by block: every so-many-th block is of one fold."""
+        """Grams by fold from those by block: every so-many-th block is of one fold."""
         return cls(blocks, np.stack([blocks[:, k::FOLDS].sum(1) for k in range(FOLDS)], axis=1))
 
 
@@ -719,7 +719,7 @@ class Products:
         self.moments[:, ~self.seen] = self.energy[:, ~self.seen] = 0.0
 
     def grams(self, places: np.ndarray) -> Grams:
-        """Of sets of columns, (N, k) by their numbers, with each other."""
+        """Products of sets of columns, (N, k) by their numbers, with each other."""
         if places.shape[1] == 1:
             return Grams.by_fold(np.ascontiguousarray(self.energy.T[places[:, 0]])[..., None, None])
         pieces, own, seen = self.columns.pieces, self.own[places], self.seen[places]
@@ -757,7 +757,7 @@ class Products:
         return found
 
     def only(self, own: np.ndarray) -> "Products":
-        """The same of some (T,) columns."""
+        """Products of some (T,) columns alone."""
         less = copy(self)
         less.own, less.seen = self.own[own], self.seen[own]
         less.moments, less.energy = self.moments[:, own], self.energy[:, own]
@@ -769,7 +769,7 @@ class Products:
         return self.moments.sum(0) ** 2 / (self.energy.sum(0) + 1.0)
 
     def holds(self, many: np.ndarray, few: np.ndarray) -> bool:
-        """Whether many columns make up a few of them (nearly) whole."""
+        """True if many columns make up a few of them (nearly) whole."""
         either = many | few
         gram, many, few = self._folds(either).sum(0), many[either], few[either]
         inside = gram[np.ix_(many, many)] + 1e-9 * self.energy.sum() * np.eye(many.sum())

@@ -96,7 +96,7 @@ class Diagnosis:
         return [line for line in (*own, rest) if line]
 
     def with_robots_off(self, off: Sequence[Outlier]) -> "Diagnosis":
-        """The same with the robots that differ told anew, in their order."""
+        """Diagnosis with the robots that differed told anew, in their order."""
         said = self.sentence
         for before, now in zip(self.robots_off, off, strict=True):
             said = said.replace(before.sentence, now.sentence, 1)
@@ -127,7 +127,7 @@ class Diagnosis:
         return [name for name in self.found if name not in self.passing]
 
     def finding(self, effect: str) -> Finding | None:
-        """What was found of an effect; None if it was not."""
+        """Finding about an effect; None if it was not found."""
         own = [f for f in (*self.findings, *self.camera) if f.effect == effect]
         return own[0] if own else None
 
@@ -138,7 +138,7 @@ class Diagnosis:
 
     @property
     def is_left(self) -> bool:
-        """Whether the rest is worth telling: more than nothing is left, or doubtful names are."""
+        """True if the rest is worth telling: more than nothing is left, or doubtful names are."""
         if self.verdict in PASSES or (self.apart and not self.rest.depends_on):
             return False
         return self.rest.share >= SETTINGS.nothing_left or self.verdict == "outside_catalogue"

@@ -88,7 +88,7 @@ class Without:
         return next(done, None)
 
     def _done_by(self, name: str, last: Trial) -> Products:
-        """What an effect does, before all formulas, with what is left without it."""
+        """Columns of an effect before all formulas, with the rest without it."""
         assert self.formulas is not None
         less = self.less[name].fit
         return self.formulas.products(less, self.formulas.changed(less, last.fit))
@@ -101,7 +101,7 @@ class Without:
 
 
 def less_each(done: Search, opened: Sequence[Opened]) -> Without:
-    """What was found, each with the final state refitted without it; what is outdone is dropped.
+    """Final state refitted without each finding in turn; outdone findings are dropped.
 
     Args:
         done: what is outdone moves from its findings to what was dropped.
@@ -154,7 +154,7 @@ def rival_of(formulas: Formulas, name: str, less: Trial, whole: Trial) -> Rival 
 def in_another_form(
     own: Products, larger: Products, families: Sequence[np.ndarray], *, local: bool
 ) -> bool:
-    """Whether formulas that make up a larger effect take what a smaller one takes beside it.
+    """True if formulas of a larger effect take the share that a smaller one takes beside it.
 
     Args:
         own: what the smaller one does, the first column, with what is left without it.

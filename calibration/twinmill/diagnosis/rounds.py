@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a search did, round by round."""
+"""Record of a search, round by round."""
 
 from dataclasses import dataclass, field
 

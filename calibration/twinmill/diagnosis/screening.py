@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What each effect of the catalogue would take away if all were linear."""
+"""Linear estimate of the error that each effect of the catalogue would take away."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -39,7 +39,7 @@ STALE = 0.3  # of the prior's width: a usual error of the base's numbers
 
 @dataclass(frozen=True)
 class Screened:
-    """What the linear screening says of one candidate.
+    """Result of the linear screening for one candidate.
 
     Attributes:
         columns: (R, k) of all data sets, weighted, what is free projected out.

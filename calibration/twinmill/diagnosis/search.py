@@ -87,7 +87,7 @@ def _forward(done: Search, starts: dict[str, Starts], progress: Callable[[str], 
 
 
 def _told(done: Search) -> str:
-    """What was found so far, for who waits."""
+    """Findings so far, in words for a person who waits."""
     return f"found {', '.join(done.found)}; " if done.found else ""
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a diagnosis tells that Ctrl-C stopped: what it has by then, within a moment.
+"""Result of a diagnosis that Ctrl-C stopped: its findings by then, within a moment.
 
 Who stops it does not want to wait: nothing is fitted any more, and nothing is said to be sure that
 was not weighed against what else could be.
@@ -25,7 +25,7 @@ NOTHING_TRIED = "Stopped before anything was tried; nothing can be said."
 
 @dataclass
 class Course:
-    """What a diagnosis has so far, written down as it goes.
+    """Findings of a diagnosis so far, written down as it goes.
 
     Attributes:
         opened, before: measurements with the model as given, and how it compares.
@@ -48,7 +48,7 @@ class Course:
         return next((s for s in reversed(self.searches) if s.rounds), None)
 
     def told(self) -> Diagnosis | None:
-        """What can be told by now; None if nothing was tried."""
+        """Diagnosis from the findings by now; None if nothing was tried."""
         if self.motion:
             return stopped(self.motion, "Stopped before the cameras were looked at.")
         return self._found_so_far(self.search) if self.search else None

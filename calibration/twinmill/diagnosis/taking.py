@@ -78,12 +78,12 @@ class Taken:
 
     @property
     def kept(self) -> bool:
-        """Whether the model has it."""
+        """True if the model has it."""
         return not self.why_not
 
     @property
     def why_not(self) -> str:
-        """What keeps it out of the model; empty if nothing does."""
+        """Reason that keeps it out of the model; empty if none does."""
         if self.formula.passing and self.runs < SEVERAL:
             return "it names the time of one run, and nothing shows that another run shares it"
         return self.gains_nothing
@@ -104,7 +104,7 @@ class Taken:
 
     @property
     def note(self) -> str:
-        """What of a formula in the model no other log shares, or empty."""
+        """Remark on a formula's part in the model that no other log shares, or empty."""
         if not (self.kept and any(form.recurs for form in self.formula.forms)):
             return ""
         return (
@@ -203,7 +203,7 @@ def doubtful_moments(findings: Sequence[Finding], formula: Formula) -> list[str]
 
 
 def needless(fit: ScoreFit, formula: Formula, local: Sequence[str], runs: int) -> list[str]:
-    """Of sure findings at a place or for a while those that bring nothing beside a formula."""
+    """Sure findings at a place or for a while that bring nothing beside a formula."""
     if not local:
         return []
     found = taken(fit, formula, beside=local, runs=runs)
@@ -233,7 +233,7 @@ def _added(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
 
 
 def _added_to_less(fit: ScoreFit, formula: Formula, runs: int) -> Taken:
-    """The same, judged against a fit that has neither: what went says nothing of other runs."""
+    """Formula judged against a fit without both: a dropped finding tells of no other run."""
     models = [_without(m, formula.instead_of) for m in fit.models]
     free = _still_free(fit, models[0])
     bare = ScoreFit(fit.datasets, models, free, fit.by_channel).fit()
@@ -330,7 +330,7 @@ def _as_fitted(
 
 
 def _told_by(fit: ScoreFit, formula: Formula) -> tuple[tuple[ParameterEstimate, ...], Covariance]:
-    """Of what a model with a formula has, as wide as the formula's numbers are told."""
+    """Estimates of a model with a formula, as wide as the formula's numbers are told."""
     own = newest_instance(fit.models[0], EFFECT)
     stds = {f"{own}.{n.name}": (n.high - n.low) / 2 / NORMAL_95 for n in formula.numbers if n.name}
     estimates = [
@@ -375,7 +375,7 @@ def _phases_in(formula: Formula) -> list[float]:
 
 
 def _still_free(fit: ScoreFit, less: native.Model) -> list[Parameter]:
-    """What is free in a fit and in a model that lacks some of its effects."""
+    """Parameters free both in a fit and in a model that lacks some of its effects."""
     lost = {*effect_names(fit.models[0])} - {*effect_names(less)}
     return [p for p in fit.shared_values if instance_of(p.name) not in lost]
 

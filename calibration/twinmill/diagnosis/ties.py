@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the data cannot tell from what was accepted."""
+"""Effects that the data cannot tell from the accepted ones."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -46,7 +46,7 @@ def ties_of(this: Round, settings: Settings) -> list[Trial]:
 
 
 def _is_as_good(accepted: Trial, trial: Trial, settings: Settings) -> bool:
-    """Whether of a wheel's and a floor's effect the poorer leaves nothing either, and does most.
+    """True if the poorer of a wheel's and a floor's effect leaves nothing either, and does most.
 
     How the push of wheels becomes motion over the floor no plant has quite right, so that on the
     robot it may be the better one.
@@ -61,7 +61,7 @@ def _is_as_good(accepted: Trial, trial: Trial, settings: Settings) -> bool:
 
 
 def _is_within_the_table(before: Trial, one: Trial, other: Trial, settings: Settings) -> bool:
-    """Whether speeds that other logs told may be wrong by what two bends of them differ in.
+    """True if the difference of two bends lies within the error of speeds that other logs told.
 
     Then the better one is better by an error of the table alone.
     """
@@ -110,7 +110,7 @@ def way_apart(one: Trial, other: Trial) -> float:
 
 
 def bends_speed(effect: str) -> bool:
-    """Whether it bends the steady speed over the command."""
+    """True if it bends the steady speed over the command."""
     return effect in of_levels() and effect in needing("steady_speed")
 
 

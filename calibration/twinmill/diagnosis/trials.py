@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is fitted: a state of a search, and trials of it with something added."""
+"""State of a search, and trials of it with something added, ready to be fitted."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
@@ -67,11 +67,11 @@ class State:
 
     @property
     def of_cameras(self) -> bool:
-        """Whether the data are detections."""
+        """True if the data are detections."""
         return isinstance(self.datasets[0], Detections)
 
     def fit_of(self, free: Sequence[Parameter]) -> ScoreFit | DetectionFit:
-        """What fits these parameters to the data, by the kind of data."""
+        """Fit of these parameters to the data, by the kind of data."""
         if self.of_cameras:
             return DetectionFit(self.datasets, self.models, free)
         return ScoreFit(self.datasets, self.models, free, self.by_channel)
@@ -200,7 +200,7 @@ def nearer(state: State) -> State:
 
 
 def begun_nearer(given: State, start: State) -> bool:
-    """Whether gains of the base were far off, so that a search started elsewhere than given."""
+    """True if gains of the base were far off, so that a search started elsewhere than given."""
     names = [p.name for p in given.free]
     pairs = zip(given.models, start.models, strict=True)
     return any(a.get(name) != b.get(name) for a, b in pairs for name in names)

@@ -256,7 +256,7 @@ class VerdictInputs:
 
     @property
     def _own(self) -> str:
-        """The same without what stands before it."""
+        """Verdict without the words that stand before it."""
         verdict = self._within
         if verdict == "model_adequate":
             maybe = " or ".join(f.effect for f in self._all_doubtful)
@@ -363,7 +363,7 @@ class VerdictInputs:
 
     @property
     def _as_before(self) -> str:
-        """What the model left in the logs that it was fitted to, it leaves here, too."""
+        """Sentence for errors as small as those in the logs that the model was fitted to."""
         if self.last <= GOOD:
             return ""
         if self.rest.by_itself:
@@ -386,7 +386,7 @@ class VerdictInputs:
 
     @property
     def _left(self) -> str:
-        """What is left, where it is more than the noise."""
+        """Sentence on the rest, where it is more than the noise."""
         events = f" {self.rest.events.sentence}".rstrip()
         if self.last <= GOOD or self.rest.share < SETTINGS.nothing_left:
             return events
@@ -409,7 +409,7 @@ class VerdictInputs:
 
     @property
     def _continuous(self) -> list[str]:
-        """What the rest depends on all the time; nothing where several may be it, or none."""
+        """Lasting dependences of the rest; none where several may be it, or none is."""
         names = [name for name in self.rest.depends_on if name != MOMENTS]
         none = len(names) > 1 or self.rest.wanders
         return [] if self.rest.likely and none else names
@@ -468,7 +468,7 @@ class VerdictInputs:
 
 
 def drifted(score: float, last: float, known: float) -> bool:
-    """Whether gains that were let drift took the error.
+    """True if gains that were let drift took the error.
 
     Args:
         score: of the model as given.
@@ -479,7 +479,7 @@ def drifted(score: float, last: float, known: float) -> bool:
 
 
 def lacking(findings: Sequence[Finding]) -> str:
-    """What a model lacks, in a sentence."""
+    """Lack of a model, in a sentence."""
     return f"{LACKING}{_in_turn([_named(f) for f in findings])}."
 
 

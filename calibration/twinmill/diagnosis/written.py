@@ -62,7 +62,7 @@ class Candidate:
     beyond: Taken | None = None
 
     def outdoes(self, other: "Candidate") -> bool:
-        """Whether it predicts left-out parts better: all together, and on the mean of blocks.
+        """True if it predicts left-out parts better: all together, and on the mean of blocks.
 
         A few blocks that follow no command pull the sum wherever they like.
         """
@@ -80,7 +80,7 @@ def best_of(candidates: Sequence[Candidate]) -> Candidate:
 
 @dataclass(frozen=True)
 class Candidates:
-    """What may be written after a diagnosis.
+    """Models that may be written after a diagnosis.
 
     Attributes:
         diagnosis: with what was found.

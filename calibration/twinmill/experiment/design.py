@@ -39,7 +39,7 @@ NO_LOG = (
 
 @dataclass(frozen=True)
 class Limits:
-    """What the user has.
+    """Space, time and commands that the user has for a run.
 
     Attributes:
         duration_s: longest run.
@@ -54,7 +54,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Chance:
-    """What the run does for one effect.
+    """Probability that the run tells one effect, before it and after it.
 
     Attributes:
         effect, rival: and the effect that could imitate it best after the run; None: the base.
@@ -268,7 +268,7 @@ class Floor:
         self.room_m = np.array(limits.floor_m) / 2 - radius_m - WANDER_M
 
     def holds(self, moves: list[Move]) -> bool:
-        """Whether these moves, one after the other, stay on it."""
+        """True if these moves, one after the other, stay on the floor."""
         played = Played.of([moves], self.modelled)
         return all(
             np.all(np.abs(played.path(model, CENTRE)[:, :2]) <= self.room_m)
@@ -333,7 +333,7 @@ def _tempered(fisher: FisherInformation, grams: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Outlook:
-    """What is predicted of the effects in question.
+    """Predicted evidence for the effects in question.
 
     Attributes:
         asked, fisher: the question, and what runs tell of all effects.
@@ -347,7 +347,7 @@ class _Outlook:
     usual: float
 
     def chances(self, told: np.ndarray, after: np.ndarray, planned: ModelledLog) -> list[Chance]:
-        """Of each effect before and after the planned run, surest first."""
+        """Chance of each effect before and after the planned run, surest first."""
         before_chi2, before = self._power(told, [])
         chi2, then = self._power(after, [planned])
         chances = []

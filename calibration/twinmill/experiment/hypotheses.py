@@ -35,7 +35,7 @@ class State:
 
 @dataclass(frozen=True)
 class Hypotheses:
-    """What is in question.
+    """Effects in question, with the numbers that a run has to tell apart.
 
     Attributes:
         alike: effects that the diagnosis could not tell apart.
@@ -56,7 +56,7 @@ class Hypotheses:
 
 
 def hypotheses_of(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
-    """What a diagnosis leaves open; `base`: of the model, also what these logs do not tell."""
+    """Open questions of a diagnosis; `base`: of the model, also ones these logs cannot tell."""
     ranking = diagnosis.ranking
     top = next((r.group for r in ranking if r.group is not None), None)
     alike = [r.effect for r in ranking if r.group == top and top is not None]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What runs tell of effects: products of whitened signatures, which add up over runs.
+"""Information of runs on effects: products of whitened signatures, which add up over runs.
 
 How well effect i can be told from effect j is the energy of i's signature that j, the base and the
 clock together cannot imitate: a Schur complement (Atkinson and Fedorov 1975, Biometrika 62(1)).

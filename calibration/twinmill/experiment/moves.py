@@ -45,13 +45,13 @@ class Axis:
 
 
 def duty_axes(max_duty: float, wheels: str = "mecanum") -> list[Axis]:
-    """Of a robot told duties of at most `max_duty` (0..1); plain wheels do not go sideways."""
+    """Axes of a robot told duties of at most `max_duty` (0..1); plain wheels do not go sideways."""
     names = [name for name in AXES if name != "strafe" or wheels != "differential"]
     return [Axis(name, max_duty * AXES[name]) for name in names]
 
 
 def twist_axes(highest: np.ndarray) -> list[Axis]:
-    """Of a robot told velocities, (3,) at most so large; without those of none."""
+    """Axes of a robot told velocities, (3,) at most so large; without those of none."""
     commands = zip(UNITS.items(), np.diag([*highest, 0.0]), strict=False)
     return [Axis(name, full, unit) for (name, unit), full in commands if full.any()]
 
@@ -72,7 +72,7 @@ class Move:
 
     @property
     def duration_s(self) -> float:
-        """Of the whole move with its rest."""
+        """Seconds of the whole move with its rest."""
         return float(self.hold_s.sum())
 
 
@@ -103,7 +103,7 @@ def family(axes: Sequence[Axis]) -> list[Move]:
 
 
 def _move(name: str, steps: list[tuple[float, np.ndarray]], axes: Sequence[Axis]) -> Move:
-    """Of shares of full drive along each axis, to whole percent or thousandths."""
+    """Move from shares of full drive along each axis, to whole percent or thousandths."""
     hold_s, shares = zip(*steps, (REST_S, np.zeros(len(axes))), strict=True)
     shares = np.array(shares) / np.maximum(1, np.abs(shares).sum(axis=1, keepdims=True))
     command = shares @ np.array([a.full for a in axes])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot would do and what motion capture would see, had it already driven some moves."""
+"""Imagined run: the robot drives some moves, and motion capture sees it."""
 
 from dataclasses import dataclass, replace
 

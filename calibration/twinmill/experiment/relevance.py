@@ -17,7 +17,7 @@ ENOUGH = 1 / WORTH**2 - 1  # of the squared score that is left: what an effect m
 
 @dataclass(frozen=True)
 class Relevance:
-    """What effects add to the errors.
+    """Errors that effects add to a model's predictions.
 
     Attributes:
         left2: squared score that is left with the effect in the model.
@@ -48,7 +48,7 @@ def relevance(
     grams: np.ndarray,
     richer: dict[int, native.Model],
 ) -> Relevance:
-    """Of some effects, over logs and planned runs.
+    """Relevance of some effects, over logs and planned runs.
 
     Args:
         logs: with the model that lacks the effects.

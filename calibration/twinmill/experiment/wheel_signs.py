@@ -30,7 +30,7 @@ AS_GOOD = 0.1  # cosine that another column must gain: front and rear may do the
 
 @dataclass(frozen=True)
 class Column:
-    """What one column of commands, or those of one side, did as it was driven forward.
+    """Reaction of the robot to one column of commands, or to those of one side, driven forward.
 
     Attributes:
         name: of the column; of a side as `import` takes it.
@@ -58,7 +58,7 @@ class Column:
 
     @property
     def verdict(self) -> str:
-        """What it does, in words."""
+        """Effect of the column in words."""
         if not self.driven:
             return "was not driven alone"
         if self.stood:
@@ -83,7 +83,7 @@ class Column:
 
 @dataclass(frozen=True)
 class WheelSigns:
-    """Of one robot: its columns, and mistakes of signs, cables and axes that explain them all."""
+    """Columns of one robot, and mistakes of signs, cables and axes that explain them all."""
 
     robot_id: int
     columns: list[Column]
@@ -150,7 +150,7 @@ def csv_text(names: list[str], rows: np.ndarray) -> str:
 
 
 def read_signs(robot: RobotLog, model: native.Model, label: str) -> WheelSigns:
-    """What each column did, by the poses.
+    """Sign of each column, told by the poses.
 
     Args:
         robot: a log in which columns of the commands were driven one at a time.

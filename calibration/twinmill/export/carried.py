@@ -40,7 +40,7 @@ class Left:
     partly: bool = False
 
     def sentence(self) -> str:
-        """What the file carries of the effect, or why not, with its share of the error."""
+        """Sentence on how the file carries the effect, or why not, with its share of the error."""
         if self.share is None:
             return f"{self.name}: {self.why}"
         others = f", with {' and '.join(self.together_with)}" if self.together_with else ""
@@ -83,21 +83,21 @@ class RobotModel:
 
     @property
     def hull_mass_kg(self) -> float:
-        """Of the robot without its wheels."""
+        """Mass of the robot without its wheels."""
         return self.get("robot.mass_kg") - len(self.model.wheels()) * self.wheel_mass_kg
 
     def hull_inertia_kgm2(self) -> tuple[float, float, float]:
-        """Of a full cylinder about its middle, x, y, z."""
+        """Moments of a full cylinder about its middle, x, y, z."""
         return _cylinder(self.hull_mass_kg, self.get("robot.body_radius_m"), HULL_HEIGHT_M)
 
     def wheel_inertia_kgm2(self) -> tuple[float, float, float]:
-        """Of one wheel, a full cylinder with its axle along z."""
+        """Moments of one wheel, a full cylinder with its axle along z."""
         radius_m = self.get("robot.wheel_radius_m")
         return _cylinder(self.wheel_mass_kg, radius_m, WHEEL_WIDTH * radius_m)
 
     @property
     def touch_radius_m(self) -> float:
-        """Of the hull where it touches others, by the effects `collision`; never 0."""
+        """Radius at which the hull touches others, by the effects `collision`; never 0."""
         more_m = sum(v["radius_m"] for v in self.values_of("collision"))
         return max(0.001, self.get("robot.body_radius_m") + more_m)
 
@@ -147,7 +147,7 @@ class RobotModel:
         return found
 
     def values_of(self, effect: str) -> list[dict[str, float]]:
-        """Of every effect of that name."""
+        """Parameters of every effect of that name."""
         return [values for _, card, values in self.effects() if card["name"] == effect]
 
     def base_left(self, why: str, duties: str) -> list[Left]:
@@ -219,7 +219,7 @@ class RobotModel:
         return left
 
     def share_of(self, instance: str) -> tuple[float | None, tuple[str, ...]]:
-        """Of the squared error, and the effects that it counts too.
+        """Share of the squared error that an effect takes, and the effects that it counts too.
 
         As a diagnosis told, or as a model file keeps it; else from the scores before and after, of
         effects that were added at the same time and of the base's refit together.
@@ -251,7 +251,7 @@ def open_robot(file: ModelFile, robot_id: int | None, diagnosis: Path | None) ->
 
 
 def _shares(path: Path) -> dict[str, float]:
-    """Of the squared error by effect, from the JSON of `diagnose` or `explain`."""
+    """Shares of the squared error by effect, from the JSON of `diagnose` or `explain`."""
     try:
         data: Any = json.loads(path.read_text())
         found = data["findings"]

@@ -15,7 +15,7 @@ from twinmill.export.carried import RobotModel
 
 @dataclass(frozen=True)
 class Drive:
-    """What a controller is told.
+    """Drive system as a controller is told of it.
 
     Attributes:
         radius_m: of the wheels, gain of speed put in.

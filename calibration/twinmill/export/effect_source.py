@@ -156,7 +156,7 @@ def write_effect(name: str, model_file: ModelFile, instance: str | None, root: P
 
 
 def _chosen(model_file: ModelFile, instance: str | None) -> str:
-    """Of a model's equations the one that is asked for, or the only one."""
+    """Equation of a model that is asked for by name, or the only one."""
     has = [n for n in effect_names(model_file.model) if catalogue_name(n) == "equation"]
     if not has:
         raise ModelError(f"{model_file.path.name}: has no equation; `add equation` takes one in.")
@@ -173,7 +173,7 @@ def _chosen(model_file: ModelFile, instance: str | None) -> str:
 
 
 def _texts(model: native.Model, instance: str) -> dict[str, str]:
-    """Of an equation that can be an effect."""
+    """Formulas of an equation that can be an effect."""
     texts = model.texts[effect_names(model).index(instance)]
     if texts["adds_to"] not in PLACES:
         raise ValueError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Foxglove's 3D panel shows: where robots are, where they came from, what they look over."""
+"""Scene for Foxglove's 3D panel: where robots are, where they came from, and their view."""
 
 from collections import deque
 from collections.abc import Iterator

@@ -19,7 +19,7 @@ from twinmill.version import __version__
 
 @dataclass(frozen=True)
 class ExportedLog:
-    """What was written of a log.
+    """Files written for a log.
 
     Attributes:
         out: the file or the folder.

@@ -389,7 +389,7 @@ def _servo(
 
 
 def _signal(robot: RobotModel, lag_s: float, name: str, row: np.ndarray) -> dict[str, str]:
-    """Of an actuator along `row` (forward, left, turn), with the robot's lag and delay."""
+    """Attributes of an actuator along `row` (forward, left, turn), with lag and delay."""
     delay_s = _delay_s(robot)
     options = {"name": name, "site": "drive", "gear": _n(row[0], row[1], 0, 0, 0, row[2])}
     if lag_s > 1e-6 or robot.values_of("coasting"):
@@ -415,7 +415,7 @@ def _lags_s(robot: RobotModel) -> np.ndarray:
 
 
 def _sensors(robot: RobotModel) -> ET.Element:
-    """What motion capture sees, with its noise as MuJoCo keeps it."""
+    """Sensors for motion capture, with its noise as MuJoCo keeps it."""
     sensor = ET.Element("sensor")
     noise_m, noise_rad = (robot.get(f"noise.sensor_{u}") for u in ("m", "rad"))
     marker = {"objtype": "site", "objname": "marker"}

@@ -33,7 +33,7 @@ WRITERS: dict[ModelFormat, Callable[[RobotModel], tuple[str, list[Left]]]] = {
 
 @dataclass(frozen=True)
 class ExportedModel:
-    """What was written of a model.
+    """Files written for a model.
 
     Attributes:
         files: all of them.

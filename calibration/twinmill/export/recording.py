@@ -38,7 +38,7 @@ class Channel:
 
     @property
     def prefix(self) -> str:
-        """What stands before R<nn>, as TWIN_; empty for channels of no robot."""
+        """Text before R<nn>, as TWIN_; empty for channels of no robot."""
         match = OF_ROBOT.fullmatch(self.name)
         return match["prefix"] if match else ""
 

@@ -53,7 +53,7 @@ def ros2_control(robot: RobotModel) -> tuple[str, list[Left]]:
 
 
 def _base_left(robot: RobotModel) -> list[Left]:
-    """What such controllers do not know of the base."""
+    """Abilities of the base that such controllers do not know."""
     why = "ros2_control has no place for it"
     left = robot.base_left(why, "ros2_control has its top speeds alone")
     known = limits_of(robot).body
@@ -71,7 +71,7 @@ def _base_left(robot: RobotModel) -> list[Left]:
 
 
 def _parts(robot: RobotModel) -> dict[str, str]:
-    """What the file has of effects that it does not carry whole."""
+    """Notes in the file on effects that it does not carry whole."""
     parts = {"wheel_limit": "the body's top speeds alone; the URDF's joints have the wheels' own"}
     if robot.model.wheel_kind == "mecanum":
         parts["speed_limit"] = "its axes are limited each alone, so aslant it is faster"

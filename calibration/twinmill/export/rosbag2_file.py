@@ -68,7 +68,7 @@ def _name(channel: Channel) -> str:
 
 
 class Speaker:
-    """What each of our messages becomes, by a method of our type's name."""
+    """Converter of our messages, with a method for each of our types' names."""
 
     def __init__(self, types: dict[str, type]) -> None:
         self._types = types
@@ -122,7 +122,7 @@ class Speaker:
             yield f"/{robot}/duty_pct", self._numbers(list(m.value))
 
     def detection(self, robot: str, m: turbopi.detection_t) -> Iterator[Said]:
-        """Whether another robot was seen."""
+        """Message for a camera's bit: seen or not."""
         yield f"/{robot}/seen", self._make("std_msgs/Bool", bool(m.seen))
 
     def run(self, robot: str, m: turbopi.run_t) -> Iterator[Said]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot does once nothing changes any more: rim speeds by duty, and its limits.
+"""Steady motion of a robot: rim speeds by duty, and its limits.
 
 A robot told duties is as fast as its table. One told wheel speeds or velocities is as fast as its
 effects `wheel_limit` and `speed_limit` say; without them no top speed is known.
@@ -24,7 +24,7 @@ KNOWN = 1e3  # m/s, rad/s: no robot's top speed; what goes faster has no limit
 
 @dataclass(frozen=True)
 class Limits:
-    """What a robot does not exceed.
+    """Speeds and accelerations that a robot does not exceed.
 
     Attributes:
         rims_mps: (K,) top speed of each wheel's rim; None where the model knows none.
@@ -61,7 +61,7 @@ def limits_of(robot: RobotModel) -> Limits:
 
 
 def top_speed_left(robot: RobotModel, so: str) -> Left:
-    """What a model lacks, what follows for a file, and what to put into the model."""
+    """Lack of a model, its consequence for a file, and the numbers to put into the model."""
     if robot.model.drive == "steering":
         return Left("top speed", f"the model has no key for it, so {so}; set it in this file")
     return Left(

@@ -73,7 +73,7 @@ OWN_GAINS = "gains"  # of one robot: its speed and its rate of turn
 
 @dataclass(frozen=True)
 class AddResult:
-    """What adding an effect did.
+    """Scores before and after an effect was added, with its estimates.
 
     Attributes:
         effect: its name, with a number if the model had one already; or `OWN_GAINS`.
@@ -105,17 +105,17 @@ class AddResult:
 
     @property
     def path(self) -> Path:
-        """Of the new model."""
+        """Path of the new model."""
         return self.child.path
 
     @property
     def of_camera(self) -> bool:
-        """Whether the effect is of the camera, so that all scores are those of detections."""
+        """True if the effect is of the camera, so that all scores are those of detections."""
         return isinstance(self.after, DetectionComparison)
 
     @property
     def label(self) -> str:
-        """What was added, and to whom."""
+        """Name of the added effect and of its robot."""
         return self.effect if self.robot_id is None else f"{self.effect} of R{self.robot_id:02d}"
 
     @property
@@ -135,7 +135,7 @@ class AddResult:
 
     @property
     def added(self) -> list[ParameterEstimate]:
-        """Of the parameters, those that are new."""
+        """Estimates of the parameters that are new."""
         gains = GAINS if self.effect == OWN_GAINS else ()
         return [p for p in self.parameters if p.name in gains or _is_of(p.name, self.effect)]
 
@@ -356,7 +356,7 @@ def with_effect(
 def begun_at_best(
     effect: str, fresh: Sequence[Parameter], without: ScoreFit, robot_id: int | None
 ) -> list[Parameter]:
-    """What is new, its place, moments or lever begun where it takes most of what is left.
+    """New parameters whose place, moments or lever begin where they take most of the rest.
 
     Args:
         effect: its name.

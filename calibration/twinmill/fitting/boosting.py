@@ -43,18 +43,18 @@ class Parts:
         return np.lexsort((self.begins, self.ends, self.inside))
 
     def at(self, rows: np.ndarray) -> "Parts":
-        """Of these rows alone."""
+        """Parts of these rows alone."""
         return Parts(self.inside[rows], self.ends[rows], self.begins[rows], self.count)
 
     @cached_property
     def slices(self) -> list[slice]:
-        """Of each part, where rows are in order."""
+        """Slice of each part, where rows are in order."""
         edges = np.searchsorted(self.inside, np.arange(self.count + 1))
         return [slice(a, b) for a, b in pairwise(edges)]
 
     @cached_property
     def cells(self) -> list[slice]:
-        """Of each of S cells, where rows are in order."""
+        """Slice of each of S cells, where rows are in order."""
         same = np.column_stack([self.inside, self.ends, self.begins])
         changes = np.flatnonzero((same[1:] != same[:-1]).any(axis=1)) + 1
         return [slice(a, b) for a, b in pairwise([0, *changes, len(same)])]
@@ -106,7 +106,7 @@ class _Alike:
 
     @classmethod
     def joined(cls, some: Sequence[tuple[np.ndarray, ...]]) -> "_Alike":
-        """Of what each batch of features has of them."""
+        """Joins the products of all batches of features."""
         numbers, columns, *products = zip(*some, strict=True)
         products = (np.concatenate(own, axis=1) for own in products)
         return cls(np.concatenate(numbers), np.concatenate(columns), *products)
@@ -172,7 +172,7 @@ class Learners:
         return len(self._places)
 
     def best(self, wanted: np.ndarray) -> tuple[float, int, float, np.ndarray]:
-        """Of the group that lowers the squared error on left-out parts most.
+        """Best group: the one that lowers the squared error on left-out parts most.
 
         Returns:
             By how much, its number, its best ridge, and its (K, F) coefficients without each part.

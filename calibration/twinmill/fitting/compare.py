@@ -75,7 +75,7 @@ class RobotComparison:
 
     @property
     def model(self) -> native.Model:
-        """Of the robot, on the clock used."""
+        """Model of the robot, on the clock used."""
         return self.modelled.model
 
     @property
@@ -194,12 +194,12 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """What the score means, after what the input tells of when commands act."""
+        """Meaning of the score, after the input's word on when commands act."""
         told = unsteady([r.measurement for r in self.robots])
         return " ".join([*told, self._own_verdict("nothing else" if told else "nothing")])
 
     def _own_verdict(self, nothing: str) -> str:
-        """What the score means; where some robots are missed and others not, of both."""
+        """Meaning of the score alone; where some robots are missed and others not, of both."""
         missed = self.missed
         if not missed:
             return _meaning(self.score, nothing)
@@ -257,7 +257,7 @@ def of_others(count: int, sentence: str) -> str:
 
 
 def _meaning(score: float, nothing: str) -> str:
-    """What a score means, in a sentence.
+    """Score in plain words, one sentence.
 
     Args:
         score: to judge.
@@ -300,7 +300,7 @@ def _of(phase: ParameterEstimate) -> str:
 def comparison(
     model_file: ModelFile, opened: Sequence[Opened], fitted_name: str = ""
 ) -> Comparison:
-    """Of measurements as they stand; of a model that was fitted to them, by its new name."""
+    """Comparison of measurements as they stand; a model fitted to them goes by its new name."""
     warnings = _warnings([o.measurement for o in opened])
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
     known = [o for o in opened if o.data is not None]
@@ -312,7 +312,7 @@ def comparison(
 
 
 def _warnings(measurements: Sequence[Measurement | SteadyTable]) -> list[str]:
-    """What was said of each; what is said of all robots of a log is said once, of the log."""
+    """Warnings of each measurement; one for all robots of a log is told once, of the log."""
     said: dict[tuple[str, str], list[str]] = {}
     for m in measurements:
         for words in m.warnings:

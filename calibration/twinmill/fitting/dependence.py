@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot's velocity may depend on beside its commands of the last moments.
+"""Candidates for a robot's velocity to depend on, beside its commands of the last moments.
 
 Each dependence is a group of features of the three velocities of the body. It may scale a velocity
 (a gain that changes with time, place, heading or way), turn one motion into another, drift by
@@ -118,7 +118,7 @@ class Product:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Of the columns."""
+        """Rows and columns of the matrix."""
         return len(self.gains), self.gains.shape[1] * self.signals.shape[1]
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
@@ -175,7 +175,7 @@ def known_physics(
     velocity: np.ndarray,
     predict: Callable[[Sequence[native.Model]], np.ndarray],
 ) -> Iterator[Group]:
-    """What each effect of the catalogue would change, but those that are somewhere or sometimes.
+    """Change by each effect of the catalogue, but those that are somewhere or sometimes.
 
     Args:
         base: a model without effects.
@@ -407,7 +407,7 @@ def wound(way: np.ndarray, most: float) -> np.ndarray:
 
 
 def _events(motion: Motion) -> Iterator[Features]:
-    """What fades after speeds rose or fell, after reversals, and after starts from rest."""
+    """Features that fade after speeds rose or fell, after reversals, and after starts from rest."""
     base, step_s = motion.base, motion.step_s
     largest = np.maximum(np.abs(base).max(axis=0), 1e-9)
     change = np.diff(np.abs(base), axis=0, prepend=np.abs(base[:1]))

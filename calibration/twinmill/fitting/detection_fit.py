@@ -112,7 +112,7 @@ class DetectionFit:
 
     @cached_property
     def held_out(self) -> HeldOutFrames:
-        """What the fits to either half say of the other."""
+        """Predictions of either half by the fit to the other."""
         models = []
         for values in self._halves:
             self._put(values)
@@ -150,7 +150,7 @@ class DetectionFit:
     # -- what the parameters change ---------------------------------------------------------------
 
     def promise(self) -> float:
-        """What the best of a grid of all values gains over neutral ones: fall of the cost."""
+        """Fall of the cost at the best point of a grid of all values, from neutral ones."""
         neutral = self.likelihood(np.array([p.usual for p in self.shared]))
         self.begin_at_best(self.shared)
         return 2 * (self.likelihood(self.x) - neutral)
@@ -201,11 +201,11 @@ class DetectionFit:
         return made
 
     def shared_estimates(self) -> list[ParameterEstimate]:
-        """The same: no robot has a camera parameter of its own that is fitted."""
+        """Estimates of shared parameters: here all, as no robot has a fitted camera of its own."""
         return self.estimates
 
     def _std(self, i: int, middle: float) -> float:
-        """Of one value: from the shortest steps to both sides that fall by more than the grain."""
+        """Error of one value: the shortest steps both ways that fall by more than the grain."""
         p = self.shared[i]
         for k in range(WIDER):
             step = 0.1 * abs(p.strength) * 2**k

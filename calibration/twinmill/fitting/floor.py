@@ -50,7 +50,7 @@ REACH_S = 1.0  # delays and offsets that are looked for
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Of one robot in one log.
+    """Floor of one robot's errors in one log, by noise alone.
 
     Attributes:
         rms: (H, 3) errors that count as one; NaN where a channel does not move.
@@ -79,7 +79,7 @@ class NoiseFloor:
     answered: bool = False
 
     def thinned(self, every: int) -> "NoiseFloor":
-        """The same, seen from every Nth start alone."""
+        """Floor seen from every Nth start alone."""
         response = self.response and self.response.thinned(every)
         keep, across = self.keep[::every], self.across[::every]
         return replace(self, keep=keep, across=across, response=response)
@@ -363,7 +363,7 @@ def too_poor(data: Trajectory) -> str:
 
 
 def no_floor(data: Trajectory, reason: str) -> NoiseFloor:
-    """Of a log that gives none."""
+    """Empty floor for a log that gives none, with the reason."""
     nothing = np.full(data.floor.shape, np.nan)
     empty = np.full(data.measured.shape, np.nan)
     everything = np.ones(len(data.measured), bool)

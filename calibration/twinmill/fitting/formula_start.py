@@ -55,7 +55,7 @@ def _starts() -> list[float]:
 
 
 def _begun_at(p: Parameter, value: float) -> Parameter:
-    """The same, begun at a value, whose sign it keeps."""
+    """Parameter that begins at another value, whose sign it keeps."""
     ends = sorted((value / NEAR, value * NEAR))
     size = abs(value)
     return replace(
@@ -72,7 +72,7 @@ def _begun_at(p: Parameter, value: float) -> Parameter:
 def _cost(
     known: Sequence[Opened], begun: Sequence[Parameter], others: Sequence[Parameter]
 ) -> float:
-    """Of the data at these numbers, with the others fitted; infinite where a state grows."""
+    """Cost of the data at these numbers, others fitted; infinite where a state grows."""
     models = [o.model.copy() for o in known]
     for model in models:
         for p in (*begun, *others):

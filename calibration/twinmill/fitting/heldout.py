@@ -26,7 +26,7 @@ class HeldOut:
 
     @classmethod
     def of(cls, fit: ScoreFit | DetectionFit) -> "HeldOut":
-        """Of a fit's left-out parts."""
+        """Scores on a fit's left-out parts."""
         if isinstance(fit, DetectionFit):
             return cls(fit.held_scores, [])
         errors = [

@@ -87,21 +87,21 @@ class Opened:
 
     @property
     def score(self) -> float:
-        """Of its model; NaN without a floor."""
+        """Score of its model; NaN without a floor."""
         return float("nan") if self.data is None else self.data.score(self.model)
 
     @property
     def one_clock(self) -> bool:
-        """Whether the log or the model file declares that one clock stamped all."""
+        """True if the log or the model file declares that one clock stamped all."""
         return self.floor is not None and (self.measurement.same_clock or self.model.clock_same)
 
     @property
     def heading_held(self) -> bool:
-        """Whether the heading was not recorded, so that the robot is taken to hold one."""
+        """True if the heading was not recorded, so that the robot is taken to hold one."""
         return self.floor is not None and not self.measurement.track.has_heading
 
     def modelled(self) -> ModelledLog | SteadyStates:
-        """What reports and other tests look at: measurement, model, noise."""
+        """Measurement, model and noise, as reports and other tests look at them."""
         if isinstance(self.data, SteadyStates):
             return self.data.with_model(self.model)
         return ModelledLog.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
@@ -112,7 +112,7 @@ class Opened:
         offset_s: float | None = None,
         rounds: int = FIT_SETTINGS.rounds,
     ) -> "Opened":
-        """The same with another model, on the clock, heading, angles and phases that suit it.
+        """Log under another model, on the clock, heading, angles and phases that suit it.
 
         They are those with which it predicts best. One clock for commands and poses is kept, a
         heading that was recorded, and all of a measurement without a floor. The wheels' angles at
@@ -143,15 +143,15 @@ class Opened:
         return replace(self, data=data, model=fit.models[0], phases=tuple(fit.first_phases))
 
     def realigned(self) -> "Opened":
-        """The same on the clock and heading that would be found for its model anew."""
+        """Log on the clock and heading that would be found for its model anew."""
         return self.aligned(self.model)
 
     def with_fitted(self, model: native.Model) -> "Opened":
-        """The same with a model of its own robot, its clock included."""
+        """Log under a fitted model of its own robot, its clock included."""
         return replace(self, model=model)
 
     def with_model(self, model: native.Model) -> "Opened":
-        """The same with another model, on the same clock."""
+        """Log under another model, on an unchanged clock."""
         if self.floor is None:
             return replace(self, model=model.for_robot(self.measurement.robot_id))
         own = model.for_robot(self.measurement.track.robot_id)
@@ -264,7 +264,7 @@ def lateness_changes(opened: Sequence[Opened]) -> list[str]:
 
 
 def lag_is_kept(opened: Sequence[Opened], told: Collection[str]) -> bool:
-    """Whether the lag keeps its value, as lateness changes in all logs.
+    """True if the lag keeps its value, as lateness changes in all logs.
 
     It does where other logs told it (`told` has names), and where it is not known how lateness
     changes; else how quickly the robot follows tells it, once the change is taken into account.
@@ -328,7 +328,7 @@ def of_few_commands(opened: Sequence[Opened]) -> str:
 
 
 def thinned(opened: Sequence[Opened], every: int) -> list[Opened]:
-    """The same with every Nth start of predictions."""
+    """Logs with every Nth start of predictions."""
     if every < 2:
         return list(opened)
     return [

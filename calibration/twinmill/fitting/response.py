@@ -112,7 +112,7 @@ class Equations:
 
     @classmethod
     def of(cls, x: np.ndarray, rows: Rows) -> "Equations":
-        """Of (R, F) features."""
+        """Normal equations for (R, F) features."""
         cells = rows.parts.cells
         moments = np.array([rows.wanted[k] @ x[k] for k in cells])
         sums = (rows.parts.summed(m) for m in (squares(x, cells), moments))
@@ -151,7 +151,7 @@ class Response:
         self.unboosted = self.across
 
     def of_windows(self, keep: np.ndarray) -> "Response":
-        """The same fitted to some windows alone, (W,) bool."""
+        """Response refitted to some windows alone, (W,) bool."""
         other = copy(self)
         measured = np.where(keep[:, None, None], self.data.measured, np.nan)
         other.data = replace(self.data, measured=measured)
@@ -160,7 +160,7 @@ class Response:
         return other
 
     def thinned(self, every: int) -> "Response":
-        """The same, as fitted, seen from every Nth start alone."""
+        """Response as fitted, seen from every Nth start alone."""
         other = copy(self)
         other.data = self.data.thinned(every)
         for name in ("starts", "ends", "within", "across", "unboosted"):
@@ -335,7 +335,7 @@ class Response:
     def _rows(
         self, part: int, scale: np.ndarray, wanted: np.ndarray, every: int = 1
     ) -> Rows | None:
-        """Of the plane (0) or of turning (1), at every Nth horizon; None where there is none.
+        """Rows of the plane (0) or of turning (1), at every Nth horizon; None where there is none.
 
         Args:
             part: which.
@@ -583,7 +583,7 @@ class Response:
 
 
 def _within(starts: np.ndarray, ends: np.ndarray, count: int) -> np.ndarray:
-    """Of so many points those of windows, from each start (W,) to its end."""
+    """Indices of the points in windows, from each start (W,) to its end."""
     opened, closed = (np.bincount(at, minlength=count + 1) for at in (starts, ends + 1))
     return np.flatnonzero(np.cumsum(opened - closed)[:count])
 
@@ -638,7 +638,7 @@ def _beside(
 
 
 def _isotropic(scale: np.ndarray) -> np.ndarray:
-    """The same scale for forward and left: in the floor both are one plane."""
+    """Makes the scales of forward and left equal: in the floor both are one plane."""
     scale = scale.copy()
     scale[:, :2] = np.sqrt(np.nanmean(scale[:, :2] ** 2, axis=1, keepdims=True))
     return scale
@@ -697,7 +697,7 @@ class _LeftOut:
         return self._fitted()
 
     def moved(self, group: int, value: float) -> float:
-        """The same at another ridge of one group."""
+        """Loss at another ridge of one group."""
         ridge = np.where(np.arange(len(self.ridge)) == group, value, self.ridge)
         if max(value, self.ridge[group]) >= OUT:
             return self.at(ridge)
@@ -748,7 +748,7 @@ class _LeftOut:
         return self.inverse[:, :, at], self.inverse[:, at[:, None], at], self.mean[own[0]] * more
 
     def _let_in(self, own: np.ndarray, values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
-        """The same where a group that is out comes in, and its (K, g, V) coefficients."""
+        """Criterion and (K, g, V) coefficients once a group that is out comes in."""
         across = self.grams[np.ix_(range(len(self.grams)), self.used, own)]
         made = self.inverse @ across
         within = self.grams[:, own[:, None], own] - across.swapaxes(1, 2) @ made

@@ -331,7 +331,7 @@ class ScoreFit:
         return {self.unknowns[c].parameter.name: float(x[c]) for c in gains}
 
     def _score_at(self, x: np.ndarray) -> float:
-        """Of all data sets together, at (P,) values."""
+        """Score of all data sets together, at (P,) values."""
         square = [rows @ rows for rows in self.rows(x)]
         return float(np.sqrt(np.average(square, weights=self.sizes)))
 
@@ -477,7 +477,7 @@ class ScoreFit:
         return np.sqrt([r @ r for r in self.state[0]])
 
     def thinned(self, every: int) -> "ScoreFit":
-        """The same values, seen from every Nth start of the logs alone."""
+        """Fit at its values, seen from every Nth start of the logs alone."""
         if every < 2:
             return self
         if every not in self._thinned:
@@ -785,7 +785,7 @@ class ScoreFit:
 
     @cached_property
     def estimates(self) -> list[ParameterEstimate]:
-        """Of all unknowns, shared ones first."""
+        """Estimates of all unknowns, shared ones first."""
         found, gaps = [], gaps_s(self.datasets)
         alone = 1 / np.sqrt(np.diag(np.linalg.pinv(self._intervals)))  # were the others known
         for u, value, std, rest in zip(self.unknowns, self.x, self.stds, alone, strict=True):
@@ -821,23 +821,23 @@ class ScoreFit:
         ]
 
     def shared_estimates(self) -> list[ParameterEstimate]:
-        """Of the quantities that all data sets share."""
+        """Estimates of the quantities that all data sets share."""
         return self.estimates[: sum(1 for u in self.unknowns if u.parameter in self.shared)]
 
     @property
     def whole_covariance(self) -> Covariance:
-        """Of what all data sets share, as wide as the stds."""
+        """Covariance of the shared quantities, as wide as the stds."""
         shared = self.shared_estimates()
         values = self._intervals[: len(shared), : len(shared)]
         return Covariance(tuple(e.name for e in shared), values)
 
     def shared_covariance(self) -> Covariance:
-        """The same of what these tell, alone or together with others."""
+        """Covariance of the shared quantities by these data, alone or together with others."""
         return self.whole_covariance.of([e.name for e in self.shared_estimates() if e.told])
 
     @property
     def log_likelihood(self) -> float:
-        """Of the errors over their floors, at the best scale of each data set, without priors.
+        """Log likelihood of the errors over their floors, at each set's best scale, without priors.
 
         The cost is minus twice this, but for what is constant, and the priors' part.
         """
@@ -846,14 +846,14 @@ class ScoreFit:
 
     @property
     def first_phases(self) -> list[ParameterEstimate]:
-        """Of formulas in the first log that has such: a model's file has one log's alone."""
+        """Phases of formulas in the first log that has such: a model's file has one log's alone."""
         own = (self.own_estimates(i) for i in range(len(self.datasets)))
         names = {self.unknowns[c].parameter.name for c in self._phases}
         found = ([e for name, e in every.items() if name in names] for every in own)
         return next((own for own in found if own), []) if names else []
 
     def own_estimates(self, i: int) -> dict[str, ParameterEstimate]:
-        """Of data set i alone: its clock and what its robot has of its own."""
+        """Estimates of data set i alone: its clock and the parameters of its robot."""
         count = len(self.shared_estimates())
         return {self.estimates[c].name: self.estimates[c] for c in self.columns[i] if c >= count}
 

@@ -48,7 +48,7 @@ class Candidate:
 
     @property
     def instance(self) -> str:
-        """What the effect is called once it is added."""
+        """Name of the effect once it is added."""
         count = self.models[0].effects.count(self.name)
         return f"{self.name}#{count + 1}" if count else self.name
 
@@ -82,7 +82,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Left:
-    """What is left of all data sets, weighted; what is free is projected out of it.
+    """Errors of all data sets, weighted; free parameters are projected out of them.
 
     Attributes:
         weights: (R,) of each data set's rows.
@@ -96,14 +96,14 @@ class Left:
 
     @classmethod
     def of(cls, fit: ScoreFit, basis: np.ndarray, rest: np.ndarray) -> "Left":
-        """Of a fit; see `projected`."""
+        """Errors that a fit leaves; see `projected`."""
         rows, _ = fit.state
         ends = np.cumsum([len(r) for r in rows])
         parts = (np.split(whole[: ends[-1]], ends[:-1]) for whole in (rest, basis))
         return cls([np.sqrt(fit.weight(i, r)) for i, r in enumerate(rows)], *parts)
 
     def at(self, members: Sequence[int]) -> "Left":
-        """Of some data sets alone: a candidate changes nothing in the others."""
+        """Errors of some data sets alone: a candidate changes nothing in the others."""
         kinds = (self.weights, self.rests, self.bases)
         return Left(*([kind[i] for i in members] for kind in kinds))
 
@@ -124,7 +124,7 @@ class Left:
     def products_of_shares(
         self, changes: Sequence[np.ndarray], shares: Sequence[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The same of changes that are there for a share of each prediction's time.
+        """Products with changes that are there for a share of each prediction's time.
 
         A share is that of all channels of a prediction, so that these are summed first.
 
@@ -154,7 +154,7 @@ def _over_channels(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def projected(fit: ScoreFit) -> tuple[np.ndarray, np.ndarray]:
-    """What is free in a fit, and what it leaves of all rows, whitened, its prior's P rows last.
+    """Free columns of a fit, and the rest of all rows, whitened, its prior's P rows last.
 
     Returns:
         (R + P, P) orthonormal columns of what is free; (R + P,) rows less their part along these.
@@ -171,7 +171,7 @@ class Starts(Protocol):
     """Starts of one effect, and how the rows change from each."""
 
     def best(self, left: Left) -> dict[str, float]:
-        """Of the starts the one that explains most; values by name."""
+        """Start that explains most of the errors, as values by name."""
         ...
 
 
@@ -209,7 +209,7 @@ class Told:
 
     @classmethod
     def of_radius(cls, candidate: Candidate) -> "Told":
-        """Of wheels whose radius the logs tell; the median of those that do."""
+        """Value for wheels whose radius the logs tell; the median of those that do."""
         told = [d.radius_ratio for d in candidate.logs if d.radius_ratio != 1.0]
         ratio = float(np.median(told)) if told else 1.0
         return cls(dict.fromkeys(candidate.named("radius"), ratio))
@@ -237,7 +237,7 @@ class Grid:
 
     @classmethod
     def of(cls, candidate: Candidate, rows: Sequence[np.ndarray]) -> "Grid":
-        """Of an effect with a limit: about the usual one."""
+        """Grid for an effect with a limit: about the usual one."""
         card = {p["name"]: p for p in catalogue()[candidate.name]["parameters"]}
         limits = {f"{candidate.instance}.{k}": card[k] for k in with_role(candidate.name, "limit")}
         starts = [
@@ -298,7 +298,7 @@ class Whiles:
 
     @classmethod
     def of(cls, candidate: Candidate, rows: Sequence[np.ndarray]) -> "Whiles":
-        """Of an effect that begins and ends."""
+        """Trial stretches of an effect that begins and ends."""
         begin, end = candidate.named("moment")
         at_s = _grid_s(candidate)
         changes = _always_on(candidate, rows, {begin: 0.0, end: NEVER_S})
@@ -337,7 +337,7 @@ def _always_on(
 
 
 def _moments(candidate: Candidate, rows: Sequence[np.ndarray]) -> Switched:
-    """Of an effect that begins at a moment, and never ends."""
+    """Trial moments of an effect that begins at one, and never ends."""
     (begin,) = candidate.named("moment")
     at_s = _grid_s(candidate)
     changes = _always_on(candidate, rows, {begin: 0.0})
@@ -361,7 +361,7 @@ def _since(dataset: Dataset, at_s: np.ndarray) -> np.ndarray:
 
 
 def _places(candidate: Candidate, rows: Sequence[np.ndarray]) -> Switched:
-    """Of an effect with a round place: over the floor that was driven."""
+    """Trial places of an effect with a round one: over the floor that was driven."""
     keys = [f"{candidate.instance}.{key}" for key in ("x_m", "y_m", "radius_m")]
     tracks = [d.measurement.track for d in candidate.logs]
     xy = np.concatenate([t.pose[t.segment >= 0, :2] for t in tracks])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a model always misses: its discrepancy in the log that it was fitted to.
+"""Lasting errors of a model: its discrepancy in the log that it was fitted to.
 
 A fitted base is of another form than the robot. What it leaves in its own log (effects that a fit
 of the base's numbers leaves out, a coupling of turns, a slow wander, single moments) is no news in
@@ -53,7 +53,7 @@ class _Grown:
 
 
 def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Always:
-    """What a model misses in the logs that it was fitted to.
+    """Lasting errors of a model, told by the logs that it was fitted to.
 
     Args:
         measurements: one robot in those logs.
@@ -72,7 +72,7 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
 
 
 def _lasts(effects: tuple[str, ...]) -> bool:
-    """Whether all of a set are of the robot: none of a place, a while or the clocks."""
+    """True if all of a set are of the robot: none of a place, a while or the clocks."""
     return not any(
         is_local(name) or with_role(name, "moment") or catalogue()[name]["needs"] == "clocks"
         for name in map(catalogue_name, effects)

@@ -53,7 +53,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a log says of a model.
+    """Verdict of a log on a model.
 
     Attributes:
         verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or

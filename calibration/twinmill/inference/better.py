@@ -92,7 +92,7 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
 def _fitted(
     found: Inference, model_file: ModelFile, score: float
 ) -> tuple[Fitted, tuple[str, ...]]:
-    """What is to be written, and its new instances of effects; the score is not known yet."""
+    """Fit to be written, and its new instances of effects; the score is not known yet."""
     model, name_of = _with_effects(model_file, found)
     duties = model_file.model.drive == "duty"
     estimates, covariance = _told(found.answer.numbers, name_of, model, duties=duties)

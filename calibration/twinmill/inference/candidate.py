@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an effect that a model may lack would change in a log."""
+"""Change in a log by an effect that a model may lack."""
 
 from dataclasses import dataclass
 from itertools import product

@@ -65,7 +65,7 @@ def candidates(
 
 
 def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
-    """What an effect would change beside a model.
+    """Change by an effect beside a model.
 
     Raises:
         ValueError: the effect cannot be added to this model.

@@ -22,7 +22,7 @@ from twinmill.model.parameters import catalogue_name, key_of
 
 @dataclass(frozen=True)
 class Hidden:
-    """What the base's own log tells of effects that were not found in it.
+    """Evidence in the base's own log on effects that were not found in it.
 
     Attributes:
         names: of their numbers, `effect.key`, M of them.
@@ -42,7 +42,7 @@ class Hidden:
     def of(
         cls, columns: dict[str, Candidate], linear: Linear, whiten, root: np.ndarray
     ) -> "Hidden":
-        """Of one's own log.
+        """Evidence from one's own log.
 
         Args:
             columns: effects, of which those count that act everywhere and have sizes alone.

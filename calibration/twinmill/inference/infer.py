@@ -28,7 +28,7 @@ OWN = "give own logs of the robot that is judged, or none"
 
 @dataclass(frozen=True)
 class Inference:
-    """What logs of a robot say of a model.
+    """Verdict of a robot's logs on a model.
 
     Attributes:
         answer: verdict, effects and dependences with their probabilities.

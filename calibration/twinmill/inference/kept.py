@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a model misses in its own logs, kept in its file as [fit.always]."""
+"""Lasting errors of a model in its own logs, kept in its file as [fit.always]."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ DIGITS = 7  # of each number: the covariance is kept as its Cholesky factor, whi
 
 
 def kept(model_file: ModelFile) -> Always | None:
-    """What a file tells of its model; None if it tells nothing.
+    """Lasting errors of its model that a file keeps; None if it has none.
 
     Raises:
         ModelError: the table is not as `with_kept` writes it.
@@ -61,7 +61,7 @@ def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -
 
 
 def as_table(always: Always) -> dict[str, Any]:
-    """What a model misses in its own logs, as [fit.always] holds it."""
+    """Table [fit.always] for a model's file."""
     low = np.linalg.cholesky(always.cov)
     return {
         "effects": list(always.effects),

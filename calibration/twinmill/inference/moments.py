@@ -20,7 +20,7 @@ SPREAD = 10.0  # pseudo-observations behind the expected share of moments: known
 
 @dataclass(frozen=True)
 class Rate:
-    """What is known of the share of moments at which something happens.
+    """Belief on the share of moments at which something happens.
 
     Attributes:
         there: probability that anything ever happens.
@@ -91,7 +91,7 @@ class Found:
         return int(self.by_number(rate).argmax())
 
     def after(self, there: float) -> Rate:
-        """What the log tells of the rate, if something happens ever with that probability."""
+        """Rate after the log, if something happens ever with that probability."""
         some = Rate()
         on, odds = self.likeliest(some), np.log(there / (1 - there)) + self.log_evidence(some)
         return Rate(float(expit(odds)), some.on + on, some.off + self.count - on)

@@ -120,7 +120,7 @@ class Filter:
 
     @classmethod
     def of(cls, logs: np.ndarray, course: Course) -> "Filter":
-        """Of (4, C) logarithms of sensor, drive, gain, memory in s of C channels."""
+        """Filter with (4, C) logarithms of sensor, drive, gain, memory in s of C channels."""
         sensor2, drive2, gain2 = np.exp(2 * logs[:3])[:, :, None]
         a = np.exp(-course.step_s / np.clip(np.exp(logs[3]), *MEMORY_S))[:, None]
         one = course.follows

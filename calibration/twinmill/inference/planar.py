@@ -60,11 +60,11 @@ class PlanarProblem(Problem):
     always: Always | None
 
     def candidate(self, name: str, model: native.Model) -> Candidate:
-        """What an effect of the twin's catalogue would change beside a model."""
+        """Change by an effect of the twin's catalogue beside a model."""
         return candidates.candidate(name, model, self.steps)
 
     def forms(self, change: np.ndarray) -> tuple[np.ndarray, ...]:
-        """What an effect's formula may miss, by speed, time, place and heading."""
+        """Shapes by which an effect's formula may be wrong: of speed, time, place and heading."""
         return discrepancy.forms_of(change, self.motion)
 
     def always_there(
@@ -83,7 +83,7 @@ class PlanarProblem(Problem):
 
 
 def planar_kinds() -> Kinds:
-    """Of the twin's catalogue."""
+    """Kinds of effects in the twin's catalogue."""
     return Kinds(
         {
             name: TOLD_BY[card["needs"]]

@@ -90,7 +90,7 @@ class _Row:
 
 
 def _belief(row: _Row, probability: float, table: Table) -> Belief:
-    """What begins or ends several times is no effect of the catalogue, but depends on time.
+    """Belief in one effect; repeated begins and ends are no effect, but a dependence on time.
 
     What comes and goes once, in several steps, is one thing of a kind.
     """

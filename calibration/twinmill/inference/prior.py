@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of a base model before a log is seen: a joint normal distribution."""
+"""Knowledge of a base model before a log is seen: a joint normal distribution."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -36,7 +36,7 @@ ROUGH = 0.3  # largest relative error of a speed of the duty table, which neighb
 
 @dataclass(frozen=True)
 class Always:
-    """What a model misses in the log that it was fitted to, so that it is no news in another.
+    """Errors of a model in the log that it was fitted to, which are no news in another.
 
     Attributes:
         effects: of the catalogue, that the base lacks there.

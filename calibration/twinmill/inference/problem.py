@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What inference is told: errors of a base, its prior, their noise, and all that may be missing.
+"""Input of inference: a base's errors, prior, noise, and all that it may lack.
 
 Robots of any kind are judged by subclasses that know their physics: `planar` those that drive on a
 floor, `twinmill.joints.problem` those that MuJoCo can load.
@@ -44,7 +44,7 @@ class Steps(Protocol):
 
 @dataclass(frozen=True)
 class Kinds:
-    """What is known of the effects that compete, beside what they change.
+    """Knowledge of the competing effects, beside the changes that they make.
 
     Attributes:
         told_by: dependences for which each effect may be mistaken.
@@ -59,7 +59,7 @@ class Kinds:
 
 @dataclass(frozen=True)
 class View:
-    """What may be missing, as it looks under a noise.
+    """Possible lacks of a model, whitened under a noise.
 
     Attributes:
         fitter: of the log, under that noise.
@@ -83,7 +83,7 @@ class View:
 
     @property
     def log_size(self) -> float:
-        """What each log evidence under this noise is less by."""
+        """Constant by which each log evidence under this noise is less."""
         return float(self.log_sizes.sum())
 
     def white(self, f: int) -> np.ndarray:
@@ -121,7 +121,7 @@ class Problem(ABC):
 
     @abstractmethod
     def candidate(self, name: str, model: Any) -> Candidate:
-        """What an effect would change beside a model.
+        """Change by an effect beside a model.
 
         Raises:
             ValueError: the effect cannot be added to this model.
@@ -149,7 +149,7 @@ class Problem(ABC):
         """(B + 1, N, W, C) change by a gain or a push of usual size up to each of the bins."""
 
     def view(self, noise: Noise) -> View:
-        """What may be missing, under a noise."""
+        """Possible lacks, whitened under a noise."""
         fitter = Fitter(self.steps, noise, self.prior.columns)
         channels = len(self.steps.observed)
         stacked = fitter.whiten(np.concatenate([k.columns for k in self.kernels]))
@@ -182,7 +182,7 @@ class Problem(ABC):
         return fitter.at(replace(h, value=value, slopes=None))
 
     def columns(self, h: Hypothesis, names: Collection[str] | None = None) -> dict[str, Candidate]:
-        """What each effect that a hypothesis lacks would change; of some effects, or of all.
+        """Change by each effect that a hypothesis lacks; of some effects, or of all.
 
         What acts at a place or for a while may be there more than once.
         """

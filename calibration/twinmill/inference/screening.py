@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What effects would gain beside a model, were they linear, and where one acts best."""
+"""Linear gain of effects beside a model, and where one acts best."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ class Screened:
 
 
 def screened(linear: Linear, columns: dict[str, Candidate], whiten: Whiten) -> dict[str, Screened]:
-    """What each effect would gain beside a linear model."""
+    """Gain of each effect beside a linear model."""
     each = {}
     for name, c in columns.items():
         each[name] = _by_size(c, linear, whiten) if c.fixed is None else _fixed(c, linear, whiten)

@@ -38,7 +38,7 @@ _Screen = tuple[tuple[Hypothesis, Linear], dict[str, Candidate], dict[str, Scree
 
 @dataclass(frozen=True)
 class Evidence:
-    """Of one hypothesis under one noise.
+    """Evidence for one hypothesis under one noise.
 
     Attributes:
         hypothesis: with its best numbers.
@@ -238,7 +238,7 @@ class Search:
         self.fitted[h.effects] = evidence(h, self.view, h.linear(self.view.fitter))
 
     def _log_posterior(self, names: tuple[str, ...]) -> float:
-        """Of a set at its best: alone or with the likeliest dependence, up to a constant."""
+        """Weight of a set at its best: alone or with the likeliest dependence, up to a constant."""
         own = self.fitted[names]
         forms = len(self.problem.kernels)
         other = float((own.gains + np.log(CHANCE)).max()) - np.log(forms)

@@ -155,7 +155,7 @@ def _ahead(step: np.ndarray, heading_rad: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Motion:
-    """What a dependence may look at: W steps as the base predicts them.
+    """Regressors of a dependence: W steps as the base predicts them.
 
     Attributes:
         moved: (W, 3) displacements forward, left, turn in m and rad.

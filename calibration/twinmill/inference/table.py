@@ -182,7 +182,7 @@ def _swells(h: Hypothesis, kinds: Kinds) -> str | None:
 
 
 def swells_once(steps: list[tuple[float, float]]) -> bool:
-    """Whether what begins at zero, and changes at times by so much each, grows once and then falls.
+    """True if a course from zero, changing at times by so much each, grows once and then falls.
 
     Args:
         steps: time in s, and the change of the size at it.
@@ -217,7 +217,7 @@ def noise_of(h: Hypothesis, p: Problem, beside: np.ndarray | None = None) -> Noi
 
 @dataclass(frozen=True)
 class _Beside:
-    """What is there beside a set of effects before more dependences are looked at.
+    """Dependences beside a set of effects before more are looked at.
 
     Attributes:
         words: dependences that it is; none for moments as often as usual.
@@ -314,7 +314,7 @@ class _Comparison:
         return out
 
     def always(self) -> list[tuple[tuple[str, ...], float]]:
-        """Of each of `subsets` how much likelier it always was there than that it is new, log."""
+        """Log odds of each of `subsets` that it always was there, against its being new."""
         found, fitter = [], self.view.fitter
         for names in subsets(self.h.effects):
             if there := self.problem.always_there(self.h, names):
@@ -349,7 +349,7 @@ class _Comparison:
         return beside[0], beside[1]
 
     def _others(self, usual: _Beside) -> list[_Beside]:
-        """What may be there in the place of usual moments, which are looked for before all else.
+        """Alternatives to usual moments, which are looked for before all else.
 
         Nothing, where a dependence does what they do; and what the formula of an effect misses.
         """
@@ -431,7 +431,7 @@ class _Comparison:
 
     @property
     def _rows(self) -> np.ndarray:
-        """Of `Hypothesis.rows`."""
+        """Rows as `Hypothesis.rows` has them."""
         return self._known.parts[0].rows[0]
 
     @cached_property

@@ -25,7 +25,7 @@ def steady_comparisons(comparison: Comparison) -> list[SteadyComparison]:
 
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
-    """What was compared with what: label and text."""
+    """Log, model and settings of a comparison: label and text."""
     if isinstance(comparison.shown, SteadyComparison):
         return steady.facts(steady_comparisons(comparison), comparison.model_name)
     return tables.facts(comparison)

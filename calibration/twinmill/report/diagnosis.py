@@ -172,7 +172,7 @@ def _would_show(diagnosis: Diagnosis) -> list[str]:
 
 
 def _alone(diagnosis: Diagnosis) -> str:
-    """What is beyond doubt of the only robot, in words."""
+    """Findings beyond doubt about the only robot, in words."""
     if diagnosis.verdict == "model_adequate":
         return "as the model"
     told = [f for f in diagnosis.findings if f.effect in catalogue() and f.certainty != "doubtful"]
@@ -182,7 +182,7 @@ def _alone(diagnosis: Diagnosis) -> str:
 
 
 def _said_of(sentence: str) -> str:
-    """Of a robot, without its name before and the full stop behind."""
+    """Sentence on a robot, without its name before and the full stop behind."""
     return (sentence.partition(": ")[2] or sentence).rstrip(".")
 
 
@@ -460,7 +460,7 @@ def _detection_tables(diagnosis: Diagnosis) -> list[Table]:
 
 
 def _detection_figures(diagnosis: Diagnosis) -> list[Figure]:
-    """What the camera sees, with the model as given and with what was found."""
+    """Figures of the camera's bits, with the model as given and with the findings."""
     if not diagnosis.detections:
         return []
     after = diagnosis.detections_after

@@ -49,7 +49,7 @@ def _told(s: Series, result: Drift) -> str:
 
 
 def terminal(result: Drift) -> RenderableType:
-    """What `twinmill robot drift` prints."""
+    """Text that `twinmill robot drift` prints."""
     tone = "bold red" if result.left else "bold green"
     return Group(
         *(Text(line, tone) for line in verdict(result)), Text(), show.table(numbers(result))

@@ -104,7 +104,7 @@ def regimes(
 
 
 def waterfall(scores: list[tuple[str, float]]) -> Figure:
-    """What each step took from the score, on a scale of factors."""
+    """Fall of the score by each step, on a scale of factors."""
     values = np.array([score for _, score in scores])
 
     def paint(axes) -> None:

@@ -21,7 +21,7 @@ NOTE = (
 
 
 def sentences(found: Score, missing: list[int]) -> list[str]:
-    """What a person wants to know."""
+    """Sentences on the floor and the score, for people."""
     log, expected = found.log_score, found.expected
     lines = [
         f"{found.hits} of {found.runs} runs ended in their most probable class; log score "

@@ -25,7 +25,7 @@ SIDES = 1.96  # standard errors: 95 %
 
 
 def sentences(rest: Rest) -> list[str]:
-    """What is said of a formula for what is left; that none holds, where something depends."""
+    """Sentences on a formula for the rest; that none holds, where something depends."""
     found = rest.proven
     if found:
         return [_said(found), _bounds(found)]
@@ -48,7 +48,7 @@ def _said(found: Formula) -> str:
 
 
 def taken(beyond: Taken | None) -> list[str]:
-    """What is said of a formula that was to go into the model; nothing if there was none."""
+    """Sentences on a formula that was to go into the model; none if there was none."""
     if not beyond:
         return []
     scores = f"{beyond.before:.2f} without it, {beyond.after:.2f} with it"

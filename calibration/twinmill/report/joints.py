@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an MJCF lacks, as sentences and tables."""
+"""Lack of an MJCF, as sentences and tables."""
 
 from collections.abc import Mapping
 from pathlib import Path

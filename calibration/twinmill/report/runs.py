@@ -33,7 +33,7 @@ HINT = (
 
 
 def verdict(result: RunComparison) -> list[str]:
-    """What changed, a sentence each."""
+    """Changes of the robot, a sentence each."""
     first, second = (o.measurement.log_name for o in (result.first, result.second))
     if not result.changed:
         return [
@@ -72,7 +72,7 @@ def sized(change: Change) -> str:
 
 
 def interval(change: Change) -> str:
-    """Of 95 %, without the sign that the words have."""
+    """Interval of 95 %, without the sign that the words have."""
     factor, unit = SHOWN[change.kind.unit]
     sign = -1 if change.value < 0 else 1
     low, high = sorted(sign * factor * end for end in change.interval)
@@ -80,7 +80,7 @@ def interval(change: Change) -> str:
 
 
 def apart(result: RunComparison) -> list[str]:
-    """What differs and is no alarm."""
+    """Differences that are no alarm."""
     said = []
     if result.remounted:
         said.append(f"The marker was mounted anew: {_moved(result)}.")
@@ -165,7 +165,7 @@ def power(result: RunComparison) -> str:
 
 
 def terminal(result: RunComparison) -> RenderableType:
-    """What `twinmill robot compare` prints."""
+    """Text that `twinmill robot compare` prints."""
     tone = "bold red" if result.changed else "bold green"
     return Group(
         *(Text(line, tone) for line in verdict(result)),

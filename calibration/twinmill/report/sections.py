@@ -36,7 +36,7 @@ def comparison_section(result: Comparison) -> Section:
 
 
 def fit_section(result: FitResult) -> Section:
-    """Of one fit: the same pictures of the fitted model, beside the old one's errors."""
+    """Section on one fit: the pictures of a comparison, beside the old model's errors."""
     log_name = _same_robot(result)[1].measurement.log_name
     return _of_both(
         result,
@@ -62,7 +62,7 @@ def added_section(result: AddResult) -> Section:
 
 
 def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Section:
-    """What pages of fitted models share; `more` tables stand at the end."""
+    """Section that pages of fitted models share; `more` tables stand at the end."""
     before, after = _same_robot(result)
     return Section(
         title,
@@ -96,7 +96,7 @@ def _camera_section(result: AddResult) -> Section:
 
 
 def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> Section:
-    """Of a chain of steps."""
+    """Section on a chain of steps."""
     ends = [_score("start", scores[0][1]), _score("end", scores[-1][1])]
     return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a person reads in the terminal."""
+"""Renderings of results for a person at the terminal."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ WARNINGS = 3  # in the terminal; --json has all
 
 
 def comparison(result: Comparison) -> RenderableType:
-    """What `twinmill compare` prints: facts, score, tables, warnings, next step."""
+    """Text that `twinmill compare` prints: facts, score, tables, warnings, next step."""
     return Group(
         _facts(comparisons.facts(result)),
         Text(),
@@ -37,7 +37,7 @@ def comparison(result: Comparison) -> RenderableType:
 
 
 def fit(result: FitResult, not_written: str = "") -> RenderableType:
-    """What `twinmill fit` prints: score before and after, estimates, the new file.
+    """Text that `twinmill fit` prints: score before and after, estimates, the new file.
 
     Args:
         result: of the fit.
@@ -58,7 +58,7 @@ def fit(result: FitResult, not_written: str = "") -> RenderableType:
 
 
 def added(result: AddResult, not_written: str = "") -> RenderableType:
-    """What `twinmill twin add` prints: scores fitted and held out, the effect's estimates.
+    """Text that `twinmill twin add` prints: scores fitted and held out, the effect's estimates.
 
     Args:
         result: of the addition.

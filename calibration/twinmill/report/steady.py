@@ -32,7 +32,7 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 
 
 def facts(robots: list[SteadyComparison], model_name: str) -> list[tuple[str, str]]:
-    """What was compared with what: label and text."""
+    """Robots and model of a comparison of steady speeds: label and text."""
     sheet = robots[0].measurement
     numbers = ", ".join(str(r.measurement.robot_id) for r in robots)
     runs = sum(int(r.measurement.runs.sum()) for r in robots)

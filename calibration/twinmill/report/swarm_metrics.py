@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a swarm does, as a page: its class, its metrics over time, its paths."""
+"""Page about a swarm: its class, its metrics over time, its paths."""
 
 import numpy as np
 import twinmill_native as native

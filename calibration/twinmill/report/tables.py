@@ -73,7 +73,7 @@ def tone(score: float) -> Tone:
 
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
-    """What was compared with what: label and text."""
+    """Log and model of a comparison: label and text."""
     robot = comparison.shown
     measurement, noise = robot.measurement, robot.modelled.noise
     track = measurement.track

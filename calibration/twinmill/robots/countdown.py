@@ -109,7 +109,7 @@ def _why(fleet: Fleet, robot: Robot, ack: Any) -> tuple[str, bool]:
 def _obeyed_a_stop(
     fleet: Fleet, robot: Robot, session: int, *, after_us: int, before_us: float = math.inf
 ) -> bool:
-    """Of somebody else, in this time of this session."""
+    """True if it obeyed somebody else's stop, in this time of this session."""
     return any(
         ack.verb == turbopi.swarm_command_t.VERB_STOP
         and ack.accepted

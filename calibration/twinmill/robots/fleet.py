@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What robots say on the LCM bus, and the one channel on which they are told."""
+"""Words of robots on the LCM bus, and the one channel on which they are told."""
 
 import math
 import re
@@ -79,7 +79,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True)
 class Answered:
-    """What the quickest answer to a word from here tells of a robot's clock.
+    """Bounds on a robot's clock by the quickest answer to a word from here.
 
     Attributes:
         session: of the robot.
@@ -125,7 +125,7 @@ class Heard:
 
 @dataclass
 class Robot:
-    """What one robot said last.
+    """Last words of one robot.
 
     Attributes:
         telemetry, run: its newest messages.
@@ -267,7 +267,7 @@ class Robot:
 
     @property
     def alarms(self) -> list[str]:
-        """What a person must know of it, loudest first."""
+        """Alarms about it that a person must know, loudest first."""
         hosts = ", ".join(self.senders.hosts)
         said = [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
         flags = self.telemetry.status_flags if self.telemetry else 0
@@ -582,7 +582,7 @@ class Fleet:
 
     @contextmanager
     def unwatched(self) -> Iterator[None]:
-        """What is done in this block is done to its end: nobody is asked whether to go on."""
+        """Runs a block to its end: nobody is asked on the way whether to go on."""
         watch, self.watch = self.watch, lambda: None
         try:
             yield
@@ -652,7 +652,7 @@ class Fleet:
 
     @property
     def has_key(self) -> bool:
-        """What robots sign can be told from what anybody says."""
+        """True if signed words of robots can be told from anybody's."""
         return self.key is not None
 
     @property

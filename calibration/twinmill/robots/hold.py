@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of robots that were started, by what they sign, until they stand."""
+"""Fate of robots that were started, by their signed words, until they stand."""
 
 import time
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ SETTLE_S = 0.3  # a state that lasts is told; a camera that stutters would be a 
 
 @dataclass(frozen=True)
 class State:
-    """What a robot does now.
+    """Motion of a robot by its last words.
 
     Attributes:
         words: to go on behind its name; of one that stands, why it does.
@@ -189,7 +189,7 @@ class Held:
 
     @property
     def states(self) -> dict[str, State]:
-        """What was told last, by the robots' names."""
+        """Last state of each robot, by name."""
         return {f"R{i:02d}": state for i, state in self._told.items()}
 
     def settle(self) -> None:

@@ -44,7 +44,7 @@ def parse_target(text: str) -> Target:
 
 @dataclass(frozen=True)
 class UpdateRequest:
-    """What is to be done.
+    """Update that is asked for.
 
     Attributes:
         packages: to install from; None: go back to the package before.
@@ -68,7 +68,7 @@ class UpdateRequest:
 
 @dataclass
 class Outcome:
-    """What became of one robot: ok, or the kind of failure and a sentence."""
+    """Result for one robot: ok, or the kind of failure and a sentence."""
 
     target: Target
     ok: bool = False

@@ -52,7 +52,7 @@ NO_SIGNATURE = (
 
 @dataclass(frozen=True)
 class Answer:
-    """What a robot answered.
+    """Reply of a robot to a command.
 
     Attributes:
         accepted: None if it did not answer.
@@ -403,7 +403,7 @@ def _say_to(fleet: Fleet, command, robots: set[int], host: str) -> None:
 
 @dataclass(frozen=True)
 class Start:
-    """What became of a common start.
+    """Result of a common start.
 
     Attributes:
         utime_us: the instant.
@@ -543,7 +543,7 @@ def _why_not_begun(robot: Robot) -> str:
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
-    """What each of some robots answered to a command."""
+    """Replies of some robots to a command."""
     unsigned = NO_SIGNATURE if fleet.has_key else NO_KEY
     return [_answer(fleet.robots.get(i) or Robot(i), command, unsigned) for i in sorted(robots)]
 

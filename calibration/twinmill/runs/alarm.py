@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a run is so unlike the healthy ones that something changed, and what that is called."""
+"""Decides if a run is too unlike the healthy ones for chance, and names the change."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Alarm:
 
     @property
     def calibrated(self) -> bool:
-        """Whether there are healthy runs beside the first one."""
+        """True if there are healthy runs beside the first one."""
         return len(self.healthy) > 1
 
     @property
@@ -53,7 +53,7 @@ class Alarm:
 
     @property
     def first_is_odd(self) -> bool:
-        """Whether the first run is less like all others than any of them."""
+        """True if the first run is less like all others than any of them."""
         first, *others = self.healthy
         return self.calibrated and first > max([self.score, *others])
 
@@ -75,7 +75,7 @@ class Alarm:
 
     @cached_property
     def found(self) -> list[tuple[Change, tuple[Change, ...]]]:
-        """What changed, the surest first, each with what explains it as well.
+        """Changes, the surest first, each with those that explain it as well.
 
         Beside the first ones another is told if it is still larger than an alarm takes.
         """

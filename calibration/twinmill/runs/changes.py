@@ -24,7 +24,7 @@ DRAWS = 20_000  # of runs without a change: a rate of 5 % is known to 0.15 %
 
 @dataclass(frozen=True)
 class Kind:
-    """What may change, by name.
+    """Change that may have happened, by name.
 
     Attributes:
         key: `wheel.fl`, `wheels.left`, `wheels.all`, `forward`, or that of a quantity.
@@ -135,7 +135,7 @@ class Judged:
         return np.sort(np.abs(normal @ ways.T).max(axis=1) / size)
 
     def chance(self, score: float) -> float:
-        """Of so large a score without a change, by the standard errors alone."""
+        """Probability of so large a score without a change, by the standard errors alone."""
         drawn = (1 + np.count_nonzero(self.by_errors >= score)) / (DRAWS + 1)
         return float(min(drawn, 2 * len(self.kinds) * t_above(score, self.free)))
 
@@ -151,7 +151,7 @@ def rivals(change: Change, changes: Sequence[Change]) -> list[Change]:
 
 
 def kinds_of(model: native.Model, keys: Sequence[str]) -> list[Kind]:
-    """What may change of a robot whose differences have these keys."""
+    """Possible changes of a robot whose differences have these keys."""
 
     def direction(**sizes: float) -> np.ndarray:
         return np.array([sizes.get(key, 0.0) for key in keys])

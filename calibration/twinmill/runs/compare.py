@@ -67,12 +67,12 @@ class RunComparison:
 
     @property
     def changed(self) -> bool:
-        """Whether there is an alarm."""
+        """True if there is an alarm."""
         return bool(self.changes)
 
     @property
     def remounted(self) -> bool:
-        """Whether the marker sits elsewhere, at the same rate of false alarms."""
+        """True if the marker sits elsewhere, at the rate of false alarms that alarms have."""
         marker = self.whole.only([k for k in self.whole.keys if k.startswith("marker.")])
         size = len(marker.values)
         square = marker.values @ np.linalg.pinv(marker.covariance) @ marker.values

@@ -74,7 +74,7 @@ class Difference:
 
     @cached_property
     def keys(self) -> list[str]:
-        """Of all quantities."""
+        """Names of all quantities that are compared."""
         return [q.key for q in self.quantities]
 
     def only(self, keys: Collection[str]) -> "Difference":
@@ -130,19 +130,19 @@ def difference(first: Opened, second: Opened) -> Difference:
 
 
 def charge_is_known(*runs: Opened) -> bool:
-    """Whether all runs recorded the battery's voltage, so that speeds may follow it."""
+    """True if all runs recorded the battery's voltage, so that speeds may follow it."""
     return all(np.isfinite(mean_V(o)) for o in runs)
 
 
 def mean_V(opened: Opened) -> float:
-    """Of the battery in a run; NaN where it was not recorded."""
+    """Mean voltage of the battery in a run; NaN where it was not recorded."""
     volts = opened.measurement.track.battery_V
     known = volts[np.isfinite(volts) & (volts > 0)]
     return float(known.mean()) if known.size else float("nan")
 
 
 def follows_charge(model: native.Model) -> bool:
-    """Whether the battery's charge changes speeds; a controller that keeps them makes up for it."""
+    """True if the battery's charge changes speeds; a controller that keeps them makes up for it."""
     return model.drive == "duty"
 
 

@@ -54,12 +54,12 @@ class Series:
 
     @property
     def drifts(self) -> bool:
-        """Whether it has a trend."""
+        """True if it has a trend."""
         return self.trend_p <= self.rate / TESTS
 
     @property
     def left(self) -> bool:
-        """Whether the last calibration is out of its band, or all have a trend; no nuisance is."""
+        """True if the last calibration is out of its band, or all have a trend; nuisances aside."""
         return not self.natural and bool(self.outside[-1] or self.drifts)
 
 

@@ -145,7 +145,7 @@ def check_history(path: Path, measurements: Sequence[Measurement]) -> None:
 def calibration(
     result: FitResult, measurements: Sequence[Measurement], logs: Sequence[Path], history: Path
 ) -> Calibration:
-    """What a fit tells, as a line of a history.
+    """Line of a history that a fit makes.
 
     Args:
         result: of the fit.

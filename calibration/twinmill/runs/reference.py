@@ -24,7 +24,7 @@ CHARGE_STD = float(np.log(FULL_V / EMPTY_V) / np.sqrt(12))
 
 @dataclass(frozen=True)
 class Day:
-    """What one run tells of its robot.
+    """Quantities of a robot that one run tells.
 
     Attributes:
         values: (K,) its differences from the first run; zeros of that itself.

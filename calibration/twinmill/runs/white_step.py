@@ -36,7 +36,7 @@ class WhiteStep:
 
 @dataclass(frozen=True)
 class _Block:
-    """What a block of time adds to curvature and slope of the squares, (P, P) and (P,)."""
+    """Contribution of a block of time to curvature and slope of the squares, (P, P) and (P,)."""
 
     gram: np.ndarray
     pull: np.ndarray
@@ -89,7 +89,7 @@ def _kept(steps: Steps, data: Trajectory) -> np.ndarray:
 
 
 def _stretches(steps: Steps, kept: np.ndarray) -> Sequence[slice]:
-    """Of the kept steps, those that follow each other without a gap."""
+    """Stretches of kept steps that follow each other without a gap."""
     number = np.zeros(len(steps), int)
     for k, part in enumerate(steps.stretches):
         number[part] = k

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sweep can vary, under the names that people use for it."""
+"""Axes that a sweep can vary, under the names that people use for them."""
 
 import difflib
 import math
@@ -62,12 +62,12 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """What the axis varies, in words; its name where there are none."""
+        """Varied quantity in words; its name where there are none."""
         return QUANTITIES[self.name].label if self.name in QUANTITIES else self.name
 
     @property
     def whole(self) -> bool:
-        """Whether its values are whole numbers, as of robots."""
+        """True if its values are whole numbers, as of robots."""
         return self.name in QUANTITIES and QUANTITIES[self.name].whole
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What becomes of a swarm: the classes, their colours, and what a behaviour is meant to do."""
+"""Classes of a swarm's end state, their colours, and the aim of each behaviour."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def check_goal(name: str) -> str:
 
 
 def goal_of(request: Request) -> str:
-    """What the first species is for, as far as its name tells."""
+    """Class that the first species aims at, as far as its name tells."""
     return DIFFUSED if request.behavior.startswith(("diffusing", "disperse")) else "milling"
 
 

@@ -57,7 +57,7 @@ class RankTest:
 
     @property
     def differs(self) -> bool:
-        """Whether either test says so; false alarms: FALSE_ALARMS of both together."""
+        """True if either test says so; false alarms: FALSE_ALARMS of both together."""
         return min(self.p_value, self.p_band) <= FALSE_ALARMS / 2
 
 

@@ -24,7 +24,7 @@ CHANNEL = re.compile(r"(.*?)R\d\d+_(?:TELEMETRY|POSE|DRIVE|RUN)")
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of the bus.
+    """Request to the bus: robots, time and metrics.
 
     Attributes:
         prefix: only the swarm with this channel prefix; None: all.

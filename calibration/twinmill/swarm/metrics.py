@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a swarm in a log does over time, in the metrics that the twin uses for its own swarms.
+"""Metrics over time of a swarm in a log, by the code that the twin uses for its own swarms.
 
 `twin_run` samples and fits the poses that it publishes in the same way (recent_poses.cpp), so that
 both say the same of a run.

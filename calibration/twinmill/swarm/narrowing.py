@@ -95,7 +95,7 @@ class Spread:
         return cls(names, known.covariance[np.ix_(kept, kept)], shares, slope, foretold)
 
     def std(self, covariance: np.ndarray) -> float:
-        """Of the share, as far as it is linear in the numbers."""
+        """Standard error of the share, as far as it is linear in the numbers."""
         return float(np.sqrt(self.slope @ covariance @ self.slope))
 
     def parts(self) -> dict[str, float]:
@@ -170,7 +170,7 @@ class Narrowing:
 
     @property
     def stds(self) -> tuple[float, float]:
-        """Of the share, before the run and after it."""
+        """Standard errors of the share, before the run and after it."""
         return self.spread.std(self.spread.covariance), self.spread.std(self.covariance)
 
     def to_json(self) -> dict:
@@ -331,7 +331,7 @@ def driven(moves: list[Move], modelled: ModelledLog) -> Measurement:
 
 
 def _fit_to(seen: Measurement, file: ModelFile, names: list[str]) -> Covariance:
-    """What a fit of all quantities to a measurement would say of their errors."""
+    """Covariance that a fit of all quantities to a measurement would give."""
     opened = judged(open_measurements([seen], file))
     model = file.model
     # One number stands for all speeds of the duty table, or they stand for it.

@@ -38,7 +38,7 @@ class Phase:
 
     @property
     def axes(self) -> list[Axis]:
-        """What the sweep varied, in the order of its dimensions."""
+        """Axes of the sweep, in the order of its dimensions."""
         return self.request.axes
 
     @property

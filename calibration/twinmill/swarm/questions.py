@@ -81,7 +81,7 @@ def _spans(places: list[int]) -> list[tuple[int, int]]:
 
 
 def axes_for(question: Question, drive: str) -> list[str]:
-    """What is varied to answer."""
+    """Axes to vary for an answer."""
     if question is Question.HOW_MANY:
         return ["n=3:14:12"]
     if question is Question.HOW_FAST:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What determines a sweep's result, to the byte, and the cells that follow from it."""
+"""Inputs that fix a sweep's result to the byte, and the cells that follow from them."""
 
 import hashlib
 import itertools
@@ -75,7 +75,7 @@ class Request:
 
     @property
     def sha256(self) -> str:
-        """Of everything in it, the model's text included."""
+        """Hash of everything in it, the model's text included."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()
 
     @property
@@ -179,7 +179,7 @@ class Request:
         return self.duration_s / model.get("base.control_period_s")
 
     def kernel(self, cell: native.Cell) -> str:
-        """What runs a cell: batched, full or mujoco."""
+        """Engine that runs a cell: batched, full or mujoco."""
         if self.plant == "mujoco":
             return "mujoco"
         return "full" if self.full or cell.why_not_batched else "batched"
@@ -236,7 +236,7 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
 
 
 def without_axes(request: Request) -> Request:
-    """The same swarm, each single value of an axis written into the model.
+    """Request with each single value of an axis written into the model.
 
     Raises:
         ValueError: an axis has several values, or is no quantity of the model file.

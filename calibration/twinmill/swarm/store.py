@@ -53,7 +53,7 @@ class Store:
         self._part(0).parent.mkdir(exist_ok=True)  # not before the folder says what it is for
 
     def read_manifest(self) -> dict:
-        """What the folder was made for: the `request`, and its `sha256`."""
+        """Manifest of the folder: the `request` it was made for, and its `sha256`."""
         return json.loads(self._manifest.read_text())
 
     def missing(self, count: int) -> list[int]:

@@ -117,7 +117,7 @@ def run_missing(
     *,
     dask: str | None = None,
 ) -> int:
-    """The same without a word.
+    """Runs the missing cells silently; returns how many.
 
     Args:
         request: the sweep.

@@ -58,7 +58,7 @@ class Ball:
 
 @dataclass(frozen=True)
 class PictureResult:
-    """What the firmware makes of one picture.
+    """Firmware's answer for one picture.
 
     Attributes:
         mask: (H, W) pixels inside the limits.
@@ -162,7 +162,7 @@ class Fitted:
 
 
 def overlap(a: Box, b: Box) -> bool:
-    """Whether some colour is inside both."""
+    """True if some colour is inside both."""
     return all(max(a[k], b[k]) <= min(a[k + 1], b[k + 1]) for k in (0, 2, 4))
 
 

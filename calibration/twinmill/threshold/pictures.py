@@ -52,7 +52,7 @@ class Picture:
         )
 
     def in_light(self, times: float) -> "Picture":
-        """The same scene in more or less light."""
+        """Scene in more or less light."""
         zero = np.tile([16, 128], self.yuyv.shape[1] // 2)
         yuyv = np.clip(np.rint(zero + times * (self.yuyv - zero)), 0, 255).astype(np.uint8)
         return Picture(f"{self.name} in {times:g} times the light", yuyv)
@@ -139,7 +139,7 @@ def from_camera(device: str, count: int, size_px: tuple[int, int]) -> list[Pictu
 
 
 def from_robot(remote: Remote, count: int, size_px: tuple[int, int]) -> list[Picture]:
-    """The same on a robot, whose program stands aside meanwhile.
+    """Takes pictures on a robot, whose program stands aside meanwhile.
 
     Raises:
         ValueError: as from_camera, or the robot cannot be reached.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot sees with the old limits and with the new ones, as a picture."""
+"""Picture of the robot's sight with the old limits and with the new ones."""
 
 from pathlib import Path
 

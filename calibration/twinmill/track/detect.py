@@ -116,7 +116,7 @@ def check_single(seen: Sightings) -> None:
 
 
 def gather(found: list[tuple[np.ndarray, np.ndarray]]) -> Sightings:
-    """What Detector.find gave for each frame of a film."""
+    """Sightings gathered from the answers of Detector.find for each frame of a film."""
     counts = [len(numbers) for numbers, _ in found]
     return Sightings(
         np.repeat(np.arange(len(found)), counts),

@@ -62,7 +62,7 @@ class View:
 
 @dataclass(frozen=True)
 class Floor:
-    """What was measured.
+    """Measured points and tags on the floor, with the pixels that show them.
 
     Attributes:
         place_m: (N, 2) in W.

@@ -22,7 +22,7 @@ STEEP = 0.03  # of the focal length: its standard error
 
 @dataclass(frozen=True)
 class Calibration:
-    """What was found.
+    """Lens that a calibration found.
 
     Attributes:
         camera: the lens.
@@ -51,7 +51,7 @@ class Calibration:
         }
 
     def notes(self) -> dict:
-        """What its file says of it."""
+        """Remarks that its file keeps with it."""
         return {
             "error_px": self.error_px,
             "views": self.views,

@@ -35,7 +35,7 @@ Found = tuple[np.ndarray, np.ndarray]  # of Detector.find
 
 @dataclass(frozen=True)
 class FrameDetections:
-    """What one picture showed.
+    """Detections in one picture.
 
     Attributes:
         camera: which of them.
@@ -57,7 +57,7 @@ class FrameDetections:
 
 @dataclass
 class LiveCount:
-    """What was done so far.
+    """Counts of a live run so far.
 
     Attributes:
         frames: looked at.

@@ -44,7 +44,7 @@ def locate(view: View, corners_px: np.ndarray, size_m: float, height_m: float) -
 def fit_squares(
     view: View, corners_px: np.ndarray, met_m: np.ndarray, size_m: float, *, height_m: float
 ) -> Squares:
-    """The same from (N, 4, 2) m, the corners on the plane."""
+    """Squares fitted to (N, 4, 2) m, the corners on the plane."""
     middle = met_m.mean(axis=1)
     # As complex numbers the best turn is the angle of the sum of products, the best scale its size.
     arms = (met_m - middle[:, None]) @ [1, 1j]

@@ -21,7 +21,7 @@ FEWEST = 3  # sightings of a robot that was not asked for
 
 @dataclass(frozen=True)
 class Tags:
-    """What is printed on the robots.
+    """Tags as printed on the robots.
 
     Attributes:
         size_m: side of the black square.

@@ -80,7 +80,7 @@ class Quality:
 
     @property
     def warnings(self) -> list[str]:
-        """What makes poses wrong that look quiet."""
+        """Faults that make poses wrong though they look quiet."""
         said = [self._backwards(r.robot_id) for r in self.robots if r.backward_share > BACKWARDS]
         worst_px = max((r.error_px for r in self.robots if np.isfinite(r.error_px)), default=0.0)
         if worst_px >= CORNERS_PX:
@@ -91,7 +91,7 @@ class Quality:
         return said
 
     def _backwards(self, robot_id: int) -> str:
-        """What a heading that is opposite to the motion may come from, and what to do."""
+        """Causes of a heading opposite to the motion, and advice."""
         other = other_drawing(self.family)
         drawn = other and (
             f"if its tag is drawn as {'AprilTag' if other.startswith('tag') else 'OpenCV'} draws "
@@ -107,7 +107,7 @@ class Quality:
 
     @property
     def sentence(self) -> str:
-        """What it means for a diagnosis."""
+        """Consequence for a diagnosis."""
         if not np.isfinite(self.weakest_wheel):
             return "Too few frames follow one another to tell how noisy the poses are."
         near_m, far_m = (1e3 * m for m in self.position_over_floor_m)

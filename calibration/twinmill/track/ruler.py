@@ -46,7 +46,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Ruler:
-    """What the poses say of a ruler.
+    """Agreement of the poses with a ruler along which a tag was moved by hand.
 
     Attributes:
         stops: in the order of the marks.
@@ -71,7 +71,7 @@ class Ruler:
 
     @property
     def good(self) -> bool:
-        """Whether each stop is where the ruler says."""
+        """True if each stop is where the ruler says."""
         return self.miss_m <= GOOD_M and self.turn_rad <= GOOD_RAD
 
     @property

@@ -37,7 +37,7 @@ class Pair:
 
 
 def clocks(films: list[Paths], names: list[str]) -> list[Pair | None]:
-    """Of each film what puts it on the clock of the first, for which it is None.
+    """Shift of each film to the clock of the first, for which it is None.
 
     A film is compared with all that are placed already: neighbours overlap, not all with all.
 
@@ -66,7 +66,7 @@ def compared(a: Paths, b: Paths) -> Pair | None:
 
 
 def on_clock(paths: Paths, shift_s: float) -> Paths:
-    """The same paths on another clock."""
+    """Paths on another clock."""
     return [replace(path, t_s=path.t_s + shift_s) for path in paths]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is shown: robots and twins from above, their bits and scores over time, in Rerun."""
+"""Scene in Rerun: robots and twins from above, their bits and scores over time."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -71,7 +71,7 @@ class Shown:
 
     @property
     def color(self) -> list[int]:
-        """Of all twins, or of all robots."""
+        """Colour of all twins, or of all robots."""
         return _rgb(COLORS[self.prefix])
 
     def poses(self, t_s: np.ndarray, payloads: Sequence[bytes]) -> None:

@@ -28,7 +28,7 @@ AWAITED = ("fit", "add", "diagnose", "next", "swarm")  # work that the user wait
 
 
 def moves(effect: str) -> bool:
-    """Whether an effect changes the motion, as all but those of the camera do."""
+    """True if an effect changes the motion, as all but those of the camera do."""
     return not is_of_camera(effect)
 
 
@@ -122,7 +122,7 @@ class Bench:
             self.changed("robots")
 
     async def aside(self, act: Callable[..., Any], *arguments: Any) -> Any:
-        """What takes long, in a thread of its own."""
+        """Runs a slow act in a thread of its own."""
         self.threads += 1
         try:
             return await asyncio.to_thread(act, *arguments)
@@ -142,7 +142,7 @@ class Bench:
 
     @property
     def ready(self) -> bool:
-        """Whether the robot that is shown was judged."""
+        """True if the robot that is shown was judged."""
         return self.picked in self.session.robots
 
     def drag(self, name: str, value: float) -> None:
@@ -166,7 +166,7 @@ class Bench:
 
     @property
     def progress(self) -> str:
-        """What the worker is doing and for how long, in words."""
+        """Worker's task and its time so far, in words."""
         if self._waiting:
             before = self.worker.work
             scores = before is not None and before.kind == "compare"
@@ -246,7 +246,7 @@ class Bench:
         self.changed("work", "model", "score")
 
     def _next(self) -> None:
-        """What waits; else the exact score of a model that a hand made."""
+        """Starts waiting work; else the exact score of a model that a hand made."""
         if self.worker.busy:
             return
         if self._waiting:
@@ -299,7 +299,7 @@ class Bench:
         return pack_robot(self.session.robots[index], raw, frames_of(raw), self.session.given.model)
 
     def prediction_bytes(self, index: int) -> bytes:
-        """What the model shown says of one robot; under a hand of fewer moments, at once."""
+        """Prediction of one robot by the model shown; under a hand of fewer moments, at once."""
         shown, beside = self.session.shown(index).model, self.session.beside_of(index)
         revision = self.changes["prediction"]
         view, seen = self.session.robots[index], self.session.detections(index)

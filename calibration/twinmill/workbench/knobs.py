@@ -62,7 +62,7 @@ class Knob:
 
     @property
     def step(self) -> float:
-        """Of the knob: a round number."""
+        """Step of the knob: a round number."""
         rough = (self.high - self.low) / HAND
         return 10 ** math.floor(math.log10(rough)) if rough > 0 else 1e-6
 

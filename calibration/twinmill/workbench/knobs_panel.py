@@ -85,7 +85,7 @@ class _Row(ui.element, component="static/knob.js"):
         self.update()
 
     async def _keep(self, event: events.GenericEventArguments) -> None:
-        """What a hand let go, or typed."""
+        """Keeps the value that a hand let go, or typed."""
         knob, asked = self.knob, float(event.args)
         value = min(max(asked, knob.least), knob.most)
         if value != asked:

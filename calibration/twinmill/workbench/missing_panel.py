@@ -33,7 +33,7 @@ class MissingPanel:
         self.draw_beside()
 
     def draw_progress(self) -> None:
-        """What is being done, or why it was not."""
+        """Shows the work under way, or the reason why there is none."""
         doing, ready = self.bench.doing, self.bench.ready
         self.button.set_visibility(doing is None)
         self.button.set_enabled(ready)
@@ -45,7 +45,7 @@ class MissingPanel:
             button.set_enabled(ready and doing is None)
 
     def draw_beside(self) -> None:
-        """What an effect that is tried would change, in one sentence."""
+        """Shows, in one sentence, the change by an effect that is tried."""
         beside = self.bench.session.beside
         for label, buttons in self._trying.items():
             on = beside is not None and beside.label == label
@@ -191,7 +191,7 @@ class MissingPanel:
             ui.label("The smallest difference from the model beyond doubt.").classes("soft")
 
     def _others(self, found: dict) -> None:
-        """What else was tried, best first."""
+        """Lists the other effects that were tried, best first."""
         named = {n for f in found["findings"] for n in (f["group"] or [f["effect"]])}
         others = [r for r in found["ranking"] if r["effect"] not in named][:OTHERS]
         if not others:
@@ -207,7 +207,7 @@ class MissingPanel:
 
 
 def _told(effect: str) -> None:
-    """What the catalogue says of an effect."""
+    """Shows the catalogue's text on an effect."""
     entry = catalogue().get(effect)
     if entry:
         ui.label(entry["summary"])

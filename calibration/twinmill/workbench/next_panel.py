@@ -50,7 +50,7 @@ class NextPanel:
         await self.page.start("next", options=asked)
 
     def draw_progress(self) -> None:
-        """What is being done, or why it was not."""
+        """Shows the work under way, or the reason why there is none."""
         doing = self.bench.doing
         self.button.set_visibility(doing is None)
         self.button.set_enabled(self.bench.ready)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all panels use: what their page does for them; numbers, tones and refusals in words."""
+"""Services of their page to all panels; numbers, tones and refusals in words."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from twinmill.workbench.bench import Bench
 
 
 class PageActions(Protocol):
-    """What a panel may ask of the page that shows it.
+    """Requests that a panel may make of the page that shows it.
 
     Attributes:
         bench: what all pages show.

@@ -39,7 +39,7 @@ NOTHING_HERE = "There is no page at this address; take the whole address that tw
 
 
 class View(BaseModel):
-    """What a page tells of its stage: cursor, stretch and horizon in s, rate of play."""
+    """View of the stage on a page: cursor, stretch and horizon in s, rate of play."""
 
     t: FiniteFloat = 0.0
     span: tuple[FiniteFloat, FiniteFloat] = (0.0, 0.0)

@@ -204,14 +204,14 @@ class Session:
         self.score_now(exact=self.tree.current.number == 0)
 
     def raw(self, index: int) -> RobotLog:
-        """What was recorded of a robot that is predicted."""
+        """Recorded log of a robot that is predicted."""
         of = self.measurements[index]
         log = next(log for log in self.logs if log.sha256 == of.log_sha256)
         return log.robots[of.track.robot_id]
 
     @property
     def notes(self) -> list[str]:
-        """What is wrong with the input, and what was left out."""
+        """Faults of the input, and the parts of it that were left out."""
         mild = [str(f) for f in self.measurements.findings if not f.fatal]
         return [*self.measurements.excluded, *mild]
 
@@ -229,7 +229,7 @@ class Session:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the file of the model as given holds another one by now, or is gone."""
+        """True if the file of the model as given holds another one by now, or is gone."""
         try:
             return self.given.path.read_text() != self.given.text
         except OSError:
@@ -237,16 +237,16 @@ class Session:
 
     @property
     def is_dragged(self) -> bool:
-        """Whether a hand holds a knob."""
+        """True if a hand holds a knob."""
         return bool(self._dragged)
 
     @property
     def is_passing(self) -> bool:
-        """Whether the model shown is not in the tree: a hand holds a knob, or a fit goes on."""
+        """True if the model shown is not in the tree: a hand holds a knob, or a fit goes on."""
         return bool(self._dragged or self._previewed)
 
     def knobs(self) -> list[Knob]:
-        """Of the model where the tree stands."""
+        """Knobs of the model where the tree stands."""
         tried = self.tree.current
         told = self.tree.model_file(tried.parent) if tried.values else self.model_file
         return knobs(self.model_file, told, self._judged)
@@ -353,7 +353,7 @@ class Session:
         return [o for o in opened if o.data is not None]
 
     def _free(self, model: native.Model) -> list[Parameter]:
-        """What a fit of these logs moves."""
+        """Parameters that a fit of these logs moves."""
         base = base_parameters(model, base_names(model, self._judged))
         return [*base, *all_effect_parameters(model)]
 
@@ -440,7 +440,7 @@ class Session:
         return total_score([self.shown(k).score for k in self._foremost(index)])
 
     def score_beside(self, index: int) -> float:
-        """The same of the model beside."""
+        """Score of the model beside."""
         known = self.beside.opened
         return total_score([known[k].score for k in self._foremost(index) if k in known])
 
@@ -451,7 +451,7 @@ class Session:
         return self.beside.label, self.beside.opened[index].model
 
     def detections(self, index: int) -> Detections | None:
-        """What its camera told, with the paths of its log's other robots; None without them."""
+        """Detections of its camera, with the paths of its log's other robots; None without them."""
         if index not in self._bits and not self.unjudged:
             self._bits[index] = self._detections_of(index)
         return self._bits.get(index)
@@ -468,7 +468,7 @@ class Session:
         return made if made.usable.any() else None
 
     def own_scores(self) -> dict[int, float]:
-        """Of each robot where the tree stands; NaN without a floor."""
+        """Score of each robot where the tree stands; NaN without a floor."""
         return self._own_scores(self.tree.current.number)
 
     def _own_scores(self, number: int) -> dict[int, float]:
@@ -486,7 +486,7 @@ class Session:
         return self.robots[index].moments(self.shown(index).model)[group, regime]
 
     def score_now(self, exact: bool = False) -> None:
-        """Of all robots where the tree stands, unless it is known."""
+        """Scores all robots where the tree stands, unless that is known."""
         tried = self.tree.current  # a hand may lead the tree elsewhere meanwhile
         if self.unjudged or not self.checked or tried.number in self.tree.scores:
             return
@@ -500,7 +500,7 @@ class Session:
     # -- long work ------------------------------------------------------------------------------
 
     def work(self, kind: str, effect: str = "", options: Mapping | None = None) -> Work:
-        """What a worker is told to do with the model where the tree stands."""
+        """Task for a worker on the model where the tree stands."""
         number = self.tree.current.number
         if kind in ("next", "swarm"):
             name, text = self.tree.file_name(number), self.tree.tried[number].text
@@ -555,7 +555,7 @@ class Session:
     # -- state ----------------------------------------------------------------------------------
 
     def to_json(self) -> dict:
-        """What must not be lost: models, what is held, findings, of swarms all but poses."""
+        """State that must not be lost: models, held knobs, findings, of swarms all but poses."""
         return {
             "tree": self.tree.to_json(),
             "held": sorted(self.held),
@@ -572,7 +572,7 @@ class Session:
         return hashlib.sha256(words.encode()).hexdigest()
 
     def restore(self, data: Mapping) -> None:
-        """What `to_json` gave, of the same logs and model; nothing is done without data.
+        """Restores the state from `to_json`, of equal logs and model; does nothing without data.
 
         Raises:
             ModelError: it is of others.
@@ -597,11 +597,11 @@ def effect_of(effect: str, robot_id: int | None) -> str:
 
 
 def beside_label(effect: str, robot_id: int | None) -> str:
-    """Of the model that has it, drawn beside."""
+    """Label of the model with an effect, drawn beside."""
     return f"with {effect_of(effect, robot_id)}"
 
 
 def _from_here(opened: Opened) -> Opened:
-    """The same, whose clock a fit looks for from where it is."""
+    """Log whose clock a fit looks for from where it is."""
     own = tuple(p.at(opened.model.get(p.name)) for p in opened.data.own)
     return replace(opened, data=replace(opened.data, own=own))

@@ -62,7 +62,7 @@ class StateFile:
 
 
 def _session(path: Path, kept: bytes) -> dict[str, Any]:
-    """What the file holds, which is replaced: so it has to be ours."""
+    """Session in the file, which will be replaced: so it has to be ours."""
     try:
         data = json.loads(kept)
     except ValueError:  # of letters that are none, too

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a swarm of robots would do with a model: the twin, from several starts, and its phases."""
+"""Forecast of a swarm of robots with a model: the twin, from several starts, and its phases."""
 
 import shlex
 import subprocess
@@ -34,7 +34,7 @@ def swarm_commands(model: str, options: Mapping[str, Any]) -> list[str]:
 
 
 def _words(model: str, options: Mapping[str, Any], seed: int) -> list[str]:
-    """Of `twin_run`."""
+    """Arguments of `twin_run`."""
     return [
         *("--plant", "planar", "--model", model, "--n", str(options["n"])),
         *("--behavior", options["behavior"], "--duration-s", f"{options['duration_s']:g}"),
@@ -45,7 +45,7 @@ def _words(model: str, options: Mapping[str, Any], seed: int) -> list[str]:
 def run_swarms(
     texts: Mapping[str, str], options: Mapping[str, Any], say: Callable[[str], None]
 ) -> dict[str, dict]:
-    """The same swarm from the same starts with each model.
+    """Swarms of each model, from equal starts.
 
     Args:
         texts: of model files, by label.
@@ -84,12 +84,12 @@ def run_swarms(
 
 
 def has_poses(told: Mapping[str, Any]) -> bool:
-    """Whether what the worker told of swarms can be played; what was kept in a file cannot."""
+    """True if the worker's swarms can be played; those kept in a file cannot."""
     return all("pose" in swarm for swarm in told["swarms"].values())
 
 
 def without_poses(told: Mapping[str, Any]) -> dict[str, Any]:
-    """What the worker told of swarms, less what is too much to be kept."""
+    """Worker's word on swarms, less the poses, which are too much to be kept."""
     swarms = {
         label: {name: value for name, value in swarm.items() if name not in ("t_s", "pose")}
         for label, swarm in told["swarms"].items()
@@ -98,7 +98,7 @@ def without_poses(told: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def phase_diagram(text: str, options: Mapping[str, Any], say: Callable[[str], None]) -> list[dict]:
-    """What becomes of the swarm of a model whose robots are faster or turn faster by a factor.
+    """Classes of the swarm of a model whose robots are faster or turn faster by a factor.
 
     Returns:
         For each cell `speed` and `turn` (factors), `class` (the most frequent) and `share`.
@@ -147,7 +147,7 @@ def _run(place: Path, model: native.Model, options: Mapping[str, Any], seed: int
 
 
 def _logged(place: Path, words: list[str]) -> Log:
-    """Of a run of the twin, whose file is gone at once."""
+    """Log of a run of the twin, whose file is gone at once."""
     command = [str(find_program("twin_run")), *words]
     done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -64,7 +64,7 @@ class SwarmPanel:
         await self.page.start("swarm", options=asked)
 
     def draw_progress(self) -> None:
-        """What is being done, or why it was not."""
+        """Shows the work under way, or the reason why there is none."""
         doing = self.bench.doing
         self.button.set_visibility(doing is None)
         self.progress.set_text(self.bench.progress if doing else "")
@@ -72,7 +72,7 @@ class SwarmPanel:
         self.failure.set_visibility(bool(self.bench.failure))
 
     def draw(self) -> None:
-        """What came of the last run."""
+        """Shows the result of the last run."""
         self.draw_progress()
         self.body.clear()
         swarm = self.bench.session.swarm

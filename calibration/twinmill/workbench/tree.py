@@ -41,7 +41,7 @@ class Tried:
 
 @dataclass
 class Score:
-    """Of one model on the logs.
+    """Score of one model on the logs.
 
     Attributes:
         fitted: on all data, as `compare` says it.
@@ -77,12 +77,12 @@ class Tree:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there was a model before."""
+        """True if there was a model before."""
         return self._place > 0
 
     @property
     def can_redo(self) -> bool:
-        """Whether undo left one behind."""
+        """True if undo left one behind."""
         return self._place < len(self._past) - 1
 
     def undo(self) -> None:
@@ -128,7 +128,7 @@ class Tree:
     # -- files and commands ---------------------------------------------------------------------
 
     def file_name(self, number: int) -> str:
-        """Of a model, until it is saved under another."""
+        """Default name of a model's file, until it is saved under another."""
         return self.name if number == 0 else f"{Path(self.name).stem}-{number}.toml"
 
     def model_file(self, number: int) -> ModelFile:
@@ -177,7 +177,7 @@ class Tree:
         }
 
     def restore(self, data: Mapping) -> None:
-        """What `to_json` gave."""
+        """Restores the tree from `to_json`."""
         self.tried = [Tried(**{**t, "verb": tuple(t["verb"])}) for t in data["tried"]]
         self.scores = {int(k): Score(**s) for k, s in data["scores"].items()}
         self._past, self._place = list(data["past"]), int(data["place"])

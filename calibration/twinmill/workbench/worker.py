@@ -21,7 +21,7 @@ YIELDS = 2  # niceness: what the user's hands do goes before
 
 @dataclass(frozen=True)
 class Work:
-    """What is to be done.
+    """Task for the worker.
 
     Attributes:
         kind: read, compare, fit, add, diagnose, next or swarm; most read the logs if that was
@@ -52,7 +52,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Done:
-    """What came of it: `result` as the command's --json, `text` of the new model; or `failure`."""
+    """Result of a task: `result` as the command's --json, `text` of the new model; or `failure`."""
 
     work: Work
     result: Mapping[str, Any]
@@ -77,7 +77,7 @@ class Worker:
 
     @property
     def busy(self) -> bool:
-        """Whether there is work under way."""
+        """True if there is work under way."""
         return self.work is not None
 
     @property
@@ -101,7 +101,7 @@ class Worker:
         self._pipe.send(work)
 
     def poll(self) -> Done | None:
-        """What is done by now; None while it goes on."""
+        """Finished task; None while it goes on."""
         if not self.busy:
             return None
         try:

@@ -57,7 +57,7 @@ class Case:
     adds_floors: tuple[float, ...]
 
     def to_json(self) -> dict:
-        """What is hidden in the log, as the sealed answers keep it."""
+        """Sealed answer to the case: every hidden effect with its sizes."""
         return {
             "case": self.number,
             "kind": self.kind,
@@ -121,7 +121,7 @@ def seal(cases: list[Case]) -> str:
 
 
 def _hidden(kind: str, plan: Plan, random: np.random.Generator):
-    """What is hidden with its sizes, or None where what was drawn cannot show in this drive."""
+    """Draws hidden effects and their sizes; None if the drawn ones cannot show in this drive."""
     if kind == "none":
         return (), ()
     robot = plan.robot
@@ -145,7 +145,7 @@ def _hidden(kind: str, plan: Plan, random: np.random.Generator):
 
 
 class Floors:
-    """What noise alone does to a plan, and what a hidden effect adds to it."""
+    """Errors that noise alone leaves in a plan, and those that a hidden effect adds to them."""
 
     def __init__(self, plan: Plan):
         self._plan = plan
@@ -164,7 +164,7 @@ class Floors:
         return float(np.sqrt(np.mean((whitened - taken) ** 2)))
 
     def sized(self, hidden: Hidden, wanted: float) -> tuple[Hidden, float]:
-        """The same effect at the wanted size, as far as it goes."""
+        """Scales an effect towards the wanted size, as far as its parameters allow."""
         by, adds = 1.0, self.adds(hidden)
         for _ in range(4):
             if not hidden.grows or abs(adds / wanted - 1) < 0.1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether 95 % intervals of fits cover the truth as often as they say, each quantity by itself.
+"""Coverage of the truth by 95 % intervals of fits, counted for each quantity by itself.
 
 Robots are drawn and driven as in the exam, on formulas of their own, with effects whose numbers are
 known; their owner knows which effects there are, but no number of them, and the base by some
@@ -85,7 +85,7 @@ def _sized(form: Hidden, random: np.random.Generator) -> Hidden:
 
 
 def errors(known: Known, fitted: dict) -> list[dict]:
-    """Of each quantity whose truth is known its error in standard errors.
+    """Error, in standard errors, of each quantity whose truth is known.
 
     Args:
         known: the drive.

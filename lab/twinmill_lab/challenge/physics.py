@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be hidden in a log: effects of the catalogue, their cousins, and what it does not name.
+"""Effects that can be hidden in a log: the catalogue's, their cousins, and some it does not name.
 
 The formulas are written down here a second time, over whole arrays, and share no code with the
 effects of the twin. A cousin is the same physics in another formula. Each form acts on one signal
@@ -22,7 +22,7 @@ TURNS_MPS = 1e-3  # of a wheel's rim: below it stands
 
 @dataclass(frozen=True)
 class Signals:
-    """What a form may look at, one row for each step of STEP_S.
+    """Time series that a form may depend on, one row for each step of STEP_S.
 
     Attributes:
         robot: that drives; where forces give it its lag, the forms of a lag see one without.
@@ -95,7 +95,7 @@ class Hidden:
     kin: tuple[str, ...] = ()
 
     def scaled(self, by: float) -> "Hidden":
-        """The same, larger or smaller."""
+        """Copy with the numbers that set its strength multiplied by a factor."""
         values = {k: v * by if k in self.grows else v for k, v in self.values.items()}
         return replace(self, values=values)
 
@@ -503,7 +503,7 @@ def _by_wheel(robot: Robot, drawn: np.ndarray) -> np.ndarray:
 
 
 def _of_the_ground(robot: Robot, random: np.random.Generator) -> list[Hidden]:
-    """What acts between wheels and floor; planar plant only."""
+    """Candidates that act between wheels and floor; only the planar plant has them."""
     sign, near = lambda: float(random.choice([-1, 1])), lambda: float(random.uniform(-0.4, 0.4))
     along_rad = float(random.uniform(0, np.pi))
     plain = [
@@ -553,7 +553,7 @@ def _of_the_ground(robot: Robot, random: np.random.Generator) -> list[Hidden]:
 
 
 def outside_forms(robot: Robot, random: np.random.Generator) -> list[Hidden]:
-    """What the catalogue does not name, with words for what it depends on."""
+    """Effects beyond the catalogue, each with words for what it depends on."""
     moment, hz = float(random.uniform(0.35, 0.65)), float(random.uniform(1.5, 3))
     compass = {"size_rad": 0.05}
     found = [

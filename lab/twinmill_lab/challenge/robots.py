@@ -60,7 +60,7 @@ class Robot:
 
     @property
     def sideways(self) -> bool:
-        """Whether it can move to its left without turning."""
+        """True if it can move to its left without turning."""
         return self.wheels != "differential"
 
     @property

@@ -40,7 +40,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Motion:
-    """What happened: steps of STEP_S, and the rows of the commands."""
+    """Driven run: steps of STEP_S, and the rows of the commands."""
 
     pose: np.ndarray
     rim_mps: np.ndarray
@@ -90,7 +90,7 @@ def play(plan: Plan, hidden: Sequence[Hidden] = (), forces: bool = False, calm: 
 
 
 def write_log(plan: Plan, motion: Motion, path: Path) -> None:
-    """What robot and motion capture would have said."""
+    """Writes the LCM log that robot and motion capture would have recorded."""
     robot, random = plan.robot, np.random.default_rng([plan.seed, 1])
     end_s = len(motion.pose) * STEP_S
     pose_s = np.arange(0.1, end_s - 0.1, 1 / robot.pose_hz)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether what was said of a case is right, and the figures over all cases.
+"""Judges an answer to a case as right or wrong, and sums the figures over all cases.
 
 Only what `twinmill diagnose --json` prints is looked at. A group of more than four names is as
 wrong as a wrong name, and every name beside the right one that is not there is counted. A doubtful
@@ -63,12 +63,12 @@ class Said:
 
     @property
     def sure(self) -> bool:
-        """Whether it is said to be this and nothing else."""
+        """True if the answer names this effect and nothing else."""
         return self.certainty == "sure"
 
     @property
     def names(self) -> frozenset[str]:
-        """What counts as named: nothing, if the group is too large to help."""
+        """Effects that count as named: none if the group is too large to help."""
         return frozenset() if len(self.group) > LARGEST_GROUP else self.group | {self.effect}
 
 
@@ -196,14 +196,14 @@ def _reliability(names: list[dict]) -> list[dict]:
 
 
 def _is_known(result: dict) -> bool:
-    """Whether another form was named, or said to be outside with what it depends on."""
+    """True if another form was named, or it was called outside with its dependence right."""
     outcome = result["outcome"]
     outside = result["verdict"] == "outside_catalogue" and outcome["depends"]
     return outcome["named"] or (outside and not outcome["wrong_and_sure"])
 
 
 def lost(result: dict) -> bool:
-    """Whether a case was not answered as it should be."""
+    """True if a case was not answered as it should be."""
     o = result["outcome"]
     return not {
         "none": not o["alarm"],
@@ -235,7 +235,7 @@ def _accepted(hidden: Hidden, case: Case) -> frozenset[str]:
 
 
 def _there(case: Case) -> frozenset[str]:
-    """What is there besides in a robot made of forces, in the base or not.
+    """Further effects that are present in a robot made of forces, in the base or not.
 
     It turns with another lag than it drives, and its mass drifts outward in arcs.
     """
@@ -252,7 +252,7 @@ def _rest(found: dict) -> dict:
 
 
 def _depends(hidden: tuple[Hidden, ...], told: dict) -> bool:
-    """Whether the strongest dependence, or the formula, speaks of the right thing."""
+    """True if the strongest dependence, or the formula, speaks of the right thing."""
     text = " ".join([*told["depends_on"][:2], str(told["formula"] or "")]).lower()
     words = "".join(c if c.isalpha() else " " for c in text).split()
     wanted = [w for h in hidden for w in h.depends_on]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was published of these swarms, run again and set against an independent program's numbers.
+"""Published claims about these swarms, run again beside an independent program's numbers.
 
 The claims are those of Vega et al. 2024 (arXiv 2410.16444). The reference is a C program of nothing
 but their equations, 100 seeds a cell unless said; "mills" there is circliness below 0.2 over the

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same diagram in MuJoCo, beside the planar plant: mass, slipping wheels, hulls."""
+"""Phase diagram of the paper in MuJoCo, beside the planar plant: mass, slipping wheels, hulls."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a camera's reach, angle and errors do to a mill, and what the simulation's step does."""
+"""Effect of a camera's reach, angle and errors on a mill, and of the simulation's step."""
 
 import numpy as np
 

@@ -35,7 +35,7 @@ class Swarm:
 
     @property
     def duration_s(self) -> float:
-        """Of a run."""
+        """Seconds that a run of the figure lasts."""
         return 180.0 if self.turn else 120.0
 
     def request(self, plant: str, seeds: int) -> Request:
@@ -65,12 +65,12 @@ PLANTS = {"planar": FLOOR, "mujoco": BEFORE}
 
 
 def requests(seeds: int) -> list[Request]:
-    """Of all swarms in both plants, in the order of the rows."""
+    """Runs to make for all swarms in both plants, in the order of the rows."""
     return [swarm.request(plant, seeds) for swarm in SWARMS for plant in PLANTS]
 
 
 def last_figure(seeds: int, folder: Path) -> Claim:
-    """Of runs that are there."""
+    """Claim of the last figure, judged from the runs that are in the folder."""
     rows: list[Row] = []
     for swarm in SWARMS:
         for plant in PLANTS:

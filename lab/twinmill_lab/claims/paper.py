@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the paper shows, part by part: which claims stand for it here, what its text leaves open.
+"""Parts of the paper: the claims that stand for each here, and what its text leaves open.
 
 Vega, Zhu, Mattson, Brown and Nowzari 2024 (arXiv 2410.16444).
 """
@@ -94,7 +94,7 @@ PARTS = (
 
 
 def answers(found: Sequence[Claim]) -> list[Answer]:
-    """Of the parts of which some claim ran, and of those that no claim is for."""
+    """Answer for each part of which a claim ran, and for each that no claim is for."""
     by_name = {claim.name: claim for claim in found}
     told = []
     for part in PARTS:

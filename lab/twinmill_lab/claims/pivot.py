@@ -102,7 +102,7 @@ def _circliness(trace: np.ndarray) -> np.ndarray:
 
 
 def mills() -> list[np.ndarray]:
-    """Of the runs that end nearest to each rung of circliness, the moment that is nearest."""
+    """Snapshots of mills: for each rung of circliness the moment that comes nearest to it."""
     runs = run([*UNEVEN, *TARGET], seeds=RUNS)
     found = []
     for rung in CIRCLINESS:

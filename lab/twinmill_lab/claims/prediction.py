@@ -59,7 +59,7 @@ EDGES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)  # of what was said
 
 @dataclass(frozen=True)
 class Trial:
-    """What was said, and what came.
+    """Prediction for one laboratory beside the outcome there.
 
     Attributes:
         said: of the chosen cells.
@@ -160,7 +160,7 @@ def prediction(_seeds: int) -> Claim:
 
 
 def prediction_in_mujoco(folder: Path, tell: Callable[[int, int], None]) -> Claim:
-    """The same of laboratories whose robots are bodies in MuJoCo, by a planar model with bodies."""
+    """Claim about predictions for robots that are bodies in MuJoCo, by a planar model."""
     with tempfile.TemporaryDirectory(prefix="twinmill.") as swept:
         request, said = sealed_prediction(Path(swept), BODIED)
     found = reliability(Trial(said, laboratories_in_mujoco(request, said.points, folder, tell)))

@@ -43,7 +43,7 @@ class Row:
 
     @property
     def surprises(self) -> bool:
-        """Whether it differs and nobody knows why."""
+        """True if it differs from the reference and no known reason explains it."""
         return self.agrees is False and not self.known
 
     def to_json(self) -> dict:
@@ -74,12 +74,12 @@ class Claim:
 
     @property
     def outcome(self) -> str:
-        """What became of the claim, in two words."""
+        """Verdict on the claim in two words."""
         return {True: "as published", False: "not seen", None: "measured"}[self.seen]
 
     @property
     def agrees(self) -> bool:
-        """Whether all numbers that have a reference agree with it, or are known not to."""
+        """True if each number that has a reference agrees with it, or is known not to."""
         return not any(row.surprises for row in self.rows)
 
     @property

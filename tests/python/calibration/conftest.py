@@ -167,7 +167,7 @@ def run_log(tmp_path_factory) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def measure(run_log) -> Callable[..., Measurement]:
-    """The same, read and cleaned."""
+    """Reads and cleans a log of `run_log`."""
 
     def make(*arguments, **options) -> Measurement:
         (measurement,) = load_measurements([run_log(*arguments, **options)])

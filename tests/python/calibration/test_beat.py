@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What swings in time by itself is told, and what the drive makes swing is not taken for it."""
+"""Swings in time are told if they come by themselves, and not if the drive makes them."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What held-out frames weigh. Truth: draws and sums by numpy here."""
+"""Weight of held-out frames. Truth: draws and sums by numpy here."""
 
 from types import SimpleNamespace
 

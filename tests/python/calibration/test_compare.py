@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a comparison tells of several logs is of all of them."""
+"""A comparison of several logs speaks of all of them."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a log could tell that an effect is one number."""
+"""A log can, or cannot, tell that an effect is one number."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_a_heading_bias_that_is_of_one_side_of_the_room_is_not_one_number(
 def test_a_wheel_that_gets_weaker_as_its_motor_warms_is_no_weak_wheel(
     warms, tanh_robot, measure, true_model
 ):
-    """The same loss on the mean: from begin to end, or more and more."""
+    """Equal loss on the mean: from begin to end, or more and more."""
 
     class Weak(tanh_robot):
         def wheels_mps(self, duty):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a score adds up, and which data are left out together: algebra."""
+"""Sum of a score over data sets, and data that are left out together: algebra."""
 
 from dataclasses import replace
 

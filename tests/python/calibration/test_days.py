@@ -37,7 +37,7 @@ def _day(values) -> Day:
 
 
 def test_a_rank_is_false_exactly_as_often_as_it_says():
-    """Of N exchangeable scores each is as likely the new one: p takes k/N with chance 1/N each."""
+    """Among N exchangeable scores each is as likely the new one: p takes k/N with chance 1/N."""
     scores = [0.3, 2.0, 1.1, 0.7, 5.0]
     others = [scores[:k] + scores[k + 1 :] for k in range(5)]
     ranks = sorted(rank_p(s, o) for s, o in zip(scores, others, strict=True))
@@ -252,7 +252,7 @@ def test_a_band_of_equal_errors_is_the_prediction_interval_of_student():
 
 
 def test_a_steady_drift_within_the_band_is_a_trend():
-    """Of 8 values one order in 8! rises all the time, and one falls."""
+    """One order of 8 values in 8! rises all the time, and one falls."""
     rising = [0.9 + 0.004 * k for k in range(8)]
     assert all(a < b for a, b in pairwise(rising))
     found = drift([_calibration(k, v) for k, v in enumerate(rising)], 0.05)

@@ -238,7 +238,7 @@ def stopping_at(words: str):
 
 
 def test_stopped_it_tells_what_was_found_so_far(calibrated, case, diagnosed):
-    """Of two effects the first round finds the one that takes most; the second round is not run."""
+    """The first round finds the larger of two effects; the second round is not run."""
     whole = diagnosed("a")
     found = diagnose(case("a"), calibrated, progress=stopping_at("round 2: "), stoppable=True)
     assert found.search.stopped and found.to_json()["stopped"]

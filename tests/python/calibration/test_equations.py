@@ -19,7 +19,7 @@ HEAT_S, LOSS_PER_HEAT = 6.0, 8.0  # of a robot that warms; s^2/m^2
 
 @pytest.fixture(scope="module")
 def log(measure):
-    """Of the robot as it is."""
+    """Drive of the unchanged robot."""
     return measure(seed=5)
 
 
@@ -120,7 +120,7 @@ def test_a_number_at_its_bound_is_told_as_such():
 
 @pytest.fixture(scope="module")
 def warming(tanh_robot, measure):
-    """Of a robot that loses speed with its heat, whose time constant is 6 s."""
+    """Drive of a robot that loses speed with its heat, whose time constant is 6 s."""
 
     class Warming(tanh_robot):
         def hindered(self, motion):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What depends on one speed, one place or the time since a change is told, whatever its form.
+"""Dependence on one speed, one place or the time since a change is told, whatever its form.
 
 The robots are those of `conftest.py`; what hinders them is written here over whole motions.
 """
@@ -164,7 +164,7 @@ def test_a_driver_that_takes_no_small_change_depends_on_past_motion(
 
 
 def test_the_floor_follows_a_castor_that_swings_round(tanh_robot, measure, one_clock_base):
-    """What turns the robot then is no noise: its floor is nearly that of the robot without it."""
+    """A swinging castor's turns are no noise: the floor is nearly that of the robot without it."""
 
     class Hindered(tanh_robot):
         def hindered(self, motion):

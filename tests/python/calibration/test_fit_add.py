@@ -99,7 +99,7 @@ def test_a_clock_that_is_not_the_logs_is_no_noise(tanh_robot, measure, fitted):
 
 @pytest.fixture(scope="module")
 def coasting(tanh_robot, measure, fitted, tmp_path_factory):
-    """The same robot rolls on at zero duty with 0.7 m/s^2, in a log of its own."""
+    """Log in which the robot rolls on at zero duty with 0.7 m/s^2."""
     robot = tanh_robot(offset_s=OFFSET_S, coast_mps2=0.7)
     path = tmp_path_factory.mktemp("add") / "coasting.toml"
     return add(

@@ -58,7 +58,7 @@ def playing(tanh_robot, run_log) -> Path:
 
 @pytest.fixture(scope="module")
 def found(playing, one_clock_base, tmp_path_factory) -> dict:
-    """What `diagnose --json` says of that log, and the page of its report."""
+    """JSON of `diagnose` for that log, and the page of its report."""
     out = tmp_path_factory.mktemp("report")
     return diagnosed([str(playing), "--model", str(one_clock_base.path), "--out", str(out)]) | {
         "page": out
@@ -101,7 +101,7 @@ def test_the_printed_command_adds_it_as_it_stands(
 
 @pytest.fixture(scope="module")
 def explained(playing, one_clock_base, tmp_path_factory) -> dict:
-    """What `explain --json` says of that log; the model that it writes is under `model`."""
+    """JSON of `explain` for that log; the model that it writes is under `model`."""
     out = tmp_path_factory.mktemp("explained") / "explained.toml"
     said = io.StringIO()
     with redirect_stdout(said):

@@ -18,7 +18,7 @@ NAME = "the formula"
 def outdoing(
     effect: np.ndarray, formula: np.ndarray, errors: np.ndarray, name: str = "speed_curve"
 ) -> Rival | None:
-    """What outdoes an effect that moves the rows by `effect`, all (R,)."""
+    """Rival that outdoes an effect, which moves the rows by `effect`, all (R,)."""
     blocks = np.repeat(np.arange(BLOCKS), LONG)
     columns = np.column_stack([effect, formula])
     alike = {"weight": np.ones(len(errors)), "free": np.zeros((len(errors), 0))}
@@ -72,7 +72,7 @@ def test_a_formula_of_other_physics_does_not_take_the_effects_place(noise):
 
 
 def takes(first: np.ndarray, second: np.ndarray, errors: np.ndarray, family: np.ndarray) -> bool:
-    """Whether (R, k) formulas that make up a first effect take what a second one does."""
+    """True if (R, k) formulas that make up a first effect take the share of a second one."""
     blocks = np.repeat(np.arange(BLOCKS), LONG)
     own, larger = (
         Products(

@@ -99,7 +99,7 @@ def hiding(tanh_robot):
 
 @pytest.fixture
 def explained(measure, hiding, one_clock_base, tmp_path):
-    """What `explain` makes of drives of 80 s each."""
+    """Result of `explain` for drives of 80 s each."""
 
     def make(hindered, *seeds) -> Explanation:
         logs = [measure(hiding(hindered), seed, 80.0) for seed in seeds]
@@ -245,7 +245,7 @@ def test_what_is_switched_is_told_with_its_period_its_moments_and_its_size(expla
 
 
 def test_what_does_not_go_on_by_its_clock_is_told_and_not_taken(explained):
-    """What a part of the run does not share with the rest, another run does not share."""
+    """A swing that one part of the run lacks, another run lacks too."""
     result = explained(switched_for_a_while, 101)
     proven = result.diagnosis.rest.proven
     assert proven.names_time and not proven.goes_on

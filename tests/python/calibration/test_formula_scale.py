@@ -45,14 +45,14 @@ def base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
 
 @pytest.fixture(scope="module")
 def explained(warming, measure, base, tmp_path_factory) -> Explanation:
-    """What `explain` makes of one drive."""
+    """Result of `explain` for one drive."""
     out = tmp_path_factory.mktemp("explained") / "explained.toml"
     return explain([measure(warming(**SLOW), 101, 100.0)], base, out=out, command="")
 
 
 @pytest.fixture(scope="module")
 def added(warming, measure, base, tmp_path_factory) -> AddResult:
-    """What `add equation` makes of it, told the form."""
+    """Result of `add equation` for it, told the form."""
     return add(
         "equation",
         [measure(warming(**SLOW), 101, 100.0)],

@@ -34,7 +34,7 @@ def test_one_disturbance_in_two_channels_counts_once():
 
 
 def test_a_slow_wander_counts_as_often_as_it_is_new():
-    """Of a first-order process (1 - r) / (1 + r) of samples that are correlated by r."""
+    """A first-order process counts (1 - r) / (1 + r) of its samples, correlated by r."""
     lost_s = 3.0
     r = np.exp(-EVERY_S / lost_s)
     errors = normal(3)

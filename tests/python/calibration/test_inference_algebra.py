@@ -144,7 +144,7 @@ def test_two_moments_of_a_shift_are_found_and_no_third():
 
 
 def test_the_gain_of_moments_is_that_of_their_columns():
-    """What the greedy search adds up is the evidence with all columns at once."""
+    """The greedy search adds up to the evidence with all columns at once."""
     random = np.random.default_rng(5)
     white = random.normal(size=(31, 4, 150)).cumsum(axis=0)
     flat = white.reshape(31 * 4, -1)
@@ -258,7 +258,7 @@ OF_OTHERS = ("wheel_gain", "dead_zone", "motor_lag", "marker_offset", "floor_pat
 
 
 def table(entries, swells=()):
-    """Of ten effects, four of which act with time."""
+    """Evidence table for ten effects, four of which act with time."""
     kinds = planar_kinds()
     words = ("time", "place")
     return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, words, {}, dict(swells), kinds)
@@ -283,7 +283,7 @@ def test_flat_evidence_leaves_the_prior_odds():
 
 
 def test_what_one_block_alone_speaks_for_is_less_sure():
-    """The same evidence, spread over all blocks or in one: drawn again the one is often absent."""
+    """Equal evidence in all blocks or in one: drawn again, the one is often absent."""
     even = np.full(8, 1.5)
     single = np.r_[12.0, np.zeros(7)]
 

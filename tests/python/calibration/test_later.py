@@ -41,7 +41,7 @@ def late(tanh_robot):
 def test_a_log_whose_lateness_changes_gives_the_model_no_clock(
     stale, late, tanh_robot, run_log, measure, true_model, tmp_path
 ):
-    """The same robot without that link is predicted no worse by the new model than by the given."""
+    """The new model predicts the robot without that link no worse than the given one."""
     base, path = true_model, tmp_path / "explained.toml"
     if stale:
         stale_text = true_model.path.read_text().replace("yaw_gain = 0.8", "yaw_gain = 0.9")
@@ -103,7 +103,7 @@ def changing(tanh_robot, run_log, on_one_clock, true_model):
 
 @pytest.fixture(scope="module")
 def told_model(run_log, on_one_clock, tanh_robot, true_model, tmp_path_factory):
-    """What a log of the robot told, in which it follows its commands alike all the time."""
+    """Model told by a log of the robot in which it follows its commands alike all the time."""
     path = tmp_path_factory.mktemp("told") / "told.toml"
     fit(on_one_clock(run_log(tanh_robot(), 8, DURATION_S), true_model.model), true_model, path, "")
     return ModelFile.load(str(path))

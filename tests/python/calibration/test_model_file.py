@@ -155,7 +155,7 @@ def test_an_old_file_survives_a_write_that_fails(tmp_path, monkeypatch):
 
 
 def test_a_covariance_is_kept_and_a_later_fit_replaces_its_own_part(parent, fitted, tmp_path):
-    """Of what a later fit left alone the block stays; between the two fits nothing is known."""
+    """The block of quantities that a later fit left alone stays; between both nothing is known."""
     first = Covariance(("base.motor_lag_s", "dead_zone.width"), np.array([[4.0, 1], [1, 9]]) * 1e-6)
     then = Covariance(
         ("dead_zone.width", "floor_tilt.drift_x_mps"), np.array([[16.0, -2], [-2, 1]])

@@ -74,7 +74,7 @@ def test_the_base_shifts_as_least_squares_fits_it_to_the_trace():
 
 @pytest.mark.parametrize("added", [0.1, 0.2, 0.3, 0.5])
 def test_promised_chance_to_matter_is_that_of_simulated_scores(added):
-    """Of unit errors and what an effect adds: a diagnosis asks that it takes 2 % of the score."""
+    """Errors are unit ones and an effect's: a diagnosis asks that it takes 2 % of the score."""
     random = np.random.default_rng(6)
     left = random.normal(size=(4000, 40))
     own = added * np.resize([1.0, -1.0], 40)
@@ -255,7 +255,7 @@ def test_the_firmware_reads_the_script_as_it_was_meant(tmp_path):
 def test_the_command_writes_the_script_and_says_what_it_parts(
     designed, monkeypatch, capsys, tmp_path, coasting_robot
 ):
-    """What a run is designed from is tested above; here it is the ready plan."""
+    """The design of a run is tested above; here it is the ready plan."""
     monkeypatch.setattr(next_run, "plan_run", lambda *_: designed.plan)
     script, report = tmp_path / "script.csv", tmp_path / "report"
     words = ["next", coasting_robot.log, "--model", coasting_robot.model, "-o", script]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What recurs in time has its period in the model, and its moment in each log.
+"""Recurring errors have their period in the model, and their moment in each log.
 
 The robots are those of `conftest.py`; what takes power from them by the clock is written here.
 """

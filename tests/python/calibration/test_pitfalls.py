@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What misleads a diagnosis, each with a robot that is not the twin or with algebra."""
+"""Traps for a diagnosis, each with a robot that is not the twin or with algebra."""
 
 import re
 from dataclasses import replace
@@ -61,7 +61,7 @@ def fitted(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFile:
 
 @pytest.fixture(scope="module")
 def on_own_clock(fitted, tmp_path_factory) -> ModelFile:
-    """The same without what the log told of the clocks."""
+    """Model without the log's word on the clocks."""
     text = Path(fitted.path).read_text()
     path = tmp_path_factory.mktemp("own_clock") / "fitted.toml"
     path.write_text(text[: text.index("[clock]")] + text[text.index("[fit]") :])
@@ -157,7 +157,7 @@ def late(tanh_robot, measure):
 
 @pytest.fixture(scope="module")
 def lateness(late, fitted):
-    """What is said where the clocks are those of the log that the base was fitted to."""
+    """Verdict where the clocks are those of the log that the base was fitted to."""
     return diagnose([late], fitted)
 
 
@@ -204,7 +204,7 @@ def test_on_a_clock_of_its_own_a_log_tells_no_delay_and_says_why(late, on_own_cl
 
 
 def test_a_clock_that_is_declared_one_names_the_delay(tanh_robot, measure, on_own_clock):
-    """The same robot 80 ms late, from a log that says that one clock stamped all."""
+    """The robot is 80 ms late, in a log that says that one clock stamped all."""
     run = measure(replace(tanh_robot(), offset_s=0.08), 10, 40.0)
     declared = replace(run, track=replace(run.track, same_clock=True))
     found = diagnose([declared], on_own_clock)
@@ -242,7 +242,7 @@ def test_an_estimate_at_its_bound_is_said_to_be_doubtful(tanh_robot, measure, fi
 def test_a_log_without_any_noise_tells_no_more_than_there_is(
     tanh_robot, measure, model_file, tmp_path
 ):
-    """What is left is 480 Hz Euler against the twin's own step: micrometres, and no physics."""
+    """480 Hz Euler against the twin's own step leaves micrometres, and no physics."""
     silent = tanh_robot(sensor_m=0, sensor_rad=0, drive_mps=0, drive_radps=0)
     fit([measure(silent, 13, 30.0)], model_file(), tmp_path / "silent.toml", "")
     found = diagnose([measure(silent, 14, 30.0)], ModelFile.load(str(tmp_path / "silent.toml")))
@@ -471,7 +471,7 @@ def in_sum_limited(duty: np.ndarray) -> np.ndarray:
 
 
 def failing_at_32_s(duty: np.ndarray) -> np.ndarray:
-    """The same from a moment on: by a quarter."""
+    """Duties less a quarter from a moment on."""
     late = np.arange(len(duty)) * EULER_S > 32.5  # the script begins after half a second
     return np.where(late[:, None], 0.75 * duty, duty)
 
@@ -1108,7 +1108,7 @@ def test_numbers_that_alone_were_stale_may_stand_for_what_is_left(effects, rest,
     ("degrees", "certainty"), [(90, "sure"), (60, "sure"), (105, "sure"), (120, "doubtful")]
 )
 def test_effects_that_undo_each_other_are_doubtful(degrees, certainty, monkeypatch):
-    """What they do to the predictions stands at an angle of so many degrees."""
+    """Their changes of the predictions stand at an angle of so many degrees."""
     turned = np.radians(degrees)
     does = {"mass_offset": (3.0, 0.0), "marker_offset": (np.cos(turned), np.sin(turned))}
     monkeypatch.setattr(doubts, "newest_instance", lambda _, name: name)
@@ -1413,7 +1413,7 @@ def test_a_form_that_leaves_something_is_not_surely_the_one_of_its_family(
 
 
 def test_a_stretch_in_which_the_model_is_right_is_not_told():
-    """What an effect explains that was found later is no push, though the floor left it out."""
+    """A later found effect explains it: it is no push, though the floor left it out."""
     random = np.random.default_rng(5)
     start_s = 0.25 * np.arange(400)
     missed = random.normal(0, 1e-3, (400, 5, 3))

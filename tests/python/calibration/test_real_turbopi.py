@@ -47,7 +47,7 @@ def chain(measurements, tmp_path_factory):
 
 
 def curved(model, duty):
-    """What the motors get of a duty, as the card of speed_curve says."""
+    """Duty at the motors, as the card of speed_curve says."""
     bend, skew = model.get("speed_curve.bend"), model.get("speed_curve.skew")
     return duty + duty * (1 - duty) * (bend + skew * (1 - 2 * duty))
 

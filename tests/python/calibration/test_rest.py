@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is left over: errors that come again at their place, irregular motion, single wheels."""
+"""Kinds of rest: errors that come again at their place, irregular motion, single wheels."""
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -378,7 +378,7 @@ def test_nothing_is_not_firm(share, again, firm):
 
 
 def test_a_round_wheel_is_not_named_for_what_an_oval_one_does():
-    """The same formula of another wheel is another formula; errors follow the left one's."""
+    """Another wheel's formula is another formula; errors follow the left one's."""
     left, right, noise = np.random.default_rng(4).normal(size=(3, 800))
     terms = [
         Term(f"angle of the {side} wheels", "rim_mps", "cos(2*wheel_rad)*rim", 1.0, "angle")

@@ -284,7 +284,7 @@ def test_explain_gives_an_odd_robot_the_score_that_it_promises(
 
 
 def test_no_fault_of_one_robot_is_told_where_all_differ_in_lag(tanh_robot, measure, one_clock_base):
-    """Of the most sluggish play had been told: the others' lags made its own no difference."""
+    """For the most sluggish play had been told: the others' lags made its own no difference."""
     lags_s = [0.06, 0.1, 0.15, 0.2]
     runs = [measure(tanh_robot(lag_s=s), 360 + k, 40.0) for k, s in enumerate(lags_s)]
     robots = [replace(m, track=replace(m.track, robot_id=k)) for k, m in enumerate(runs)]

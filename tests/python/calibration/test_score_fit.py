@@ -67,7 +67,7 @@ def test_estimates_are_right_on_average(fits, truth):
 
 
 def test_intervals_cover_the_truth(fits, truth):
-    """Of 42 intervals of 95 % at least 36: a binomial of 0.95 has fewer once in 70 times."""
+    """At least 36 of 42 intervals of 95 %: a binomial of 0.95 has fewer once in 70 times."""
     names, values, stds = fits
     true = np.array([truth[name] for name in names])
     inside = np.abs(values - true) < 1.96 * stds
@@ -117,7 +117,7 @@ def test_an_interval_is_as_wide_as_runs_disagree(spread_s, tanh_robot, measure, 
 
 
 def chance_of_a_turned_marker(measurement, guess):
-    """What the fit of a model with `heading_bias` says of its being nothing."""
+    """Probability, by a fit with `heading_bias`, that it is nothing."""
     (opened,) = judged(open_measurements([measurement], guess))
     model = opened.model.copy()
     model.add_effect("heading_bias")

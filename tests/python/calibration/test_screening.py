@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the screening promises of an effect, against what its fit takes."""
+"""The screening's promise for an effect, against the gain of its fit."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is on at some times or in some places alone is found, wherever these are.
+"""Effects at some times or in some places alone are found, wherever these are.
 
 Truth: a robot that shares no code with the twin, with something done to it where and when is known.
 """
@@ -121,7 +121,7 @@ def opened(tanh_robot, measure, true_model):
 
 
 def left_by(opened, errors):
-    """What is left, if errors (R,) were all of it, and nothing else is free."""
+    """Rest if errors (R,) were all of it, and nothing else is free."""
     return Left([np.ones(len(errors))], [errors], [np.zeros((len(errors), 0))])
 
 
@@ -186,7 +186,7 @@ def test_no_search_begins_beyond_the_bounds_of_a_limit(opened):
 
 @pytest.mark.parametrize("edge", [0.29, 0.33, 0.37, 0.48, 0.57])
 def test_a_limit_is_found_from_where_nothing_reaches_it(edge, opened):
-    """Of wheels that stand below a duty: truth is the plant's own; few duties lie near it."""
+    """Wheels stand below a duty: truth is the plant's own; few duties lie near it."""
     model = opened.model.copy()
     model.add_effect("stiction")
     model.set("stiction.below", edge)

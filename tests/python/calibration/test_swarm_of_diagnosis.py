@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `diagnose` says of a swarm as a whole, after it judged each robot by itself."""
+"""Verdict of `diagnose` on a swarm as a whole, after it judged each robot by itself."""
 
 import os
 import subprocess

@@ -70,13 +70,13 @@ def said_by(words: list[str]) -> dict:
 
 @pytest.fixture(scope="module")
 def log(overshooting, run_log) -> Path:
-    """Of the robot that overshoots."""
+    """Drive of the robot that overshoots."""
     return run_log(overshooting(), 101, 60.0)
 
 
 @pytest.fixture(scope="module")
 def explained(log, one_clock_base, tmp_path_factory) -> dict:
-    """What `explain` says of it."""
+    """JSON of `explain` for that drive."""
     out = tmp_path_factory.mktemp("explained") / "swings.toml"
     return said_by(["explain", str(log), "--model", str(one_clock_base.path), "-o", str(out)])
 

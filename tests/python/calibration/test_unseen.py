@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a log cannot show by what it holds, or a robot by its wheels, and what to drive then."""
+"""A log's, or its robot's, blind spots are told, and the drive that would show them."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def test_no_robot_is_told_to_drive_where_its_wheels_do_not_go(wheels, model_text
 
 @pytest.fixture(scope="module")
 def without_voltage(tanh_robot, measure, model_file):
-    """Of a log of the robot as it is, whose battery nobody measured."""
+    """Log of the unchanged robot, whose battery nobody measured."""
     run = measure(tanh_robot(), 1, 20.0)
     unknown_V = np.full(len(run.track.command_t_s), np.nan)
     return diagnose([replace(run, track=replace(run.track, battery_V=unknown_V))], model_file())

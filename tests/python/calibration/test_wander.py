@@ -68,7 +68,7 @@ def test_logs_together_tell_one_wander():
 
 
 def test_the_noise_of_a_sensor_does_not_wander():
-    """Of four correlations each is beyond two standard errors on one side by 2.3 %."""
+    """Each of four correlations is beyond two standard errors on one side by 2.3 %."""
     assert sum(wandering([log(seed)]) is not None for seed in range(20)) <= 6
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a wheel does at its angle is told though the model has its radius wrong.
+"""A wheel's fault at its angle is told though the model has its radius wrong.
 
 The robots are those of `conftest.py`, with 0.0325 m in their model's file.
 """

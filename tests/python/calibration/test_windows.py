@@ -94,7 +94,7 @@ def test_displacement_is_the_same_wherever_and_however_the_room_is_turned(
 
 
 def test_a_heading_error_shows_as_motion_to_the_side(driven, modelled_of):
-    """The same path with poses that look 0.1 rad to the left of it: all moves to the right."""
+    """Poses look 0.1 rad to the left of the path: all moves to the right."""
     robot = driven()
     pose = robot.pose + np.array([0, 0, 0.1])
     modelled = modelled_of(replace(robot, pose=pose))
@@ -173,7 +173,7 @@ def test_a_lost_frame_takes_no_speed_away(driven, modelled_of):
 
 
 def test_models_side_by_side_drive_as_each_alone(driven, modelled_of):
-    """Of the floor alone, or of the wheels: duties 0.5 and 0.8 of what each one's wheels do."""
+    """Floor alone, or wheels: duties 0.5 and 0.8 of each one's own."""
     given = [(1.0, 0.4), (0.7, 0.4), (1.0, 0.2), (0.7, 0.2)]
     each = [modelled_of(driven(), yaw_gain, top_mps) for yaw_gain, top_mps in given]
     models = [own.model for own in each]

@@ -47,7 +47,7 @@ def test_what_inference_calls_sure_is_there(inferred):
 
 
 def test_inference_names_most_single_effects_first(inferred):
-    """Of half the usual length, so that one may be lost."""
+    """At least half of the effects, as one may be lost in half the usual length."""
     single = [r["outcome"]["first"] for r in inferred if r["kind"] in ("one", "cousin")]
     assert sum(single) >= len(single) - 1
 

@@ -90,7 +90,7 @@ def maker_3(folder: Path) -> None:
 
 @reads("NatNet", "the maker's client, NatNet 4", "natnetsdk==4.1.1", ours=_read((4, 1)))
 def maker_4(folder: Path) -> None:
-    """The same, of Motive 3.1."""
+    """Export in the format of Motive 3.1."""
     _heard_by_the_maker(folder, (4, 1))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What runs one other program on one file, and the table of what came of it.
+"""Runner of one other program on one file, and the table of the results.
 
 The other program's side of a cell runs in a Python of its own that has its packages alone, so its
 module imports at the top nothing but the standard library and this module.

@@ -23,7 +23,7 @@ def x_m(k: int) -> float:
 
 
 def seen(k: int) -> bool:
-    """Whether the capture had it in frame k."""
+    """True if the capture had it in frame k."""
     return k % 50 < 47
 
 
@@ -58,14 +58,14 @@ def events() -> Iterator[Event]:
 
 
 def export(folder: Path, to: str, name: str, more: Iterable[Event] = ()) -> None:
-    """What `twinmill export` makes of it."""
+    """Writes the log into a folder in the form that another program reads."""
     import twinmill as tm
 
     tm.load(write_log(folder, more)).export(folder / name, to=to)
 
 
 def told_at(log_path: Path) -> bool:
-    """Whether each command of a file that was imported is at the time of its frame."""
+    """True if each command of a file that was imported is at the time of its frame."""
     import numpy as np
 
     from twinmill.data.log import read_log
@@ -76,7 +76,7 @@ def told_at(log_path: Path) -> bool:
 
 
 def told_of_import(log_path: Path, kind: str) -> dict[str, bool]:
-    """What came of a file that was imported: times, places, gaps and commands."""
+    """Verdicts on a file that was imported: times, places, gaps and commands."""
     import numpy as np
 
     from twinmill.data.log import read_log

@@ -32,7 +32,7 @@ def _write(folder: Path) -> None:
 
 
 def _told(events: list[tuple[int, str, bytes]]) -> Told:
-    """What is in events; a pose's payload by the order of fields in pose_t.lcm, big-endian."""
+    """Facts in events; a pose's payload by the order of fields in pose_t.lcm, big-endian."""
     poses = [data for _, channel, data in events if channel == POSE]
     stamps = [at for at, _, _ in events]
     first = [struct.unpack_from(">q", data, 8)[0] for data in poses]

@@ -142,7 +142,7 @@ def mujoco_warp(folder: Path) -> Told:
 
 
 def _held_by(model) -> Told:
-    """What stands in a model that MuJoCo compiled."""
+    """Facts in a model that MuJoCo compiled."""
     import numpy as np
 
     numbers = {model.numeric(i).name for i in range(model.nnumeric)}
@@ -157,7 +157,7 @@ def _held_by(model) -> Told:
 
 
 def _moves(text: str, begin: Callable[[str], Step]) -> Told:
-    """What a straight drive shows, by algebra.
+    """Straight drive of the model beside algebra.
 
     It stands still for the delay, and has 1 - 1/e of its speed one lag later. The body settles a
     millisecond behind its wheels; a step more or less is allowed. With `actearly` it moves in the

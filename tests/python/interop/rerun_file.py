@@ -23,7 +23,7 @@ def _write(folder: Path) -> None:
 
 
 def _told(folder: Path, package: str) -> Told:
-    """What `rerun rrd` says of the file."""
+    """Facts that `rerun rrd` prints of the file."""
     (program,) = (p for p in packages_at(package).glob("**/rerun_cli/rerun"))
 
     def run(*words: str) -> subprocess.CompletedProcess:

@@ -53,7 +53,7 @@ def write(folder: Path, to: str, text: str = TEXT) -> Path:
 
 
 def held_by_drake(path: Path) -> dict[str, bool]:
-    """What stands in the plant that Drake makes of a file."""
+    """Facts in the plant that Drake makes of a file."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
 

@@ -52,7 +52,7 @@ def rclpy(folder: Path) -> Told:
 
 
 def _stands(heard: list[list[float]]) -> bool:
-    """Whether it drove the second row and then stood."""
+    """True if it drove the second row and then stood."""
     return tuple(heard[-10][2:]) == ROWS[1] and not any(heard[-1][2:])
 
 

@@ -70,7 +70,7 @@ def _driven_otherwise() -> Iterator[drive.Event]:
 
 
 def _told(rows: dict[str, list]) -> Told:
-    """What stands in topics, rows of (stamp of the bag in ns, message)."""
+    """Facts in topics, rows of (stamp of the bag in ns, message)."""
     poses, duties = rows["/r01/pose"], rows["/r01/duty_pct"]
     stamps_us = [m.header.stamp.sec * 10**6 + m.header.stamp.nanosec // 1000 for _, m in poses]
     here = [k for k in range(drive.COUNT) if drive.seen(k)]
@@ -96,7 +96,7 @@ def _stamped(rows: dict[str, list]) -> Told:
 
 
 def _frames(rows: dict[str, list]) -> Told:
-    """What `/tf` has beside them, and wheels."""
+    """Facts about `/tf` beside them, and wheels."""
     frames = [message.transforms[0] for _, message in rows["/tf"]]
     here = [k for k in range(drive.COUNT) if drive.seen(k)]
     return {
@@ -251,7 +251,7 @@ def foxglove_writes(folder: Path) -> None:
 
 
 def _stamp(k: int) -> tuple[int, int]:
-    """Of a stamped command, s and ns; all are of their frame but one, which has none."""
+    """Stamp of a command, s and ns; all are of their frame but one, which has none."""
     return divmod(1000 * (drive.START_US + k * drive.STEP_US) * (k != BARE), 10**9)
 
 

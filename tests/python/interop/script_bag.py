@@ -27,7 +27,7 @@ def _write(folder: Path) -> None:
 
 
 def _told(rows: list) -> Told:
-    """What stands in the bag, rows of (stamp in ns, Twist)."""
+    """Facts in the bag, rows of (stamp in ns, Twist)."""
     told = [(1e-9 * at_ns, (m.linear.x, m.linear.y, m.angular.z)) for at_ns, m in rows]
     at = [next(t_s for t_s, twist in told if twist == row) for row in ROWS]
     steps_s = [b - a for (a, _), (b, _) in pairwise(told)]

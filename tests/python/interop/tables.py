@@ -29,7 +29,7 @@ NAMED_TYPE = f"{UNTOLD_TYPE}, if named"
 
 
 def _told(x_m: list, volts: list, seq: list, float_types: bool, whole_type: bool) -> Told:
-    """What is in columns; what is missing is None or NaN."""
+    """Facts in columns; a missing cell is None or NaN."""
     missing = [value is None or value != value for value in x_m]
     return {
         "rows": len(x_m) == len(volts) == drive.COUNT,

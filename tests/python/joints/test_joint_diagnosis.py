@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an MJCF lacks is named, written so that stock MuJoCo has it, and told on a real machine.
+"""An MJCF's lack is named, written so that stock MuJoCo has it, and told on a real machine.
 
 The simulated slide is run by `mj_step` with what is planted in its XML or set as a force, by none
 of the code that judges it.

@@ -250,7 +250,7 @@ def circle(x_m: float, y_m: float, radius_m: float, rate_radps: float, phase_rad
 
 
 def still(x_m: float, y_m: float, theta_rad: float) -> Path:
-    """What lies there."""
+    """Path of a tag that never moves."""
     return lambda t_s: np.tile([x_m, y_m, theta_rad], (len(t_s), 1))
 
 

@@ -29,7 +29,7 @@ def commands(seed, robot_id=1, duration_s=60.0, steps=None):
 
 
 def driven(series, begin_s, duration_s, robot_id=1, hidden=()):
-    """What a film that begins at `begin_s` of the commands sees of a robot that obeys at once."""
+    """Film, begun at `begin_s` of the commands, of a robot that obeys at once."""
     t_s = np.arange(0, 80, 0.01)
     row = np.searchsorted(series.utime_us / 1e6 - EPOCH_S, t_s, side="right") - 1
     duty = np.where(row[:, None] >= 0, series.value[np.maximum(row, 0)], 0.0)

@@ -88,7 +88,7 @@ def track(folder, *arguments, video="run.mp4"):
 
 @pytest.fixture(scope="module")
 def tracked(folder):
-    """What the command found in the film, and its rows by robot: t_s, pose, valid."""
+    """Output of the command for the film, and its rows by robot: t_s, pose, valid."""
     found = track(folder, "--robots", "1-3", "--out", folder / "poses.csv", "--json")
     with (folder / "poses.csv").open() as file:
         rows = list(csv.DictReader(file))

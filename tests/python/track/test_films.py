@@ -41,7 +41,7 @@ def read(path, rate_hz=None):
 @pytest.mark.parametrize("container", CODECS)
 @pytest.mark.parametrize("stamps_s", [EVEN_S, SLOWED_S], ids=["even", "slowed"])
 def test_a_whole_film_lasts_as_long_as_its_container_says(film, container, stamps_s):
-    """Of a rate that changes, too: OpenCV counts 90 frames for the 60 in Matroska and AVI."""
+    """The rate may change, too: OpenCV counts 90 frames for the 60 in Matroska and AVI."""
     opened, frames = read(film(container, stamps_s))
     assert [stamp_s for stamp_s, _ in frames] == pytest.approx(stamps_s, abs=1e-3)
     assert opened.duration_s == pytest.approx(stamps_s[-1] + 1 / 30, abs=0.05)

@@ -37,7 +37,7 @@ def drive(t_s):
 
 
 def film(sees, start_s, seed, seconds=SECONDS, off_m=0.0, path=drive):
-    """What a camera makes of it, on its own clock: noise of 0.2 mm and 0.2 degrees."""
+    """Film of a camera on its own clock: noise of 0.2 mm and 0.2 degrees."""
     random = np.random.default_rng(seed)
     t_s = np.arange(0, seconds, 1 / RATE_HZ)
     pose = path(t_s + start_s) + random.normal(size=(len(t_s), 3)) * [2e-4, 2e-4, 3.5e-3]

@@ -278,7 +278,7 @@ def plan_the_next_run(page) -> None:
 
 
 def run_the_twin(page) -> None:
-    """What the swarm does with the model now is what `twin_run` and `metrics` say."""
+    """The swarm's class with the model now is that of `twin_run` and `metrics`."""
     page.get_by_test_id("tab-swarm").click()
     expect(page.locator("#swarm")).not_to_be_visible()  # nothing to be seen yet
     page.get_by_test_id("swarm-n").fill(str(SWARM))

@@ -36,7 +36,7 @@ def opened(brief_coasting_robot, tmp_path_factory):
 
 
 def predicted(session):
-    """What is drawn of the first robot."""
+    """Prediction that is drawn for the first robot."""
     return session.robots[0].predicted(session.shown(0).model)
 
 

@@ -69,7 +69,7 @@ def _wrong(found: list[InputFinding]) -> set[tuple[str, int]]:
 
 
 def check_recorded(tracks: Tracks, model: native.Model | None) -> list[InputFinding]:
-    """What each track shows by itself: kind of drive, timing, noise, length. Takes no time."""
+    """Findings that each track shows by itself: kind of drive, timing, noise, length; quick."""
     found = check_length(tracks)
     robots = Counter(label for label, _ in tracks)
     for label, track in tracks:

@@ -56,12 +56,12 @@ class Alternative:
 
     @property
     def of_poses(self) -> bool:
-        """Whether the mistake lies in the poses."""
+        """True if the mistake lies in the poses."""
         return self.turned or self.mirrored or self.heading_sign < 0
 
     @property
     def is_turn(self) -> bool:
-        """Whether the heading is off by a constant, and nothing else is wrong with the poses."""
+        """True if the heading is off by a constant, and nothing else is wrong with the poses."""
         return self.turned and self.heading_sign > 0 and not self.mirrored
 
     @property
@@ -131,14 +131,14 @@ class Explained:
 
 
 def far_better(best: Explained, own: Explained) -> bool:
-    """Whether an alternative explains so much more that it is no matter of physics."""
+    """True if an alternative explains so much more that physics cannot be the reason."""
     if best.left > CHECKS.far_better * own.left or own.left - best.left < CHECKS.good:
         return False
     return surely_better(best, own)
 
 
 def surely_better(best: Explained, own: Explained) -> bool:
-    """Whether it is sure that one leaves less than another of the same motion.
+    """True if one surely leaves less than another of the same motion.
 
     By the standard error of the ratio of what both leave, from leaving out one stretch after the
     other (the jackknife; Cochran 1977, Sampling Techniques, 6.17): that some stretches hold much
@@ -189,7 +189,7 @@ class Search:
         lags_s: Sequence[float] = LAGS_S,
         commands: Motion | None = None,
     ) -> None:
-        """What was felt at a lag is made when it is asked for: of a long log it is large.
+        """Sums of motion felt at a lag, which are large for a long log, are made on demand.
 
         Args:
             motion: of one robot.
@@ -218,7 +218,7 @@ class Search:
         lates_s: np.ndarray | None = None,
         lags_s: Sequence[float] | None = None,
     ) -> "Search":
-        """The same commands beside another motion, or at other shifts and lags."""
+        """Search with these commands beside another motion, or at other shifts and lags."""
         return Search(
             motion or self.motion,
             self.wheels,
@@ -237,7 +237,7 @@ class Search:
         return begin_s, shapes @ self.weighted(self.wheels).T
 
     def once(self, tell: Callable[["Search"], Told]) -> Told:
-        """What `tell` says of this search; several ask, and it takes long."""
+        """Result of `tell` for this search, computed once since several ask and it takes long."""
         if tell not in self._told:
             self._told[tell] = tell(self)
         return self._told[tell]
@@ -306,7 +306,7 @@ class Search:
         return place_of_least(self.lates_s, left), float(left.min())
 
     def by_shift(self, lag_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of the columns as they are, at each of S shifts: sums over stretches, for each bend.
+        """Sums over stretches for each bend, with the columns unchanged, at each of S shifts.
 
         Returns:
             (S, B, SHAPES, 3) told times itself and times measured, and (B,) measured squares.

@@ -22,7 +22,7 @@ Pose = tuple[int, bool, bool]  # sign of headings; mirrored; turned
 
 
 def at_axle(search: Search, alternatives: list[Alternative]) -> Search:
-    """The same search at the point that the robot turns about, if that explains far more.
+    """Search moved to the point that the robot turns about, if that explains far more.
 
     Args:
         search: of the tracked point's motion.

@@ -66,13 +66,13 @@ def shift_s(search: Search, coarse_s: float) -> float:
 
 
 def _by_lag(search: Search, lates_s: np.ndarray) -> Iterator[tuple[float, Search]]:
-    """The same search at other shifts, of each lag alone."""
+    """Searches of one lag each, at other shifts."""
     for lag_s in ANY_LAG_S:
         yield lag_s, search.of(lates_s=lates_s, lags_s=(lag_s,))
 
 
 def _is_shifted(search: Search, late_s: float) -> bool:
-    """Whether a lag alone, of any length, surely explains less than one with about that shift.
+    """True if a lag alone, of any length, surely explains less than one with about that shift.
 
     In a smooth drive a longer lag and poses that come sooner look alike.
     """
@@ -84,7 +84,7 @@ def _is_shifted(search: Search, late_s: float) -> bool:
 
 
 def _refined(search: Search, own: Explained, jump: Jump) -> Jump:
-    """The same step on a finer grid of shifts."""
+    """Jump sought again on a finer grid of shifts."""
     fine = search.of(lates_s=_about(jump))
     return fine.jump(own, CHECKS.fewest_blocks // 2)
 
@@ -116,7 +116,7 @@ def _of_step(checked: CheckedTrack, own: Explained, jump: Jump) -> InputFinding:
 
 
 def _beat_breaks(checked: CheckedTrack, jump: Jump) -> bool:
-    """Whether stamps of poses or commands skip about the time of a step, or overlap."""
+    """True if stamps of poses or commands skip about the time of a step, or overlap."""
     track = checked.track
     if _skips(track.pose_t_s, jump.t_s, jump.by_s):
         return True
@@ -124,7 +124,7 @@ def _beat_breaks(checked: CheckedTrack, jump: Jump) -> bool:
 
 
 def _skips(t_s: np.ndarray, at_s: float, by_s: float) -> bool:
-    """Whether as many stamps as come in a step of the clock are missing about a time, or too many.
+    """True if about a time as many stamps are missing, or too many, as come in a step of the clock.
 
     A step back that is sorted by stamps has both clocks' rows one beside the other.
     """
@@ -203,7 +203,7 @@ def _of_precedence(checked: CheckedTrack, late_s: float, t: float, without: str)
 
 
 def _is_no_clock(checked: CheckedTrack, late: Lateness) -> bool:
-    """Whether no clock makes such a change: one stamped all, or it is no step and no drift."""
+    """True if a clock cannot cause it: one clock stamped all, or it is neither step nor drift."""
     return checked.track.same_clock or late.shape in ("while", "steps")
 
 
@@ -265,7 +265,7 @@ def _of_two_clocks(checked: CheckedTrack, search: Search, own: Explained) -> lis
 
 
 def _is_step(search: Search, own: Explained, jump: Jump) -> bool:
-    """Whether a step of surely that size leaves far less than one shift of the whole log does.
+    """True if a step of surely that size leaves far less than one shift of the whole log does.
 
     Where a lag depends on the command a robot is late by how it is driven; a step by the mean of
     that leaves more than half.

@@ -154,7 +154,7 @@ def _alternatives(checked: CheckedTrack) -> list[Alternative]:
 
 
 def _shows(a: Alternative, track: Track) -> bool:
-    """Whether a mistake can be told from a robot that is held at an unknown angle.
+    """True if a mistake can be told from a robot that is held at an unknown angle.
 
     Without a heading the turn shows nothing, and velocities that are a quarter or half a turn off
     are no mistake.
@@ -165,7 +165,7 @@ def _shows(a: Alternative, track: Track) -> bool:
 
 
 def _is_rotation(a: Alternative) -> bool:
-    """Whether forward and left are turned together: its determinant is 1 (a mirror's is -1)."""
+    """True if forward and left are turned together: its determinant is 1 (a mirror's is -1)."""
     swapped = a.place[:2] == (1, 0)
     return a.sign[0] * a.sign[1] == (-1 if swapped else 1)
 
@@ -352,7 +352,7 @@ def _no_gain(checked: CheckedTrack, speed: float) -> list[InputFinding]:
 
 
 def _anew_with(names: dict[str, str]) -> Remedy:
-    """What to do about columns that have other units or meanings than their names say."""
+    """Remedy for columns that have other units or meanings than their names say."""
     if not names:
         return "correct it where the log is made, or the unit in the names of its columns"
     return lambda robot: (

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with an input, in three sentences."""
+"""Finding about an input, in three sentences: the fault, its evidence, its remedy."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass

@@ -88,7 +88,7 @@ def foreign_stretches(track: Track, search: Search, own: Explained) -> list[tupl
 
 
 def _is_foreign(compared: Compared, part: slice, changes: int) -> bool:
-    """Whether the robot moves, for long and by many commands, and by no share of them."""
+    """True if the robot moves, for long and by many commands, and by no share of them."""
     moved, told = (np.sum(a[part] ** 2) for a in (compared.moved, compared.told))
     return (
         compared.t_s[part.stop - 1] - compared.t_s[part.start] >= CHECKS.foreign_s

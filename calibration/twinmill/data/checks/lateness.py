@@ -116,7 +116,7 @@ class _Path:
 
     @property
     def straight(self) -> bool:
-        """Whether it is a drift."""
+        """True if lateness changes along a straight line, as a drift does."""
         return len(self.at_s) > self.pieces
 
     def cost(self, stretches: int) -> float:
@@ -190,7 +190,7 @@ def _left_at(search: Search, lag_s: float) -> tuple[list[np.ndarray], np.ndarray
 
 
 def _normal(left: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """What is left over what the best of all leaves in each stretch, and leaves usually.
+    """Squares left in each stretch, over those that the best of all leaves there, and usually.
 
     Where the robot stands, or does something else than it is told, a stretch says nothing.
     """
@@ -265,7 +265,7 @@ def _drift(left: np.ndarray, places: np.ndarray, reach: float) -> _Path:
 
 
 def _drifts_surely(drift: _Path, left: np.ndarray) -> bool:
-    """Whether shifts of stretches scatter far less about a line than it rises."""
+    """True if shifts of stretches scatter far less about a line than it rises."""
     shift_s, weight = _timing(left, SHIFTS_S)
     line = np.linspace(*drift.at_s, len(shift_s))
     weight = weight / max(weight.sum(), 1e-12)
@@ -278,7 +278,7 @@ def _drifts_surely(drift: _Path, left: np.ndarray) -> bool:
 
 
 def _is_sure(path: _Path, left: np.ndarray) -> bool:
-    """Whether on both sides of each step hardly any stretch speaks for the shift of the other."""
+    """True if on both sides of each step hardly any stretch speaks for the shift of the other."""
     parts = [slice(a, b) for a, b in pairwise(path.edges)]
     sides = [(k, k + d) for k in range(len(parts)) for d in (-1, 1) if 0 <= k + d < len(parts)]
     within = SHIFTS_S[1] < min(path.at_s) and max(path.at_s) < SHIFTS_S[-2]
@@ -291,7 +291,7 @@ def _is_sure(path: _Path, left: np.ndarray) -> bool:
 
 
 def _holds(left: np.ndarray, own_s: float, other_s: float) -> bool:
-    """Whether stretches (S, B) speak for one shift against another, and not one of them alone."""
+    """True if stretches (S, B) favour one shift over another, and not one of them alone."""
     gained = _value(left, SHIFTS_S, other_s) - _value(left, SHIFTS_S, own_s)
     speak = np.maximum(gained, 0)
     against = float(np.maximum(-gained, 0).sum())
@@ -303,7 +303,7 @@ def _holds(left: np.ndarray, own_s: float, other_s: float) -> bool:
 
 
 def _of_steps(path: _Path) -> Shape:
-    """What kind of change steps are."""
+    """Classifies steps of lateness by the kind of change."""
     if path.pieces == 2:
         return "step"
     if path.pieces > 3:

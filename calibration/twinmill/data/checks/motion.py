@@ -80,7 +80,7 @@ class Motion:
         return motion.in_stretches(BLOCK_S)
 
     def in_stretches(self, block_s: float) -> "Motion":
-        """The same in stretches of a length; of a longer one where that makes more than MOST."""
+        """Motion averaged over a length; over a longer one where that makes more than MOST."""
         span_s = float(np.ptp(self.t_s)) if len(self.t_s) else 0.0
         return replace(self, block_s=max(block_s, span_s / MOST))
 
@@ -100,7 +100,7 @@ class Motion:
         return world * np.exp(-1j * heading_sign * self.heading_rad)
 
     def mended(self, heading_sign: int, mirrored: bool, turned_rad: float) -> "Motion":
-        """The same with other poses, as in `body_mps`, the front to the left by `turned_rad`."""
+        """Motion with poses read otherwise, as in `body_mps`; front `turned_rad` to the left."""
         return replace(
             self,
             world_mps=np.conj(self.world_mps) if mirrored else self.world_mps,
@@ -109,7 +109,7 @@ class Motion:
         )
 
     def at_axle(self, led_m: complex, heading_sign: int = 1, mirrored: bool = False) -> "Motion":
-        """The same of the point that the robot turns about.
+        """Motion of the point that the robot turns about.
 
         Args:
             led_m: how a turn to the left leads the tracked point: ahead + i left, m per rad.
@@ -121,7 +121,7 @@ class Motion:
         return replace(self, world_mps=world_mps, led_m=led_m)
 
     def told_in_room(self) -> "Motion":
-        """The same, if the first two columns were velocities along the room's axes."""
+        """Motion if the first two columns were velocities along the room's axes."""
         heading_rad = np.interp(self.grid_s, self.t_s, np.unwrap(self.heading_rad))
         linear = self.shapes[:, 1].copy()
         along = (linear[:, 0] + 1j * linear[:, 1]) * np.exp(-1j * heading_rad)
@@ -150,7 +150,7 @@ class Motion:
 
     @cached_property
     def _kept(self) -> dict[float, np.ndarray]:
-        """What was felt at lags that were asked for, of a log that is not long."""
+        """Cache of sums at lags that were asked for, kept for logs that are not long."""
         return {}
 
     def _felt(self, lag_s: float) -> np.ndarray:

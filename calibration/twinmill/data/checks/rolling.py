@@ -55,7 +55,7 @@ def _option(factor: float) -> str:
 
 
 def factor_words(ratio: float) -> tuple[str, str] | None:
-    """What wheel speeds are by whose ratio the robot is slower or faster than told; the remedy."""
+    """Names for the ratio by which the robot is slower or faster than told, and the remedy."""
     near = [(unit, f) for unit, f in UNITS if 1 / CHECKS.unit_off < ratio / f < CHECKS.unit_off]
     if near:
         names = " or ".join(unit for unit, _ in near)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the poses alone show: axes, units, headings that are none, how much there is."""
+"""Checks of the poses alone: axes, units, headings that are none, how much there is."""
 
 import numpy as np
 
@@ -216,7 +216,7 @@ def check_poses(robot: RobotLog, label: str, own: int | None = None) -> list[Inp
 
 
 def check_track(track: Track, label: str, own: int | None = None) -> list[InputFinding]:
-    """What about a log can be used, and yet is worth a sentence; args as of `check_poses`."""
+    """Remarks on a log that can be used all the same; arguments as of `check_poses`."""
     found = []
 
     def add(what: str, evidence: str, remedy: Remedy, fatal: bool = False) -> None:

@@ -29,7 +29,7 @@ Mend = dict[str, Any]  # options of an import
 
 
 def described(a: Alternative, kind: CommandKind, turned_rad: float) -> tuple[str, Mend]:
-    """What is wrong, a clause; and options that put it right.
+    """Fault as a clause, with the options that put it right.
 
     Args:
         a: what is wrong.

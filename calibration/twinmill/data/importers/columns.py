@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the columns of other people's tables mean: their names, their units, and what only looks so.
+"""Meanings of other people's table columns: their names, their units, and some that mislead.
 
 A unit in a name is believed and converted: `theta_deg`, `x_mm`, `t_ms`. A name without a unit is
 never guessed silently: `explain` says what it looks like, a mapping file keeps what was decided.
@@ -38,7 +38,7 @@ Mapping = dict[str, Source]
 
 @dataclass(frozen=True)
 class Guess:
-    """What a column of a file looks like.
+    """Likely meaning of a file's column.
 
     Attributes:
         column: its name in the file; empty for a constant.
@@ -145,7 +145,7 @@ LOW_PULSE_US = 500.0  # no servo takes shorter ones
 
 
 def _in_other_unit(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess | None:
-    """What duties look like whose values do not fit the unit in their name: nobody drives so."""
+    """Guess for duties whose values do not fit the unit in their name, as nobody drives so."""
     top = float(np.abs(values).max(initial=0.0))
     if 0 < top <= 1 and np.any(values % 1):
         factor, why = _duty(values)
@@ -158,7 +158,7 @@ def _in_other_unit(column: str, targets: tuple[str, ...], values: np.ndarray) ->
 
 
 def _centred(column: str, targets: tuple[str, ...], values: np.ndarray) -> Guess | None:
-    """What duties look like that stand still in the middle of their range."""
+    """Guess for duties whose rest lies in the middle of their range."""
     for middle, span in CENTRED if len(values) else ():
         off, zero = (values - middle) / span, float(values[-1])
         within = np.all(np.abs(off) <= 1) and np.any(off < -AT_REST) and np.any(off > AT_REST)
@@ -256,7 +256,7 @@ def explain(
     rename: dict[str, str] | None = None,
     topic: str | None = None,
 ) -> list[Guess]:
-    """What each column looks like, in the order of the file.
+    """Guesses for all columns, in the order of the file.
 
     Args:
         table: as it was read.
@@ -292,7 +292,7 @@ def explain(
 
 
 def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list[Guess]:
-    """What columns look like beside each other: x and y have one unit, q0 to q3 an order."""
+    """Guesses made consistent with each other: x and y share a unit, q0 to q3 have one order."""
     named = {plain_name(guess.column): guess.column for guess in guesses}
     changed: dict[str, Guess] = {}
     plane = [g for g in guesses if g.targets in (("x_m",), ("y_m",)) and not g.sure]
@@ -325,7 +325,7 @@ def _beside_quaternion(table: Table, guesses: list[Guess]) -> dict[str, Guess]:
 
 
 def _quaternion(table: Table, known: frozenset[str], named: dict[str, str]) -> dict[str, Guess]:
-    """What q0 to q3 look like, by the order in which x and y of a level robot are small."""
+    """Order of q0 to q3, told by where x and y of a level robot are small."""
     if not (set(NUMBERED) <= set(named) and known.issuperset(QUATERNIONS[0])):
         return {}
     parts = [np.abs(_numbers(table, named[q])).max(initial=0.0) for q in NUMBERED]
@@ -341,7 +341,7 @@ def _quaternion(table: Table, known: frozenset[str], named: dict[str, str]) -> d
 
 
 def _guess(table: Table, column: str, known: frozenset[str], new: str | None) -> Guess:
-    """What one column looks like, under the new name that a person gave it."""
+    """Guess for one column under the new name that a person gave it."""
     name = new or column
     if found := by_name(name, known):
         targets, factor = found
@@ -456,7 +456,7 @@ def _path(name: str) -> str:
 
 
 def _usual(name: str) -> tuple[tuple[str, ...], Callable] | None:
-    """What a usual name means, wherever in a message of ROS it stands."""
+    """Our columns for a usual name, wherever it stands in a message of ROS; else None."""
     return USUAL.get(field_of(name, USUAL)[1])
 
 
@@ -467,7 +467,7 @@ def targets_of(name: str, known: frozenset[str]) -> tuple[str, ...]:
 
 
 def is_usual(name: str, known: frozenset[str]) -> bool:
-    """Whether a name is one of ours in any unit, or a usual one for what we know."""
+    """True if a name is one of ours in any unit, or a usual one for a quantity that we know."""
     return bool(targets_of(name, known))
 
 
@@ -479,7 +479,7 @@ LACKS = {  # what a column is whose factor no table has, and that factor, by wha
 
 
 def lacks(target: str) -> tuple[str, str]:
-    """What a column is that becomes one of ours by a number from outside; that number."""
+    """Quantity that a column holds but for a number from outside, and that number."""
     what, factor = LACKS[split_unit(target)[1]]
     return what, f"the factor is {factor}"
 

@@ -86,7 +86,7 @@ def _check_held(
 
 
 def columns_of(series: PoseSeries | CommandSeries) -> dict[str, np.ndarray]:
-    """What it holds, by the names of our columns."""
+    """Columns of a series, by the names that our tables have for them."""
     if isinstance(series, PoseSeries):
         columns = dict(zip(POSITION, series.position_m.T, strict=True))
         if np.isfinite(series.orientation_wxyz).any():
@@ -152,7 +152,7 @@ def renamed(series: Series, renames: Mapping[str, str]) -> Series:
 
 
 def _kind_of(names: Collection[str], series: CommandSeries) -> tuple[CommandKind, bool]:
-    """What columns of commands are, and whether along the axes of the room."""
+    """Kind of command that the columns hold, and True if along the axes of the room."""
     if set(OF_WORLD) <= set(names):
         return "twist", True
     kind = next((k for k, own in VALUES.items() if set(own) <= set(names)), None)
@@ -163,7 +163,7 @@ def _kind_of(names: Collection[str], series: CommandSeries) -> tuple[CommandKind
 
 
 def _told(names: Collection[str]) -> bool:
-    """Whether some are commands themselves, not inputs that they follow from."""
+    """True if some columns are commands themselves, not inputs that commands follow from."""
     return bool({*names} - {*INPUTS})
 
 

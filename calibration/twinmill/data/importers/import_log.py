@@ -276,7 +276,7 @@ def _detections(
     poses: dict[int, PoseSeries],
     left_out: Collection[int],
 ) -> list[DetectionSeries]:
-    """Of robots whose poses are known, at the time of the poses; none of those left out."""
+    """Detections of robots with known poses, at the time of the poses; none of those left out."""
     read = read_detections(
         path, Columns(options.rename, robot_id=options.robot_id, robots=options.robots)
     )
@@ -447,7 +447,7 @@ def _on_our_clock(series: PoseSeries, options: ImportOptions) -> np.ndarray:
 
 
 def _of(robot_id: int, given: OfRobots) -> float:
-    """What is given for a robot: of all and its own added, so that a remedy is added to options."""
+    """Option's value for a robot: the one for all plus its own, so that remedies add up."""
     if isinstance(given, Mapping):
         return given.get(None, 0.0) + given.get(robot_id, 0.0)
     return given
@@ -631,7 +631,7 @@ def _flips_in_toml(flips: Flips) -> list[str]:
 
 
 def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> dict:
-    """What import_log returns, by reading the log as everybody else will.
+    """Result of import_log, gathered by reading the log as everybody else will.
 
     Args:
         log: as it was written.
@@ -673,7 +673,7 @@ def _summary(log: Log, out: Path, warnings: list[str], rows: dict[int, int]) -> 
 
 
 def _told_of(robots: Sequence[RobotLog]) -> list[str]:
-    """What was cut, and what is wrong with poses or velocities; a mistake stands alone.
+    """Remarks on cuts and on wrong poses or velocities; a mistake stands alone.
 
     Cuts and a heading that seems turned may follow from a mistake. Duties and wheel speeds need a
     model to be judged by.

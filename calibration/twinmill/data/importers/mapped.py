@@ -122,7 +122,7 @@ def read_mapped(
 
 
 def _is_of_ours(old: str, new: str, header: Collection[str], known: frozenset[str]) -> bool:
-    """Whether a new name is for one of our columns, and not for one of the file."""
+    """True if a new name is for one of our columns, and not for one of the file."""
     in_our_unit = new in known
     return old in known and (in_our_unit or (old not in header and bool(by_name(new, known))))
 
@@ -192,7 +192,7 @@ def _unsure(table: str, guesses: list[Guess]) -> LogError:
 
 
 def _lacks_unit(guess: Guess) -> bool:
-    """Whether all but the unit of a column is known."""
+    """True if only the unit of a column is unknown."""
     known = guess.targets and not math.isnan(guess.factor) and not guess.zero
     return bool(known and split_unit(guess.targets[0])[1])
 

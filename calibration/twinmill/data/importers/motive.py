@@ -35,7 +35,7 @@ ROTATIONS = (QUATERNION, "XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 
 @dataclass(frozen=True)
 class _Header:
-    """What the rows above the first frame say."""
+    """Metadata from the rows above the first frame."""
 
     fields: dict[str, str]
     rotation: str  # one of ROTATIONS

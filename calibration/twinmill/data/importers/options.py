@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an import is made of: sources, and options that say how to read them; each has its use."""
+"""Sources of an import and the options for reading them, each with its use."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

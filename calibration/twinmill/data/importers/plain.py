@@ -93,7 +93,7 @@ class Columns:
         return samples_of(named, known - OF_ALL, KNOWN - known, loses=loses)
 
     def of_robot(self, robot_id: int | None) -> "Columns":
-        """The same for rows of one robot alone."""
+        """Columns that rows of one robot alone have."""
         own = self.own_renames.get(robot_id, {})
         return replace(self, rename={**self.rename, **own}, own_renames={})
 
@@ -195,7 +195,7 @@ def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
 
 
 def read_detections(path: Path, columns: Columns) -> list[DetectionSeries]:
-    """What cameras saw, by robot.
+    """Detections from cameras, by robot.
 
     Args:
         path: CSV with t_s (when the picture was taken, the commands' clock), robot_id, and seen, 0

@@ -132,7 +132,7 @@ class BagOptions:
 
 
 def list_topics(path: Path) -> list[Topic]:
-    """What is in a bag.
+    """Topics of a bag, with their types and counts.
 
     Raises:
         LogError: it is no bag, broken, or empty.
@@ -168,7 +168,7 @@ def list_topics(path: Path) -> list[Topic]:
 
 
 def _is_static(topic: str) -> bool:
-    """Whether it is the topic of frames that never move in their parents."""
+    """True if it is the topic of frames that never move in their parents."""
     return topic.rpartition("/")[2] == "tf_static"
 
 
@@ -228,7 +228,7 @@ def guess_pairs(topics: list[Topic]) -> list[tuple[str, str]]:
 
 
 def _is_tag_of(topic: Topic, command: str) -> bool:
-    """Whether a tag has the number of a robot."""
+    """True if a tag has the number of a robot."""
     of_tag = topic.kind in TAGS or bool(re.search(r":tag.*:\d+$", topic.name))
     return of_tag and _told(topic.name.rpartition(":")[2], "", {}) == _told("", command, {})
 
@@ -459,7 +459,7 @@ def _storage(path: Path) -> Path:
 
 
 def _remedy(path: Path) -> str:
-    """What to do about a bag that cannot be read."""
+    """Advice for a bag that cannot be read."""
     mend = {
         ".bag": f"if it was cut off, mend it with `rosbag reindex {path.name}`",
         ".mcap": f"if it was cut off, mend it with `mcap recover {path.name} -o whole.mcap`",
@@ -479,7 +479,7 @@ def _remedy(path: Path) -> str:
 
 
 def _profile(path: Path) -> str | None:
-    """What an MCAP file says that its messages are of; None: it is none, or cut off there."""
+    """Profile in an MCAP file's header; None if it is no such file or is cut off there."""
     with path.open("rb") as stream:
         begin = stream.read(LONGEST_PROFILE)
     head = struct.Struct("<8sBQI")  # https://mcap.dev/spec: magic, then the record `Header`
@@ -494,7 +494,7 @@ def _profile(path: Path) -> str | None:
 
 @dataclass
 class _Messages:
-    """Of one topic, as they come; `values` are the rows one after the other."""
+    """Messages of one topic, as they come; `values` are the rows one after the other."""
 
     kind: str
     header_ns: array = field(default_factory=lambda: array("q"))
@@ -518,7 +518,7 @@ class _Messages:
 
 @dataclass(frozen=True)
 class _Rows:
-    """Of one topic, ready to be taken for poses or commands.
+    """Rows of one topic, ready to be taken for poses or commands.
 
     Attributes:
         topic, kind: its name and type.
@@ -601,7 +601,7 @@ def _rows(path: Path, topics: list[Role], options: BagOptions) -> dict[Role, _Ro
 
 
 def _of_bag(path: Path) -> list[str]:
-    """What is to be said of a bag whose recorder was stopped hard."""
+    """Remarks on a bag whose recorder was stopped hard."""
     storage = _storage(path)
     notes = []
     if storage != path:

@@ -20,7 +20,7 @@ TIMES_SIZES = 28  # bytes of a chunk before the name of its compression
 
 
 def is_cut(path: Path) -> bool:
-    """Whether an MCAP file begins as one and does not end as one."""
+    """True if an MCAP file begins as one and does not end as one."""
     if path.suffix != ".mcap" or not path.is_file():
         return False
     with path.open("rb") as stream:

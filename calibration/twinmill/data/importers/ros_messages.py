@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ROS messages of each type say: a pose, a command, or places of frames (tf) or of tags."""
+"""Readers of ROS message types: poses, commands, places of frames (tf) or of tags."""
 
 import re
 from collections.abc import Callable, Iterator

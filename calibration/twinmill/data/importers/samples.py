@@ -61,7 +61,7 @@ def samples_of(
 
 
 def _between(table: Table, sampled: np.ndarray, rest: np.ndarray) -> bool:
-    """Whether rows mostly lie nearer to a sample of their robot than samples do to each other.
+    """True if most rows lie nearer to a sample of their robot than samples do to each other.
 
     Args:
         table: with our names.

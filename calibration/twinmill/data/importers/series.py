@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every reader of foreign measurements hands over: poses and commands of one robot."""
+"""Series that every reader of foreign measurements hands over: poses and commands of one robot."""
 
 from dataclasses import dataclass, field, replace
 
@@ -89,7 +89,7 @@ def stopped_when_silent(series: CommandSeries, timeout_s: float) -> CommandSerie
 
 @dataclass(frozen=True)
 class DetectionSeries:
-    """What one robot's camera saw.
+    """Bits and times from one robot's camera.
 
     Attributes:
         robot_id: 0..99.

@@ -20,7 +20,7 @@ FEWEST = 2  # robots, and columns of each
 
 
 def in_rows(table: Table) -> Table:
-    """The same table with a column `robot_id`, if its columns are those of several robots.
+    """Table with a column `robot_id`, if the given columns are those of several robots.
 
     All robots must have the same columns, each of a usual name. Others stay, as the time.
     """

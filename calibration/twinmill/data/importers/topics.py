@@ -24,12 +24,12 @@ SI = frozenset(
 
 
 def is_path(column: str) -> bool:
-    """Whether a name is that of a field in a message, with the way to it."""
+    """True if a name is that of a field in a message, with the way to it."""
     return bool(APART.search(column.strip().strip("%")))
 
 
 def is_si(column: str, field: str) -> bool:
-    """Whether a column is a field whose unit its message fixes.
+    """True if a column is a field whose unit its message fixes.
 
     Args:
         column: its name in the file.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What acts at some places of the room, or while the robot moves in some of its directions."""
+"""Families of effects at some places of the room, or in some directions of motion."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -65,7 +65,7 @@ def _squares(sides: Sequence[Humps], own: Opened) -> np.ndarray:
 
 
 def _at(where: str, texts: Sequence[str], bells: Callable[[Opened], np.ndarray]) -> list[Family]:
-    """What happens there.
+    """Families for one kind of place.
 
     All speeds change alike, or turning alone. The floor pushes along the room, or adds a rate of
     its own to one axis of the body. Iron turns a compass.

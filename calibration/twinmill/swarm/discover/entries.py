@@ -53,7 +53,7 @@ class Entry:
 
     @property
     def holds(self) -> bool:
-        """Whether most runs are of its kind: again, in twins drawn, and in MuJoCo if it ran."""
+        """True if most runs are of its kind: again, in twins drawn, and in MuJoCo if it ran."""
         return self.least > 0.5
 
     @property

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is searched: two tables and how many robots play the second."""
+"""Genes of the search: two tables and the share of robots that play the second."""
 
 from dataclasses import dataclass
 
@@ -28,14 +28,14 @@ class Mix:
         return [(name, self.ring), *([(f"{name}_odd", self.odd)] if self.odd_count else [])]
 
     def behavior(self, name: str) -> str:
-        """What --behavior takes to run the mix by these names."""
+        """Argument of --behavior that runs the mix by these names."""
         if not self.odd_count:
             return name
         return f"{name}:{self.n - self.odd_count},{name}_odd:{self.odd_count}"
 
 
 def gene_count(bits: int) -> int:
-    """Of the ring's table, the share of odd robots, and the odd table."""
+    """Genes in the ring's table, the share of odd robots, and the odd table."""
     return 2 * _inputs(bits) + 1
 
 

@@ -34,7 +34,7 @@ KIND_WORDS = {
 
 
 def measures(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of candidates from their runs.
+    """Measures of candidates, from their runs.
 
     Args:
         rows: (candidates, seeds, COLUMNS) metrics of the last 10 s.
@@ -59,7 +59,7 @@ def measures(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def kinds(rows: np.ndarray, start_scatter_m2: float, range_m: float) -> list[str]:
-    """What each run, a row of COLUMNS, is called: a known behaviour, else its class."""
+    """Name of each run, a row of COLUMNS: a known behaviour, else its class."""
     at = {name: rows[:, k] for k, name in enumerate(COLUMNS)}
     turns = (np.abs(at["rotation"]) > 0.9) & (at["contacts"] < 0.5)
     apart, near = at["least_diffusion"] > 1, at["scatter_m2"] < (2 * range_m) ** 2

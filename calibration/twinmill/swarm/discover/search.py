@@ -46,7 +46,7 @@ class Hunt:
 
     @property
     def sha256(self) -> str:
-        """Of the whole question: a stored search goes on only with the same one."""
+        """Hash of the whole question: a stored search goes on only with an equal one."""
         return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
 
     @property
@@ -139,7 +139,7 @@ class GenerationStore:
         self._parts.mkdir(exist_ok=True)
 
     def rows(self, generation: int, genes: np.ndarray, run: Callable[[], np.ndarray]) -> np.ndarray:
-        """What was kept of these candidates, else what they do now, which is then kept."""
+        """Stored results of these candidates; missing ones are run now, then kept."""
         path = self._parts / f"{generation:06d}.parquet"
         digest = hashlib.sha256(genes.tobytes()).hexdigest().encode()
         if path.exists():

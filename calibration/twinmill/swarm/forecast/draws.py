@@ -25,7 +25,7 @@ UNSEEN = 0.5  # runs of each class that are added, so that nothing is impossible
 
 @dataclass(frozen=True)
 class Forecast:
-    """What is expected in C cells.
+    """Expected outcomes in C cells.
 
     Attributes:
         points: (C, axes) axis values.
@@ -53,7 +53,7 @@ class Forecast:
 
 
 def knows_errors(request: Request) -> bool:
-    """Whether the sweep's model says how well its numbers are known."""
+    """True if the sweep's model says how well its numbers are known."""
     file = file_of(request)
     return any(q.source != "robots" for q in quantities(file, file.model))
 

@@ -43,7 +43,7 @@ CLASSES = """\
 
 @dataclass(frozen=True)
 class Plan:
-    """What is predicted, of which runs.
+    """Cells to predict, and the runs that it takes.
 
     Attributes:
         request: of the sweep.

@@ -129,7 +129,7 @@ def _mean(values: np.ndarray, cell: np.ndarray) -> Mean:
 
 
 def _bounded(values: np.ndarray, cell: np.ndarray, seed: int) -> Mean:
-    """The same for a score that has ends: percentiles of bootstrapped cells stay within."""
+    """Mean of a score that has ends: percentiles of bootstrapped cells stay within."""
     mean = float(values.mean())
     cells = np.unique(cell)
     if len(values) < FEWEST_RUNS or len(cells) < FEWEST_CELLS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is changed of a model to see whether it matters for the swarm."""
+"""Changes of a model that show if a part of it matters for the swarm."""
 
 import difflib
 from collections.abc import Collection, Mapping, Sequence
@@ -43,7 +43,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Factor:
-    """What is asked about, with all changes that answer.
+    """Part that is asked about, with all changes that answer.
 
     Attributes:
         name: an effect, a quantity, `robots` (their differences) or `together` (all quantities).

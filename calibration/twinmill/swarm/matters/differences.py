@@ -68,7 +68,7 @@ def _wilson(hits: np.ndarray, level: float) -> tuple[float, float]:
 
 
 def median_difference(before: np.ndarray, after: np.ndarray, seed: int) -> Difference:
-    """Of two medians over the same seeds, runs without a value left out of both.
+    """Difference of two medians over equal seeds, runs without a value left out of both.
 
     The interval is the percentile one of a bootstrap over pairs (Efron 1979).
 

@@ -68,7 +68,7 @@ def hidden_effects(diagnosis: Diagnosis) -> list[Hidden]:
 
 
 def unseen_effects(model: native.Model) -> list[Hidden]:
-    """The same without a log: nothing is excluded, and each has its usual strength."""
+    """Effects without a log: nothing is excluded, and each has its usual strength."""
     return [Hidden(name, 1.0, "no log excludes it") for name in _lacking(model)]
 
 

@@ -25,7 +25,7 @@ OF_GOAL = ("radius_m", "settled_s")
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a change does.
+    """Swarm's reaction to a change.
 
     Attributes:
         share: of runs that reach the goal.
@@ -69,7 +69,7 @@ class FactorResult:
 
     @property
     def worst(self) -> Outcome:
-        """Of the change that moves the share most."""
+        """Outcome of the change that moves the share most."""
         return max(self.outcomes, key=lambda o: abs(o.share.change))
 
     @property

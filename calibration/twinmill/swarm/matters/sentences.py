@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What matters, in sentences."""
+"""Sentences on the parts of a model that matter."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ NAMED = 4  # of a list in a sentence
 
 
 def sentence(result: FactorResult) -> str:
-    """Whether one thing matters to the swarm, with the shares that say so."""
+    """Sentence on one part's weight for the swarm, with the shares that show it."""
     factor, worst = result.factor, result.worst
     verb = VERBS[result.verdict]
     low, high = result.shares
@@ -50,7 +50,7 @@ def sentence(result: FactorResult) -> str:
 
 
 def label(result: FactorResult) -> str:
-    """What was changed, in few words."""
+    """Short name of the change."""
     factor = result.factor
     if factor.kind == "effect":
         return f"{factor.name} left out"
@@ -87,7 +87,7 @@ def headline(found: Sensitivity) -> str:
 
 
 def next_step(found: Sensitivity) -> str:
-    """What to measure next, and what not to."""
+    """Advice on the next measurement, and on those that would be wasted."""
     worth = found.of(MATTERS, kinds=("parameter", "hidden"))
     idle = found.of(NOTHING, kinds=("parameter", "hidden"))
     text = ""
