@@ -15,6 +15,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 
 from twinmill.programs import find_program
@@ -117,6 +118,21 @@ def test_who_installs_the_wheel_gets_nothing_older_than_what_was_tried():
             continue
         assert any(s.operator in (">=", "==") for s in need.specifier), need
         assert need.specifier.contains(exact[need.name.lower()]), need
+
+
+def test_the_conda_package_needs_what_the_wheel_needs_or_has_it_inside():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    recipe_file = ROOT / "packaging/conda/recipe.yaml"
+    recipe = yaml.safe_load(recipe_file.read_text(encoding="utf-8"))
+    needed = {word.split()[0]: "".join(word.split()[1:]) for word in recipe["requirements"]["run"]}
+    needed["matplotlib"] = needed.pop("matplotlib-base")  # conda-forge's, without a window
+    inside = {"lcm", "mujoco-core"}
+    assert all(name in " ".join(recipe["build"]["script"]) for name in inside)
+    wanted = {r.name: str(r.specifier) for r in map(Requirement, project["dependencies"])}
+    assert {k: v for k, v in wanted.items() if k not in inside} == {
+        k: v for k, v in needed.items() if k not in {"python", "__glibc"}
+    }
+    assert recipe["context"]["version"] == metadata.version("twinmill")
 
 
 def licence_of(package: str) -> str:
