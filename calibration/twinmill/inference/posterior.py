@@ -86,7 +86,6 @@ class _Row:
     log: float
     mimicked: tuple[str, ...] = ()
     always: tuple[str, ...] = ()
-    formed: bool = False  # the first dependence is what the formula of an effect misses
 
 
 def _belief(row: _Row, probability: float, table: Table) -> Belief:
@@ -102,9 +101,8 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
     def once(effects) -> tuple[str, ...]:
         return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in steps)
 
-    words = entry.words[1:] if row.formed else entry.words
-    again = steps and swells is None and AGAIN not in words
-    words = (AGAIN, *words) if again else words
+    again = steps and swells is None and AGAIN not in entry.words
+    words = (AGAIN, *entry.words) if again else entry.words
     real = once(n for n in entry.effects if n not in (*row.mimicked, *row.always))
     like = tuple(n for n in once(row.mimicked) if n not in real)
     return Belief(real, like, words, entry, probability)
@@ -112,31 +110,21 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
 
 def _rows(entry: Entry, table: Table) -> list[_Row]:
     """All meanings of an entry."""
+    count = len(entry.effects)
     stale = np.log(PRIORS.stale if entry.stale else 1 - PRIORS.stale)
-
-    def prior(effects: int, things: int) -> float:
-        """Log prior of so many effects of the catalogue and things outside it."""
-        each = np.log(PRIORS.outside / len(table.words))
-        other = things * each if things else np.log(1 - PRIORS.outside)
-        return float(stale + other + log_prior_of_effects(effects, len(table.candidates)))
-
-    count, things = len(entry.effects), len(entry.words)
-    real = prior(count, things) + entry.log_evidence
-    rows = [_Row(entry, real)]
+    each = np.log(PRIORS.outside / len(table.words))
+    other = len(entry.words) * each if entry.words else np.log(1 - PRIORS.outside)
+    real = stale + other + log_prior_of_effects(count, len(table.candidates)) + entry.log_evidence
+    rows = [_Row(entry, float(real))]
     for names, log_odds in table.always.get(entry.effects, []):
         rows.append(_Row(entry, float(real + log_odds), always=names))
     for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
         if np.isfinite(log_evidence):
             # the first word is no further thing, but the part that the effects' forms do not take
             like = sum(_log_likeness(catalogue_name(n), entry.words, table) for n in names)
-            log = prior(count - len(names), things) + like + log_evidence
+            rest = log_prior_of_effects(count - len(names), len(table.candidates))
+            log = float(stale + other + like + rest + log_evidence)
             rows.append(_Row(entry, log, mimicked=names))
-    for name, log_evidence in zip(entry.effects, entry.log_formed, strict=True):
-        told_by = table.kinds.told_by[catalogue_name(name)]
-        if entry.words[:1] and entry.words[0] in told_by and np.isfinite(log_evidence):
-            # one of these, or what `forms` says
-            log = prior(count, things - 1) - np.log(len(told_by) + 1) + log_evidence
-            rows.append(_Row(entry, float(log), formed=True))
     return rows
 
 

@@ -16,7 +16,6 @@ from twinmill.inference.moments import MOMENTS, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Kinds, Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
-from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import (
     catalogue_name,
     effect_names,
@@ -41,7 +40,6 @@ class Entry:
         log_evidence: integrated over numbers, forms and sizes.
         log_mimicked: for each of `subsets`, the same where an unnamed thing is in its place, of
             which the dependence is the part that the effect's form does not take.
-        log_formed: for each effect, the same where the dependence is what its formula misses.
         blocks: (B,) log density of each block of time at the posterior mean.
         fall: of the squares by the dependence.
     """
@@ -51,7 +49,6 @@ class Entry:
     words: tuple[str, ...]
     log_evidence: float
     log_mimicked: tuple[float, ...]
-    log_formed: tuple[float, ...]
     blocks: np.ndarray
     fall: float
 
@@ -224,9 +221,8 @@ class _Beside:
         white: (K, R) columns.
         log_chance: prior of just these.
         fall: of the squares by it; 0 if it is none.
-        log_relative: (M + E,) log prior of its size where it is what the form of each of `subsets`
-            leaves, and where it is what the formula of each effect misses, over that of a thing of
-            its own.
+        log_relative: (M,) log prior of its size where it is what the form of each of `subsets`
+            leaves, over that of a thing of its own.
         cov: prior covariance of a stale base; None for what is known.
         local: (B,) what moments cost the evidence, in the blocks in which they are: where a block
             counts less, so does the price of what happened in it.
@@ -506,34 +502,26 @@ class _Comparison:
         sizes = np.bincount(self.view.block, self.view.log_sizes)
         blocks = linear.log_densities(self.view.block) - sizes + beside.local
         found = log_evidence - self.view.log_size
-        count = len(self.squares)
-        meant = np.broadcast_to(mimicked, count + len(self.h.effects)) + found
         return Entry(
             self.h.effects,
             beside.cov is not None,
             words,
             found,
-            tuple(meant[:count].tolist()),
-            tuple(meant[count:].tolist()),
+            tuple(float(found + m) for m in np.broadcast_to(mimicked, len(self.squares))),
             blocks,
             fall,
         )
 
     def _log_relative(self, falls: np.ndarray) -> np.ndarray:
-        """(M + E, ...) log prior of a dependence that takes these squares, as part of a thing.
+        """(M, ...) log prior of a dependence that takes these squares as what effects leave.
 
         The share of the squares of an unnamed thing that the forms of effects do not take is
-        uniform between nothing and all; what the formula of an effect misses has a size, relative
-        to the effect, that is exponentially distributed. Each size stands for a bin of the grid.
+        uniform between nothing and all. Each size stands for a bin of the grid of sizes.
         """
         squares = self.squares.reshape(-1, *[1] * np.ndim(falls))
         share = falls / np.maximum(falls + squares, 1e-300)
-        own = squares[: len(self.h.effects)]
-        size = np.sqrt(falls / np.maximum(own, 1e-300)) / PRIORS.form
         with np.errstate(divide="ignore"):
-            like = np.log(np.minimum(1, share * STEP**2) - share / STEP**2)
-            formed = np.log(np.exp(-size / STEP) - np.exp(-size * STEP))
-        return np.concatenate([like, formed])
+            return np.log(np.minimum(1, share * STEP**2) - share / STEP**2)
 
 
 def _as_without_moments(entries: list[Entry]) -> list[Entry]:

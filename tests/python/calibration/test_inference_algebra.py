@@ -264,11 +264,10 @@ def table(entries, swells=()):
     return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, words, {}, dict(swells), kinds)
 
 
-def entry(effects, words, log_evidence, mimicked=None, formed=None):
+def entry(effects, words, log_evidence, mimicked=None):
     mimicked = tuple(mimicked or [-np.inf] * (2 ** len(effects) - 1))
-    formed = tuple(formed or [-np.inf] * len(effects))
     blocks = np.full(6, log_evidence / 6)
-    return Entry(effects, False, words, log_evidence, mimicked, formed, blocks, 1.0)
+    return Entry(effects, False, words, log_evidence, mimicked, blocks, 1.0)
 
 
 def test_flat_evidence_leaves_the_prior_odds():
@@ -288,9 +287,8 @@ def test_what_one_block_alone_speaks_for_is_less_sure():
     single = np.r_[12.0, np.zeros(7)]
 
     def sure(blocks):
-        nothing = (-np.inf,)
-        found = Entry(("battery_sag",), False, (), 12.0, nothing, nothing, blocks, 0.0)
-        none = Entry((), False, (), 0.0, (), (), np.zeros(8), 0.0)
+        found = Entry(("battery_sag",), False, (), 12.0, (-np.inf,), blocks, 0.0)
+        none = Entry((), False, (), 0.0, (), np.zeros(8), 0.0)
         return beliefs(table([none, found]))[1].probability
 
     assert sure(even) > 0.999
@@ -307,21 +305,6 @@ def test_an_unnamed_thing_looks_rather_like_an_effect_that_depends_on_the_same(e
                        (lambda b: effect in b.effects, lambda b: effect in b.mimicked))  # fmt: skip
         alike = PRIORS.alike * kin + (1 - PRIORS.alike) / 10
         assert mimic / real == pytest.approx(density * alike / (PRIORS.effects / 10))
-
-
-@pytest.mark.parametrize("word, missed", [("time", True), ("place", False)])
-def test_what_an_effect_depends_on_may_be_what_its_formula_misses(word, missed):
-    """The odds over a further thing: the density of that size, less the prior of the thing."""
-    density, q = 1 / 3, PRIORS.outside
-    entries = [entry((), (), -50), entry(("battery_sag",), (word,), 0, formed=[log(density)])]
-    found = [b for b in beliefs(table(entries)) if b.effects]
-    odds = {b.words: b.probability for b in found}
-    if missed:
-        ways = len(planar_kinds().told_by["battery_sag"]) + 1
-        wanted = density / ways * (1 - q) / (q / 2)
-        assert odds[()] / odds[(word,)] == pytest.approx(wanted)
-    else:
-        assert list(odds) == [(word,)]
 
 
 def test_what_a_formula_misses_changes_its_course_and_not_its_size():
