@@ -155,8 +155,11 @@ def test_each_effect_that_an_mjcf_holds_reads_back_as_it_was_written(slide):
 def test_the_commands_name_write_and_compare(slide, tmp_path, capsys):
     path, better = tmp_path / "run.npz", tmp_path / "better.xml"
     simulated(damping=25).saved(path)
-    run(["explain", str(path), "--model", str(slide), "-o", str(better), "--json"])
+    stale = tmp_path / "better_hook.py"  # of a model that is replaced, which a new one is not with
+    stale.write_text("EFFECTS = [('drag@x', {'drag': 9.0})]")
+    run(["explain", str(path), "--model", str(slide), "-o", str(better), "--force", "--json"])
     told = json.loads(capsys.readouterr().out)
+    assert not stale.exists()
     assert told["findings"][0]["effect"] == "viscous_friction@x"
     assert told["output"] == str(better) and told["hook"] is None
     run(["compare", str(path), "--model", str(better), "--json"])
