@@ -41,6 +41,7 @@ if working():  # not for --help
         open_model,
         option,
         provenance,
+        refuse_own,
         told,
     )
 if TYPE_CHECKING:
@@ -80,11 +81,7 @@ def _diagnose(
         from twinmill_cli.joints import diagnosed  # MuJoCo's Python is slow to import
 
         return diagnosed(logs, model, own=own or [], as_json=as_json, out=out)
-    if own:
-        raise ValueError(
-            "diagnose: --own is for models in MJCF; of a robot on wheels `twinmill lab infer` "
-            "takes it."
-        )
+    refuse_own("diagnose", own)
     native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
@@ -248,6 +245,7 @@ def _explain(
     output: NewModel,
     *,
     model: Model = DEFAULT_MODEL,
+    own: Own = None,
     formula: Annotated[
         bool,
         typer.Option(
@@ -267,12 +265,16 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 
-    Of an MJCF: twinmill explain run.csv --model arm.xml -o better.xml
+    Of an MJCF, which alone takes --own:
+    twinmill explain run.csv --model arm.xml -o better.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import explained as of_joints  # as in diagnose
 
-        return of_joints(logs, model, output, force=force, as_json=as_json, out=out)
+        return of_joints(
+            *(logs, model, output), own=own or [], force=force, as_json=as_json, out=out
+        )
+    refuse_own("explain", own)
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
     verb = "explain" if formula else "explain --no-formula"

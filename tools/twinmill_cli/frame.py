@@ -55,6 +55,15 @@ def is_mjcf(model: str) -> bool:
     return Path(model).suffix.lower() in (".xml", ".mjcf")
 
 
+def refuse_own(verb: str, own: list[Path] | None) -> None:
+    """Raises ValueError if a robot on wheels is given logs that its model was made with."""
+    if own:
+        raise ValueError(
+            f"{verb}: --own is for models in MJCF; of a robot on wheels `twinmill lab infer` "
+            "takes it."
+        )
+
+
 def provenance(command: str, model: ModelFile) -> Provenance:
     """Provenance that every output carries."""
     return Provenance(command, f"twinmill {__version__}", model.hash)

@@ -13,6 +13,7 @@ from twinmill.files import check_new_file, replacing
 from twinmill.joints.compare import JointComparison, compare_joints
 from twinmill.joints.diagnose import JointDiagnosis, diagnose_joints
 from twinmill.joints.explain import JointExplanation, explain_joints
+from twinmill.joints.hook import hook_beside
 from twinmill.joints.next import Excitation, next_joints
 from twinmill.report import joints as shown
 from twinmill.version import __version__
@@ -29,7 +30,7 @@ def diagnosed(
     with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
         found = diagnose_joints(logs, model, progress, own=own)
     _warn(found.warnings)
-    command = command_line(shlex.join(["diagnose", *repeated("--own", own)]), logs, model)
+    command = _command("diagnose", own, logs, model)
     deliver({**found.to_json(), **_source(command)}, shown.diagnosis(found), as_json)
     return found
 
@@ -39,17 +40,18 @@ def explained(
     model: str,
     output: Path,
     *,
+    own: list[Path],
     force: bool,
     as_json: bool,
     out: Path | None,
 ) -> JointExplanation:
     """Writes an MJCF with what was found, and a hook for what it cannot hold."""
     _no_report("explain", out)
-    hook = output.with_name(f"{output.stem}_hook.py")
+    hook = hook_beside(output)
     for path in (output, hook):
-        check_new_file(path, force, [Path(model), *logs])
+        check_new_file(path, force, [Path(model), *logs, *own])
     with telling(f"explaining with {model}") as progress, threadpool_limits(1, "blas"):
-        found = explain_joints(logs, model, progress)
+        found = explain_joints(logs, model, progress, own=own)
     _warn(found.diagnosis.warnings)
     written = {}
     for key, path, text in (("output", output, found.text), ("hook", hook, found.hook)):
@@ -57,7 +59,9 @@ def explained(
             with replacing(path, force) as place:
                 place.write_text(text, encoding="utf-8")
             written[key] = str(path)
-    command = command_line("explain", logs, model, output)
+    if "output" in written and "hook" not in written:
+        hook.unlink(missing_ok=True)  # of the model that --force replaced
+    command = _command("explain", own, logs, model, output)
     data = {**found.to_json(), "output": None, "hook": None, **written, **_source(command)}
     deliver(data, shown.explanation(found, written), as_json)
     return found
@@ -66,8 +70,7 @@ def explained(
 def compared(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointComparison:
     """Errors of an MJCF on a log; a hook that `explain` wrote beside it acts as well."""
     _no_report("compare", out)
-    beside = Path(model).with_name(f"{Path(model).stem}_hook.py")
-    hook = beside if beside.is_file() else None
+    hook = beside if (beside := hook_beside(model)).is_file() else None
     found = compare_joints(logs, model, hook)
     _warn(found.warnings)
     command = command_line("compare", logs, model)
@@ -81,6 +84,7 @@ def designed(
     model: str,
     output: Path,
     *,
+    own: list[Path],
     duration_s: float,
     times_speed: float,
     force: bool,
@@ -89,20 +93,29 @@ def designed(
 ) -> Excitation:
     """Writes the motion that parts what logs leave open."""
     _no_report("next", out)
-    check_new_file(output, force, [Path(model), *logs])
+    check_new_file(output, force, [Path(model), *logs, *own])
     with telling(f"designing a run with {model}") as progress, threadpool_limits(1, "blas"):
         found = next_joints(
-            logs, model, duration_s=duration_s, times_speed=times_speed, progress=progress
+            *(logs, model),
+            own=own,
+            duration_s=duration_s,
+            times_speed=times_speed,
+            progress=progress,
         )
     _warn(found.diagnosis.warnings)
     with replacing(output, force) as place:
         place.write_text(found.text(), encoding="utf-8")
     verb = f"next --duration-s {duration_s:g} --times-speed {times_speed:g}"
-    command = command_line(verb, logs, model, output)
-    then = command_line("diagnose", [*logs, Path("next.mcap")], model)
+    command = _command(verb, own, logs, model, output)
+    then = _command("diagnose", own, [*logs, Path("next.mcap")], model)
     data = {"script": str(output), **found.to_json(), "then": then, **_source(command)}
     deliver(data, shown.excitation(found, output, then), as_json)
     return found
+
+
+def _command(verb: str, own: list[Path], *rest: Any) -> str:
+    """A command of these, with the logs that the model was made with."""
+    return command_line(shlex.join([*shlex.split(verb), *repeated("--own", own)]), *rest)
 
 
 def _no_report(verb: str, out: Path | None) -> None:

@@ -13,7 +13,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Logs, Model, Out, ScriptAs, ScriptForm
+from twinmill_cli.options import Logs, Model, Out, Own, ScriptAs, ScriptForm
 from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
@@ -34,6 +34,7 @@ if working():  # not for --help
         load,
         open_model,
         provenance,
+        refuse_own,
         told,
     )
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
@@ -98,6 +99,7 @@ def _next(
             help="Of an MJCF: highest speed of each joint, over that in the logs.",
         ),
     ] = 1.0,
+    own: Own = None,
     force: Annotated[bool, typer.Option("--force", help="Replace SCRIPT if it exists.")] = False,
     script_as: ScriptAs = None,
     as_json: AsJson = False,
@@ -115,13 +117,16 @@ def _next(
 
     Example: twinmill next run.lcmlog --model fitted.toml -o script.csv
 
-    Of an MJCF: twinmill next run.mcap --model arm.xml -o excitation.csv
+    Of an MJCF, which alone takes --own:
+    twinmill next run.mcap --model arm.xml -o excitation.csv
     """
     if is_mjcf(model):
         from twinmill_cli.joints import designed  # MuJoCo's Python is slow to import
 
         how_long = {"duration_s": duration_s, "times_speed": times_speed}
-        return designed(logs, model, output, **how_long, force=force, as_json=as_json, out=out)
+        told_too = {"own": own or [], "force": force, "as_json": as_json, "out": out}
+        return designed(logs, model, output, **how_long, **told_too)
+    refuse_own("next", own)
     limits = Limits(duration_s, _sides(floor_m), max_duty_pct / 100)
     verb = f"next --duration-s {duration_s:g} --floor-m {floor_m} --max-duty-pct {max_duty_pct}"
     verb += f" --script-as {script_as}" if script_as else ""

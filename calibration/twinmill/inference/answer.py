@@ -26,6 +26,7 @@ class Named:
         group: names one of which is missing, itself first; empty if it stands alone.
         group_probability: that one of the group is.
         certainty: sure, group or doubtful.
+        share: of the excess squared error that it takes.
         numbers: parameter -> (value, standard deviation).
     """
 
@@ -34,6 +35,7 @@ class Named:
     group: tuple[str, ...]
     group_probability: float
     certainty: Certainty
+    share: float
     numbers: dict[str, tuple[float, float]]
 
     def to_json(self) -> dict:
@@ -44,6 +46,7 @@ class Named:
             "group": list(self.group) if self.certainty == "group" else None,
             "group_probability": self.group_probability,
             "certainty": self.certainty,
+            "share": self.share,
             "parameters": [
                 {"name": name, "value": value, "std": std}
                 for name, (value, std) in self.numbers.items()
@@ -175,8 +178,17 @@ def _named(name: str, best: tuple[str, ...], every: list[Belief], table: Table) 
         certainty, group = "sure", (name,)
     elif total >= PRIORS.sure and len(group) > 1:
         certainty = "group"
-    numbers = _averaged(name, every, table)
-    return Named(name, p, group, total, certainty, numbers)
+    share = _share(name, best, every, table)
+    return Named(name, p, group, total, certainty, share, _averaged(name, every, table))
+
+
+def _share(name: str, best: tuple[str, ...], every: list[Belief], table: Table) -> float:
+    """Part of the excess squares that an effect takes in the likeliest model with that set."""
+    likely = max((b for b in every if tuple(sorted(b.fitted)) == best), key=lambda b: b.probability)
+    effects = likely.entry.effects
+    takes = zip(effects, table.takes[effects].tolist(), strict=True)
+    own = sum(squares for n, squares in takes if catalogue_name(n) == name)
+    return float(np.clip(own / table.excess, 0, 1))
 
 
 def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[float, float]]:

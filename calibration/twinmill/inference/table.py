@@ -87,6 +87,7 @@ class Table:
     Attributes:
         entries: hypotheses.
         numbers: of each set of effects.
+        takes: of each set of effects, squares of what each of them changes.
         excess: squares that the base leaves over those of noise.
         candidates: effects that compete.
         words: dependences that compete.
@@ -99,6 +100,7 @@ class Table:
 
     entries: list[Entry]
     numbers: dict[tuple[str, ...], Numbers]
+    takes: dict[tuple[str, ...], np.ndarray]
     excess: float
     candidates: tuple[str, ...]
     words: tuple[str, ...]
@@ -130,7 +132,8 @@ def table_of(search: Search) -> Table:
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
     entries: dict[tuple, Entry] = {}
-    falls: dict[tuple, float] = {}  # under the first of them, as the excess is
+    falls: dict[tuple, float] = {}  # under the first of them, as the excess is ...
+    takes: dict[tuple[str, ...], np.ndarray] = {}  # ... and this
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
     for names in kept:
         search.progress("comparing hypotheses")
@@ -140,6 +143,7 @@ def table_of(search: Search) -> Table:
         within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
         for view in views:
             each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
+            takes.setdefault(names, each)
             squares = np.array([each[index].sum() for index in within])
             own = _Comparison(p, search.words, h, forms, squares, view)
             of_noise = own.entries(names in whole)
@@ -155,6 +159,7 @@ def table_of(search: Search) -> Table:
     return Table(
         [replace(entry, fall=falls[key]) for key, entry in entries.items()],
         {names: own.numbers() for names, (_, own) in best.items()},
+        takes,
         max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
         tuple(p.names),
         search.words,

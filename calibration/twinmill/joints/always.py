@@ -16,8 +16,9 @@ from scipy.linalg import block_diag
 from twinmill.inference.prior import Prior
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
+from twinmill.joints.hook import Held
 from twinmill.joints.plant import CLOCK, JointModel
-from twinmill.model.parameters import Parameter, instance_of
+from twinmill.model.parameters import Parameter, effect_names, instance_of
 
 
 @dataclass(frozen=True)
@@ -46,17 +47,26 @@ def always_of(search: Search) -> Always:
     return Always(h.effects, tuple(h.labels[k] for k in kept), mean[kept], cov[np.ix_(kept, kept)])
 
 
+def of_hook(hook: Sequence[Held]) -> Always:
+    """Effects in a model's hook, their numbers as exact as what an own log tells exactly."""
+    model = JointModel({}, {})
+    model.effects = [name for name, _ in hook]
+    instances = effect_names(model)  # type: ignore[arg-type]
+    each = zip(instances, hook, strict=True)
+    told = {f"{name}.{key}": value for name, (_, own) in each for key, value in own.items()}
+    mean = np.array(list(told.values()))
+    return Always(tuple(model.effects), tuple(told), mean, np.zeros((len(mean), len(mean))))
+
+
 def with_always(model: JointModel, prior: Prior, always: Always, own: Sequence[Parameter]) -> Prior:
-    """Prior of the base of a later log, to which its effects of the own log are added.
+    """Prior of the base of a later log, with its effects of the own log.
 
     Args:
-        model: of the base, which is changed.
-        prior: without that.
+        model: of the base with these effects, whose numbers are set.
+        prior: without them.
         always: of the own log.
         own: numbers of its effects.
     """
-    for name in always.effects:
-        model.add_effect(name)
     names = [*prior.names, *(p.name for p in own)]
     first, count = len(prior.names), len(names)
     mean = np.r_[prior.mean[:first], np.zeros(len(own)), prior.mean[first:]]

@@ -53,7 +53,7 @@ class JointDiagnosis:
         for finding in told["findings"]:
             card = self.problem.effects[finding["effect"]]
             units = {n.key: n.unit for n in card.parameters}
-            finding |= {"summary": card.summary, "equation": card.equation, "in_mjcf": card.written}
+            finding |= {"summary": card.summary, "equation": card.equation, "in": card.held_in}
             for p in finding["parameters"]:
                 p["unit"] = units[p["name"]]
         return {
@@ -63,6 +63,7 @@ class JointDiagnosis:
             "actuators": list(self.mjcf.actuators),
             "warnings": list(self.warnings),
             "always": list(self.always.effects) if self.always else [],
+            "in_hook": [name for name, _ in self.mjcf.hook],
             "settings": {name: value for name, value, _ in PRIORS.listed()},
         }
 
@@ -102,7 +103,7 @@ def diagnose_joints(
 def _searched(plant: Plant, always: Always | None, progress: Callable[[str], None]) -> Search:
     """A search in a run of the model, then in one with what that found, if it is nearer."""
     model = None
-    if always and always.effects:
+    if plant.mjcf.hook or (always and always.effects):
         _, model, _ = begun(plant, always)
         plant = plant.about(model.act)
     search = Search(problem_of(plant, model, always), progress).run()

@@ -1,49 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The MJCF with what was found: single attributes of its text, and a hook for what it cannot hold.
-
-The hook is a Python file beside the model that needs MuJoCo and numpy alone.
-"""
+"""The MJCF with what was found: single attributes of its text; what it cannot hold is in a hook."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from twinmill.inference.answer import Named
 from twinmill.joints.action import Action
 from twinmill.joints.diagnose import JointDiagnosis, Logs, diagnose_joints
 from twinmill.joints.effects.effect import Effect
+from twinmill.joints.hook import hook_text
 from twinmill.joints.mjcf import INERTIAL, Edit, Mjcf
 from twinmill.model.model_file import ModelError
+from twinmill.model.parameters import catalogue_name, effect_names, instance_of
 
 DIGITS = 6
-LIKELY = 0.5  # probability from which a model with an effect is the better bet
-TOLD = 0.5  # of the prior's width, below which a log tells a number of the base
 SAME = 1e-6  # relative: less is the rounding of text
 ACTUATORS = ("general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder")
-HOOK = '''# SPDX-License-Identifier: Apache-2.0
-"""Forces that {model} lacks and MJCF cannot hold: call install() before the first mj_step."""
-
-import mujoco
-import numpy as np
-
-
-def add_forces(model, data):
-    """Adds them to the passive forces of a step."""
-    t = data.time
-{lines}
-
-
-def install():
-    """Lets MuJoCo call them in each step."""
-    mujoco.set_mjcb_passive(add_forces)
-'''
-LINE = """    i = model.joint({joint!r}).dofadr[0]
-    q, v, f = data.qpos[i], data.qvel[i], data.qfrc_actuator[i]
-    data.qfrc_passive[i] += {force}  # {effect}"""
 
 
 @dataclass(frozen=True)
@@ -61,19 +37,16 @@ class JointExplanation:
     diagnosis: JointDiagnosis
     text: str
     hook: str
-    added: tuple[Named, ...]
-    left_out: tuple[Named, ...]
+    added: tuple[str, ...]
+    left_out: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill explain --json` of an MJCF."""
         effects = self.diagnosis.problem.effects
         return {
             **self.diagnosis.to_json(),
-            "added": [
-                {"effect": n.effect, "in": "mjcf" if effects[n.effect].written else "hook"}
-                for n in self.added
-            ],
-            "left_out": [n.effect for n in self.left_out],
+            "added": [{"effect": name, "in": effects[name].held_in} for name in self.added],
+            "left_out": list(self.left_out),
         }
 
 
@@ -81,94 +54,85 @@ def explain_joints(
     log: Logs,
     model: Mjcf | Path | str,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    own: Logs | None = None,
 ) -> JointExplanation:
-    """Diagnoses, and adds each effect that is likelier missing than not, the base fitted beside it.
+    """Diagnoses, and writes the likeliest model: what is missing, the base's numbers beside it.
 
-    Of a group that cannot be told apart the likeliest is added.
+    What the model always lacked is missing, too. Of a group that cannot be told apart the likeliest
+    is added.
 
     Args:
         log: arrays, or a file of them; or several of one machine.
         model: opened, or its path.
         progress: told in words what is being done.
+        own: as of `diagnose_joints`.
 
     Raises:
-        LogError: the log does not fit the model, or cannot be read.
+        LogError: a log does not fit the model, or cannot be read.
         ModelError: the model cannot be loaded or is not judged, or its text is in several files.
     """
-    found = diagnose_joints(log, model, progress)
-    effects = found.problem.effects
-    sure = [n for n in found.answer.findings if max(n.probability, _of_group(n)) > LIKELY]
-    sure, base = _together(sure, found)
-    written = [n for n in sure if effects[n.effect].written]
-    hooked = [n for n in sure if not effects[n.effect].written and _hook(n, effects)]
-    text = _written(found.mjcf, written, base, found)
-    added = tuple(n for n in sure if n in written or n in hooked)
+    found = diagnose_joints(log, model, progress, own=own)
+    mjcf, of = found.mjcf, found.problem.effects
+    numbers, base = _likeliest(found)
+    each = [(of[catalogue_name(instance)], own) for instance, own in numbers.items()]
+    forces = [
+        (mjcf.joints[card.joint], (card.name, own), card.hook(own))
+        for card, own in each
+        if card.held_in == "hook"
+    ]
+    new = dict.fromkeys([*(found.always.effects if found.always else ()), *found.answer.added])
     return JointExplanation(
         found,
-        text,
-        _hooks(found.mjcf, hooked, effects),
-        added,
-        tuple(n for n in sure if n not in added),
+        _written(found, [(card, own) for card, own in each if card.held_in == "mjcf"], base),
+        hook_text(mjcf.path.name, forces),
+        tuple(n for n in new if of[n].held_in),
+        tuple(n for n in new if not of[n].held_in),
     )
 
 
-def _together(sure: list[Named], found: JointDiagnosis) -> tuple[list[Named], dict[str, float]]:
-    """Effects with their numbers as of the fit of just these, and factors of the base beside them.
+def _likeliest(found: JointDiagnosis) -> tuple[dict[str, dict[str, float]], dict[str, float]]:
+    """Numbers of each instance of an effect in the likeliest model, and factors of its base.
 
-    Factors that the log tells no better than the file are left out.
+    They are those of a model without the errors of its equations that were looked at beside it.
     """
-    every = {tuple(sorted(names)): e for names, e in found.fitted.items()}
-    own = every.get(tuple(sorted(n.effect for n in sure)))
-    if own is None:
-        return sure, {}
-    h = own.hypothesis
-    told = np.sqrt(np.diag(h.posterior(own.linear)[1])) < TOLD * np.sqrt(np.diag(h.cov))
-    value = dict(zip(h.labels, h.value.tolist(), strict=True))
-    base = {n: value[n] for n, t in zip(h.labels, told, strict=True) if t and n.startswith("base.")}
-    numbers = [
-        {key: (value[f"{n.effect}.{key}"], std) for key, (_, std) in n.numbers.items()}
-        for n in sure
-    ]
-    return [replace(n, numbers=own) for n, own in zip(sure, numbers, strict=True)], base
-
-
-def _of_group(named: Named) -> float:
-    return named.group_probability if named.certainty == "group" else 0.0
-
-
-def _values(named: Named) -> dict[str, float]:
-    return {key: value for key, (value, _) in named.numbers.items()}
-
-
-def _hook(named: Named, effects: Mapping[str, Effect]) -> str:
-    return effects[named.effect].hook(_values(named))
-
-
-def _hooks(mjcf: Mjcf, found: list[Named], effects: Mapping[str, Effect]) -> str:
-    if not found:
-        return ""
-    lines = [
-        LINE.format(
-            joint=mjcf.joints[effects[n.effect].joint], force=_hook(n, effects), effect=n.effect
-        )
-        for n in found
-    ]
-    return HOOK.format(model=mjcf.path.name, lines="\n".join(lines))
+    numbers, problem = found.answer.numbers, found.problem
+    known = effect_names(problem.base.model)
+    mean = numbers.alone @ numbers.mean
+    value = dict(zip(numbers.labels, mean.tolist(), strict=True))
+    effects = {}
+    for instance in effect_names(numbers.model):
+        kind = catalogue_name(instance)
+        if instance in known or kind in found.answer.added:
+            effects[instance] = {
+                n.key: float(np.clip(value[f"{instance}.{n.key}"], n.low, n.high))
+                for n in problem.effects[kind].parameters
+            }
+    bounds = zip(problem.prior.names, problem.prior.low, problem.prior.high, strict=True)
+    base = {
+        name: float(np.clip(value[name], low, high))
+        for name, low, high in bounds
+        if instance_of(name) == "base"
+    }
+    return effects, base
 
 
 def _written(
-    mjcf: Mjcf, found: list[Named], base: Mapping[str, float], diagnosis: JointDiagnosis
+    found: JointDiagnosis,
+    effects: list[tuple[Effect, dict[str, float]]],
+    base: Mapping[str, float],
 ) -> str:
     """The text with what was found in MuJoCo's own numbers.
 
     Raises:
         ModelError: MuJoCo does not read back what was written.
     """
-    action = diagnosis.problem.plant.begin(diagnosis.problem.plant.usual)
+    plant, mjcf = found.problem.plant, found.mjcf
+    action = plant.begin(plant.usual)
     for name, factor in base.items():
-        diagnosis.problem.catalogue[name].act(action, {"value": factor})
-    for named in found:
-        diagnosis.problem.effects[named.effect].write(action, _values(named))
+        found.problem.catalogue[name].act(action, {"value": factor})
+    for effect, values in effects:
+        effect.write(action, values)
     text = mjcf.edited(edits(mjcf, action))
     try:
         mujoco.MjSpec.from_string(text, assets=_beside(mjcf.path))

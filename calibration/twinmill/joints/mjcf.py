@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from twinmill.joints.hook import Held, read_hook
 from twinmill.model.model_file import ModelError
 
 JOINTS = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}
@@ -57,6 +58,7 @@ class Mjcf:
         moves: (U,) joint of each actuator.
         lag_s, delay_s: (U,) of the actuators.
         degrees: the text has its angles in degrees.
+        hook: effects in the file beside it, with their numbers.
     """
 
     path: Path
@@ -70,10 +72,11 @@ class Mjcf:
     lag_s: np.ndarray
     delay_s: np.ndarray
     degrees: bool
+    hook: tuple[Held, ...]
 
     @classmethod
     def load(cls, path: Path | str) -> "Mjcf":
-        """Opens a file.
+        """Opens a file, and the hook beside it.
 
         Raises:
             ModelError: MuJoCo cannot load it, or it holds what is not judged.
@@ -107,6 +110,7 @@ class Mjcf:
             np.array(lag),
             np.array(delay),
             bool(spec.compiler.degree),
+            read_hook(path),
         )
 
     @cached_property

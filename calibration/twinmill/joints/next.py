@@ -19,6 +19,7 @@ from twinmill.data.lcm_log import LogError
 from twinmill.inference.evidence import log_evidence
 from twinmill.inference.settings import PRIORS
 from twinmill.joints import dependences
+from twinmill.joints.always import Always
 from twinmill.joints.diagnose import JointDiagnosis, Logs, diagnose_joints
 from twinmill.joints.excitation import Limits, Motion, motion
 from twinmill.joints.log import JointLog
@@ -26,6 +27,7 @@ from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.plant import JointModel, Plant, Steps
 from twinmill.joints.problem import begun
 from twinmill.joints.series import series_of
+from twinmill.model.parameters import newest_instance
 
 TRIED = 40  # random motions
 PERIOD_S = 0.01  # of a script's commands: what most controllers keep
@@ -71,6 +73,7 @@ class Excitation:
                 }
                 for (a, b), odds in self.odds.items()
             ],
+            "findings": self.diagnosis.to_json()["findings"],
             "duration_s": float(np.ptp(self.log.t_s)),
             "tried": self.tried,
             "within_limits": self.kept,
@@ -94,6 +97,7 @@ def next_joints(
     logs: Logs,
     model: Mjcf | Path | str,
     *,
+    own: Logs | None = None,
     duration_s: float = 30.0,
     times_speed: float = 1.0,
     progress: Callable[[str], None] = lambda _: None,
@@ -103,6 +107,7 @@ def next_joints(
     Args:
         logs: one or several, as of `diagnose_joints`.
         model: opened, or its path.
+        own: as of `diagnose_joints`.
         duration_s: of the run.
         times_speed: highest speed of each joint, over that in the logs.
         progress: told in words what is being done.
@@ -111,7 +116,7 @@ def next_joints(
         LogError: a log does not fit, nothing is left open, or no motion keeps the limits.
         ModelError: the model cannot be loaded, or is of a kind that is not judged.
     """
-    found = diagnose_joints(logs, model, progress)
+    found = diagnose_joints(logs, model, progress, own=own)
     plant, mjcf = found.problem.plant, found.mjcf
     asked = _Asked.of(found)
     before = asked.odds(plant, asked.likely)
@@ -166,12 +171,14 @@ class _Asked:
     """Questions of a diagnosis, with what has to be the same in each motion.
 
     Attributes:
+        always: what the model lacks in its own log, too; None where that is not known.
         values: numbers of each effect: as fitted by itself, or else of usual size.
         noise: (J,) standard deviation of a step's error.
         likely: pairs of names of which one is missing.
         unseen: each effect against nothing.
     """
 
+    always: Always | None
     values: Mapping[str, Mapping[str, float]]
     noise: np.ndarray
     likely: list[Pair]
@@ -192,7 +199,8 @@ class _Asked:
             }
             own = found.fitted.get((name,))
             if own is not None:
-                values[name] = {key: own.hypothesis.model.get(f"{name}.{key}")
+                h = own.hypothesis
+                values[name] = {key: h.model.get(f"{h.instance(name)}.{key}")
                                 for key in values[name]}  # fmt: skip
         best = min(found.fitted.values(), key=lambda e: -e.alone).hypothesis.errors
         errors = np.asarray(problem.base.errors if best is None else best)
@@ -200,6 +208,7 @@ class _Asked:
         noise = np.array([np.median(np.abs(e[s])) if s.any() else 0.0
                           for e, s in zip(errors.T, slides.T, strict=True)])  # fmt: skip
         return cls(
+            found.always,
             values,
             np.maximum(NOISE * noise, 1e-12),
             likely or [(n, NOTHING) for n in open_to if n in problem.effects],
@@ -210,7 +219,7 @@ class _Asked:
         """Log odds that are expected between two names from a run."""
         if not pairs:
             return {}
-        _, model, prior = begun(plant)
+        _, model, prior = begun(plant, self.always)
         steps = Steps(plant)
         base = self._base(steps, model, prior)
         names = {name for pair in pairs for name in pair if name}
@@ -242,8 +251,9 @@ class _Asked:
         """(W, J) of the errors by an effect at its numbers."""
         changed = model.copy()
         changed.add_effect(name)
+        instance = newest_instance(changed, name)  # type: ignore[arg-type]
         for key, value in self.values[name].items():
-            changed.set(f"{name}.{key}", value)
+            changed.set(f"{instance}.{key}", value)
         return np.asarray(steps.errors(changed)[0] - steps.errors(model)[0])
 
     def _white(self, columns: np.ndarray) -> np.ndarray:

@@ -14,12 +14,14 @@ from twinmill.inference.prior import Prior
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
 from twinmill.inference.settings import PRIORS
 from twinmill.joints import dependences
-from twinmill.joints.always import Always, with_always
+from twinmill.joints.always import Always, of_hook, with_always
 from twinmill.joints.base import base_numbers
 from twinmill.joints.effects import effects_of
 from twinmill.joints.effects.effect import Effect, Number
+from twinmill.joints.hook import hook_beside
 from twinmill.joints.plant import CLOCK, JointModel, Plant, Steps
-from twinmill.model.parameters import EFFECT_STEP, Parameter
+from twinmill.model.model_file import ModelError
+from twinmill.model.parameters import EFFECT_STEP, Parameter, newest_instance
 
 ROUNDS = 2  # of looking for the noise: what it begins with is a guess
 FACTOR_STEP = 0.02  # of finite differences in a number of the base, relative
@@ -63,15 +65,28 @@ class JointProblem(Problem):
 def begun(
     plant: Plant, always: Always | None = None
 ) -> tuple[dict[str, Effect], JointModel, Prior]:
-    """Effects that a robot may have in a log, its base's model, and what is known of that."""
-    effects = effects_of(plant)
+    """Effects that a robot may have in a log, its base's model, and what is known of that.
+
+    Raises:
+        ModelError: the hook of its MJCF has an effect that it cannot have.
+    """
+    effects, hook = effects_of(plant), plant.mjcf.hook
+    if strange := [name for name, _ in hook if name not in effects]:
+        raise ModelError(
+            f"{hook_beside(plant.mjcf.path)}: has '{strange[0]}', which is no effect that this "
+            "model can have; let `twinmill explain` write the hook again, or move it away."
+        )
     base = {f"base.{key}": factor for key, factor in base_numbers(plant).items()}
     names = [CLOCK, *base]
     model = JointModel({**effects, **base}, {n: 0.0 if n == CLOCK else 1.0 for n in names})
     prior = _prior(names, plant)
-    if always is not None:
-        own = [p for name in always.effects for p in parameters_of(effects[name])]
-        prior = with_always(model, prior, always, own)
+    for known in (of_hook(hook), always):
+        if known is not None:
+            own = []
+            for name in known.effects:
+                model.add_effect(name)
+                own += parameters_of(effects[name], newest_instance(model, name))  # type: ignore[arg-type]
+            prior = with_always(model, prior, known, own)
     return effects, model, prior
 
 
@@ -147,9 +162,9 @@ def _begin_noise(steps: Steps, model: JointModel) -> Noise:
     return Noise(each / np.sqrt(2), each, each, np.full(len(each), 2 * s.step_s[0]), course)
 
 
-def parameters_of(effect: Effect) -> list[Parameter]:
-    """Numbers of an effect, as inference takes them."""
-    return [_parameter(effect.name, n) for n in effect.parameters]
+def parameters_of(effect: Effect, instance: str = "") -> list[Parameter]:
+    """Numbers of an effect, as inference takes them, or of another instance of it."""
+    return [_parameter(instance or effect.name, n) for n in effect.parameters]
 
 
 def _parameter(name: str, n: Number) -> Parameter:

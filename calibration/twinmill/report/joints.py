@@ -18,6 +18,7 @@ from twinmill.report.inference import percent, sentence
 from twinmill.report.tables import Cell, Table, number
 
 QUESTIONS = 8  # that are listed, those first that stay open; --json has all
+PLACES = {"mjcf": "MJCF", "hook": "hook", None: "neither"}  # that hold an effect
 SHOWN = 0.05  # probability of an effect that is listed; --json has all
 
 
@@ -25,6 +26,8 @@ def diagnosis(found: JointDiagnosis) -> RenderableType:
     """Text of `twinmill diagnose` of an MJCF."""
     answer = found.answer
     parts: list[RenderableType] = [Text(sentence(answer))]
+    if found.mjcf.hook:
+        parts.append(Text(f"With its hook: {', '.join(name for name, _ in found.mjcf.hook)}."))
     if found.always and found.always.effects:
         parts.append(Text(f"In its own log, too: {', '.join(found.always.effects)}."))
     if answer.findings:
@@ -52,11 +55,11 @@ def explanation(found: JointExplanation, written: Mapping[str, str]) -> Renderab
     """
     effects = found.diagnosis.problem.effects
     lines = [
-        f"Added {n.effect} in {'the MJCF' if effects[n.effect].written else 'the hook'}, "
-        "with the numbers of the model fitted beside it."
-        for n in found.added
+        f"Added {name} in the {PLACES[effects[name].held_in]}, with the numbers of the likeliest "
+        "model."
+        for name in found.added
     ]
-    lines += [f"Left out {n.effect}: neither an MJCF nor a force holds it." for n in found.left_out]
+    lines += [f"Left out {name}: neither an MJCF nor a force holds it." for name in found.left_out]
     lines += [f"Written: {path}" for path in written.values()]
     if not written:
         lines.append("Not written: nothing that a model can hold is likelier missing than not.")
@@ -141,11 +144,14 @@ def _effects(found: JointDiagnosis) -> Table:
                 [
                     Cell("" if k else f.effect),
                     Cell("" if k else percent(f.probability), bar=None if k else f.probability),
+                    Cell("" if k else percent(f.share)),
                     Cell(name),
                     Cell(number(value)),
                     Cell(f"± {number(std, 2)} {units[name]}"),
+                    Cell("" if k else PLACES[card.held_in]),
                     Cell("" if k else card.summary),
                 ]
             )
-    columns = ["effect", "probability", "number", "value", "std", "what it is"]
-    return Table("Missing effects", columns, rows, words=(0, 2, 5))
+    columns = ["effect", "probability", "takes", "number", "value", "std", "held by", "what it is"]
+    note = "takes: of the squared error above the noise; hook: a Python file that `explain` writes."
+    return Table("Missing effects", columns, rows, words=(0, 3, 6, 7), note=note)

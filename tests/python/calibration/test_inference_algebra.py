@@ -261,7 +261,7 @@ def table(entries, swells=()):
     """Evidence table for ten effects, four of which act with time."""
     kinds = planar_kinds()
     words = ("time", "place")
-    return Table(entries, {}, 1.0, OF_TIME + OF_OTHERS, words, {}, dict(swells), kinds)
+    return Table(entries, {}, {}, 1.0, OF_TIME + OF_OTHERS, words, {}, dict(swells), kinds)
 
 
 def entry(effects, words, log_evidence, mimicked=None):

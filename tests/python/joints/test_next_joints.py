@@ -104,6 +104,20 @@ def test_speeds_that_the_log_lacks_part_forms_of_friction(tmp_path):
     assert abs(value - 8) < 3 * std
 
 
+def test_what_the_own_log_shows_is_no_question(tmp_path, monkeypatch):
+    """One speed alone leaves viscous friction and drag a group; the own log told them apart."""
+    monkeypatch.setattr(design, "TRIED", 4)
+    path = carriage(tmp_path, more='forcerange="-60 60" ctrlrange="-60 60"')
+    log = recorded(path, slow(), push=lambda v: -8 * v)
+    lively = np.interp(T_S, np.arange(0, 17, 0.8), np.random.default_rng(1).uniform(-0.3, 0.3, 22))
+    own = recorded(path, lively, push=lambda v: -8 * v)
+    with threadpool_limits(1, "blas"):
+        found = next_joints(log, path, own=own, duration_s=8, times_speed=3)
+    assert found.diagnosis.always.effects == ("viscous_friction@x",)
+    assert not found.to_json()["findings"]
+    assert not any("viscous_friction@x" in pair and "drag@x" in pair for pair in found.odds)
+
+
 def test_the_reason_is_told_where_no_motion_keeps_the_limits(tmp_path, monkeypatch):
     monkeypatch.setattr(design, "TRIED", 3)
     wall = '<geom name="wall" type="box" pos="0.1 0 0" size=".05 .5 .5"/>'

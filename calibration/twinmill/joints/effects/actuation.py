@@ -25,7 +25,7 @@ class Gain(ActuatorEffect):
     equation = "force *= 1 + more"
     source = "MuJoCo, actuator gainprm and biasprm"
     told_by = ("command",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @property
@@ -47,7 +47,7 @@ class ServoStiffness(ActuatorEffect):
     equation = "force += kp * more * (command - q)"
     source = "MuJoCo, position/kp"
     told_by = ("command", "position")
-    written = True
+    held_in = "mjcf"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:
@@ -74,7 +74,7 @@ class ServoDamping(ActuatorEffect):
     equation = "force -= more * v"
     source = "MuJoCo, position/kv"
     told_by = ("speed",)
-    written = True
+    held_in = "mjcf"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:
@@ -102,7 +102,7 @@ class CommandDelay(ActuatorEffect):
     equation = "command(t) -> command(t - delay)"
     source = "MuJoCo, actuator delay; Hwangbo et al. 2019, Sci. Robot. 4: latency of actuators"
     told_by = ("past",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @property
@@ -124,7 +124,7 @@ class CommandLag(ActuatorEffect):
     equation = "lag * dx/dt = command - x"
     source = "MuJoCo, actuator dyntype filterexact"
     told_by = ("past",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @property
@@ -146,7 +146,7 @@ class CommandDeadZone(ActuatorEffect):
     equation = "command -> command - clip(command, -width, width)"
     source = "Tao and Kokotovic 1994, IEEE Trans. Autom. Control 39: dead zones"
     told_by = ("command",)
-    written = False
+    held_in = None
     changes = "exact"
 
     @classmethod
@@ -173,7 +173,7 @@ class CommandPlay(ActuatorEffect):
     equation = "command -> play(command), of half width `width`"
     source = "Nordin and Gutman 2002, Automatica 38: backlash"
     told_by = ("past", "position")
-    written = False
+    held_in = None
     changes = "exact"
 
     @classmethod
@@ -201,7 +201,7 @@ class Saturation(ActuatorEffect):
     equation = "force -> clip(force, -limit, limit)"
     source = "MuJoCo, actuator forcerange"
     told_by = ("command",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @classmethod
@@ -231,7 +231,7 @@ class SupplyDrift(ActuatorEffect):
     equation = "force *= 1 - loss * t / duration"
     source = "Maxon 2023, Motor data and operating ranges: torque constant and voltage"
     told_by = ("time",)
-    written = False
+    held_in = "hook"
     changes = "force"
 
     @property

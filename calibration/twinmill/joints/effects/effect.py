@@ -4,10 +4,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from twinmill.joints.action import SLOW, Action
 from twinmill.joints.plant import Plant
+
+HeldIn = Literal["mjcf", "hook"] | None  # stock MuJoCo's file, Python beside it, or neither
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Effect(ABC):
     equation: ClassVar[str]
     source: ClassVar[str]
     told_by: ClassVar[tuple[str, ...]]  # dependences for which it may be mistaken
-    written: ClassVar[bool]  # in an MJCF, so that stock MuJoCo has it
+    held_in: ClassVar[HeldIn]
     changes: ClassVar[str] = "linear"  # or "force" (adds one, or several), or "exact" (all else)
 
     @classmethod
@@ -68,15 +70,16 @@ class Effect(ABC):
         """Changes what is put into MuJoCo."""
 
     def write(self, action: Action, values: Mapping[str, float]) -> None:
-        """Changes MuJoCo's own numbers, as an MJCF can hold them; where `written`."""
+        """Changes MuJoCo's own numbers, as an MJCF can hold them; where these hold it."""
         self.act(action, values)
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Force on the joint as a Python expression of q, v, t, and f, its actuators' force.
 
-        Empty where an MJCF holds the effect, or where it is no force.
+        Raises:
+            NotImplementedError: a hook does not hold the effect.
         """
-        return ""
+        raise NotImplementedError(self.name)
 
     @property
     def name(self) -> str:

@@ -18,7 +18,7 @@ class Coulomb(JointEffect):
     equation = "force -= friction * sign(v)"
     source = "MuJoCo, joint/frictionloss; Olsson et al. 1998, Eur. J. Control 4, ch. 3"
     told_by = ("speed",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"  # it decides what is held
 
     @property
@@ -40,7 +40,7 @@ class CoulombByDirection(JointEffect):
     equation = "force -= half * |sign(v)|, half = (forward - back) / 2"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30, sec. 3"
     told_by = ("speed", "position")
-    written = False
+    held_in = "hook"
     changes = "force"
 
     @property
@@ -67,7 +67,7 @@ class Viscous(JointEffect):
     equation = "force -= damping * v"
     source = "MuJoCo, joint/damping; Olsson et al. 1998, Eur. J. Control 4, ch. 3"
     told_by = ("speed",)
-    written = True
+    held_in = "mjcf"
 
     @property
     def parameters(self) -> list[Number]:
@@ -88,7 +88,7 @@ class ViscousByDirection(JointEffect):
     equation = "force -= half * |v|, half = (forward - back) / 2"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30, sec. 3"
     told_by = ("speed",)
-    written = False
+    held_in = "hook"
     changes = "force"
 
     @property
@@ -115,7 +115,7 @@ class Drag(JointEffect):
     equation = "force -= drag * v * |v|"
     source = "MuJoCo, joint/damping, second number; Swevers et al. 2007, IEEE Control Syst. 27"
     told_by = ("speed",)
-    written = True
+    held_in = "mjcf"
 
     @property
     def parameters(self) -> list[Number]:
@@ -137,7 +137,7 @@ class Stribeck(JointEffect):
     equation = "force -= extra * exp(-(v / speed)^2) * sign(v)"
     source = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30, eq. 3"
     told_by = ("speed",)
-    written = False
+    held_in = "hook"
     changes = "force"
 
     @property
@@ -169,7 +169,7 @@ class LoadFriction(JointEffect):
     equation = "force -= share * |actuator force| * sign(v)"
     source = "Hamon, Gautier, Garrec 2010, IROS: dry friction models with load dependence"
     told_by = ("command", "speed")
-    written = False
+    held_in = "hook"
     changes = "force"
 
     @property
@@ -196,7 +196,7 @@ class FrictionByPosition(JointEffect):
     equation = "force -= slope * (q - middle) * sign(v)"
     source = "Altintas et al. 2011, CIRP Annals 60: friction of feed drives along the way"
     told_by = ("position",)
-    written = False
+    held_in = "hook"
     changes = "force"
 
     @property

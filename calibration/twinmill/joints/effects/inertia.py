@@ -16,7 +16,7 @@ class Armature(JointEffect):
     equation = "inertia += armature"
     source = "MuJoCo, joint/armature; Featherstone 2008, ch. 9.6"
     told_by = ("past",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @property
@@ -40,7 +40,7 @@ class LinkMass(JointEffect):
     equation = "mass *= 1 + more, inertia *= 1 + more"
     source = "MuJoCo, body/inertial; Featherstone 2008, ch. 2.13"
     told_by = ("position", "past")
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @classmethod

@@ -22,7 +22,7 @@ class ForceOffset(JointEffect):
     equation = "force += offset"
     source = "Janot, Gautier, Brunot 2019, EMPS benchmark: offset of the amplifier"
     told_by = ("position",)
-    written = True
+    held_in = "mjcf"
     changes = "force"
 
     @property
@@ -50,7 +50,7 @@ class EncoderOffset(JointEffect):
     equation = "measured position = position + offset"
     source = "Khalil and Dombre 2002, ch. 11: geometric calibration"
     told_by = ("position",)
-    written = True
+    held_in = "mjcf"
     changes = "exact"
 
     @property
@@ -80,7 +80,7 @@ class Stiffness(JointEffect):
     equation = "force -= stiffness * (q - springref)"
     source = "MuJoCo, joint/stiffness"
     told_by = ("position",)
-    written = True
+    held_in = "mjcf"
 
     @property
     def parameters(self) -> list[Number]:
@@ -102,7 +102,7 @@ class Tilt(Effect):
     equation = "gravity += g * (about_y, -about_x, 0) for small angles, gravity along z"
     source = "MuJoCo, option/gravity"
     told_by = ("position",)
-    written = True
+    held_in = "mjcf"
 
     @classmethod
     def all_of(cls, plant: Plant) -> list[Effect]:
