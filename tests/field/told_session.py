@@ -350,7 +350,7 @@ class Field:
         return row
 
     def script_ends(self) -> dict:
-        """Of the one robot that is held: its own file names the script."""
+        """Script that ends by itself on the one robot that is held; its own file names it."""
         with self._of_a_script():
             begin_s = time.monotonic()
             self.operator = Operator(
@@ -475,7 +475,7 @@ class Field:
         return self._stopped_by(preexec_fn=limit)
 
     def start_without_standard_files(self) -> dict:
-        """Of a fault nobody could be told."""
+        """Start that is refused: nobody could be told of a fault."""
         begin_s = time.monotonic()
         self.operator = Operator(
             self.key_file, *START, terminal=False, preexec_fn=lambda: os.closerange(0, 3)
@@ -519,7 +519,7 @@ class Field:
         return self._stopped_by("--robots", "\udcfc")
 
     def late_network(self) -> dict:
-        """What robots say comes so late; their clocks are right."""
+        """Network that brings late what robots say; their clocks are right."""
         operator = self.held(terminal=False, late_s=LATE_S)
         fault_s = time.monotonic()
         operator.process.send_signal(signal.SIGINT)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What MJCF cannot hold: a Python file beside the model that needs MuJoCo and numpy alone.
+"""Hook for effects that MJCF cannot hold: Python beside the model, for MuJoCo and numpy alone.
 
 It says its effects twice: as forces, which stock MuJoCo calls, and with their numbers, so that they
 are part of the model when that is judged again.

@@ -122,13 +122,13 @@ struct EffectSpec
                         std::span<const std::string> texts) = nullptr;
 };
 
-// How much of what begins at a moment is there `since_s` after it, 0 to 1: 1 / (1 + exp(-t / edge)).
+// Share of what begins at a moment that is there `since_s` after it: 1 / (1 + exp(-t / edge)).
 double Begun(double since_s, double edge_s);
 
 // What begins at once has this edge: narrower than the shortest prediction, so that the moment can
 // be fitted and is one.
 inline constexpr double kAtOnce_s = 0.1;
-inline constexpr double kSlowest_s = 5;  // 22 s from a tenth to nine; slower is heat or a battery
+inline constexpr double kSlowest_s = 5;  // 22 s from 0.1 to 0.9; slower is heat or a battery
 
 // Defines the effect of the file catalogue/<name>.cpp.
 #define EFFECT(name)                        \
