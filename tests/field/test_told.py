@@ -357,7 +357,7 @@ FAULTS = {
     "start_not_in_utf_8": Fault(
         "`swarm start --behavior` with a word that is not in UTF-8",
         ("is not in UTF-8; type it anew",),
-        1,
+        2,
         NEVER,
     ),
     "stop_not_in_utf_8": Fault(

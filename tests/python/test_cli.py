@@ -646,6 +646,19 @@ def compared_in(brief_coasting_robot):
     return run
 
 
+@pytest.mark.parametrize(("words", "code"), [(["--version"], 0), (["nonsense"], 2)])
+def test_an_interpreter_that_would_go_on_keeps_the_exit_code(words, code):
+    """With PYTHONINSPECT, Python takes SystemExit for an error that it prints."""
+    ended = subprocess.run(
+        [sys.executable, "-c", "from twinmill_cli.main import main; main()", *words],
+        env={**os.environ, "PYTHONINSPECT": "1"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert ended.returncode == code and "cannot be imported" not in ended.stderr
+
+
 @pytest.mark.parametrize("module", ["typer", "twinmill_cli.output", "twinmill.robots.tell"])
 def test_ctrl_c_while_it_starts_is_one_sentence(module):
     """From the first line of ours on: the interpreter's own start is not ours."""

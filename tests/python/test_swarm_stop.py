@@ -190,7 +190,7 @@ def test_words_that_are_no_text_are_to_be_typed_anew(monkeypatch, capsys, words)
     with pytest.raises(SystemExit) as ended:
         main()
     err = capsys.readouterr().err
-    assert ended.value.code == 1 and "is not in UTF-8; type it anew" in err
+    assert ended.value.code == 2 and "is not in UTF-8; type it anew" in err
 
 
 def test_a_stop_is_said_before_a_file_is_read(monkeypatch, twinmill):

@@ -34,6 +34,12 @@ NO_ROOM = {  # why a file takes no more, and what to do
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
 
+class NotText(typer.TyperException):
+    """Word of a command line that is no text, and no file's name."""
+
+    exit_code = WRONG_COMMAND_LINE
+
+
 def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> NoReturn:
     """Runs a program's command line and leaves with its exit code.
 
@@ -65,7 +71,8 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
         say(stopped, program)
-    if code == STOPPED and words[0] == "swarm":
+    if (code == STOPPED and words[0] == "swarm") or sys.flags.inspect:
+        # PYTHONINSPECT: an interpreter would take the end for an error, whatever the code is
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):
                 stream.flush()
@@ -114,13 +121,19 @@ def _means_stop(word: str) -> bool:
 
 
 def _check_encoding(words: list[str]) -> None:
-    """Raises ValueError for a word that no page, model file, table or JSON could hold."""
+    """Refuses words that no page, model file, table or JSON could hold.
+
+    Raises:
+        NotText: one is typed wrong.
+        ValueError: one is the name of a file.
+    """
     for word in words:
         if word != word.encode(errors="replace").decode():
             name = word.partition("=")[2] or word
             is_file = os.path.lexists(word) or os.path.lexists(name)
             remedy = "rename the file or folder" if is_file else "type it anew, in UTF-8"
-            raise ValueError(f"'{word}': is not in UTF-8; {remedy}.")
+            sentence = f"'{word}': is not in UTF-8; {remedy}."
+            raise ValueError(sentence) if is_file else NotText(sentence)
 
 
 def _told(error: Exception) -> tuple[int, str]:

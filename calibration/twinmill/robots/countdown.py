@@ -13,6 +13,7 @@ from twinmill.robots.fleet import GONE_S, SIGNED_S, TELEMETRY, Fleet, Robot
 ARM = turbopi.signed_command_t.VERB_ARM
 STOPPED = "stopped by another command"
 NOT_BEGUN = "not driving when the others had begun"
+NONE_BEGUN = "not driving when the instant of the start was past"  # clocks may have been set
 UNHEARD = "told something by another operator who was not heard here"
 
 

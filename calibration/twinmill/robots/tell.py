@@ -18,7 +18,13 @@ import turbopi
 
 from twinmill.arguments import option
 from twinmill.foreign_text import plain_line
-from twinmill.robots.countdown import NOT_BEGUN, Dropouts, find_dropouts, stopped_by_another
+from twinmill.robots.countdown import (
+    NONE_BEGUN,
+    NOT_BEGUN,
+    Dropouts,
+    find_dropouts,
+    stopped_by_another,
+)
 from twinmill.robots.fleet import ALL, ASK, LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
@@ -493,7 +499,9 @@ def start(
         waiting = _not_begun(fleet, given, patience_s)
         waiting -= find_dropouts(fleet, robots, command.seq, only_stopped=False).taken
         if waiting and not partial:
-            out = dropouts().beside({i: _why_not_begun(fleet.robots[i]) for i in waiting})
+            why = NOT_BEGUN if len(waiting) < len(given) else NONE_BEGUN
+            words = {i: _not_driving(fleet.robots[i], why) for i in waiting}
+            out = dropouts().beside(words)
         elif waiting and not link_timeout_ms:
             late = stop(fleet, waiting)
     called_off = bool(out) or not agreed
@@ -537,9 +545,9 @@ def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]
     return {robot.robot_id for robot in accepted if robot.mode in STANDING}
 
 
-def _why_not_begun(robot: Robot) -> str:
+def _not_driving(robot: Robot, why: str) -> str:
     alarms = "; ".join(robot.alarms)
-    return f"{NOT_BEGUN} ({alarms})" if alarms else NOT_BEGUN
+    return f"{why} ({alarms})" if alarms else why
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
