@@ -78,11 +78,12 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
         return with_limits(name, parameters, model, steps)
     masks, ends, at = None, None, None
     on = np.array([p.usual for p in parameters])
-    where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN]
+    where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN and r != DURATION]
     if where:
-        own = [parameters[k] for k in where]
-        masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, own)
-        on[where] = _everywhere(own, steps)
+        masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
+        on[where] = _everywhere([parameters[k] for k in where], steps)
+        at_once_s = on[[k for k, r in enumerate(roles) if r == DURATION]]
+        at = np.column_stack([at, np.tile(at_once_s, (len(at), 1))])
     return with_sizes(name, parameters, model, steps, on=on, masks=masks, ends=ends, at=at)
 
 
@@ -90,9 +91,7 @@ def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
     """Values at which an effect of a place or a while acts in the whole log."""
     if where[0].role == "place":
         return [*steps.place.mean(axis=0), where[2].max]
-    moments = [p for p in where if p.role == "moment"]
-    begins_ends = [0.0, moments[-1].max][: len(moments)]
-    return [*begins_ends, *(p.usual for p in where[len(moments) :])]
+    return [0.0, where[-1].max][: len(where)]
 
 
 def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
@@ -117,23 +116,13 @@ def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
     return inside[used].astype(float), None, at[used]
 
 
-def _whiles(
-    steps: Steps, where: list[Parameter]
-) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
-    """Masks (M, W) of times from a moment on, (G, 2) pairs of these, and (G, P) times in s.
-
-    What begins and ends does so at once here.
-    """
-    at_once_s = np.array([p.usual for p in where if p.role == DURATION])
+def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    """Masks (M, W) of times from a moment on, (G, 2) pairs of these, and (G, count) times in s."""
     t_s, begin_s = steps.t_s, steps.logs[0].measurement.track.command_t_s[0]
     grid_s = np.linspace(t_s[0], t_s[-1], MOMENTS + 2)[1:-1]
     masks = (t_s >= grid_s[:, None]).astype(float)
-    if sum(p.role == "moment" for p in where) == 1:
-        return masks, None, _beside((grid_s - begin_s)[:, None], at_once_s)
+    if count == 1:
+        return masks, None, (grid_s - begin_s)[:, None]
     ends = np.column_stack(np.triu_indices(len(grid_s), 1))
     ends = ends[grid_s[ends[:, 1]] - grid_s[ends[:, 0]] >= LEAST_S]
-    return masks, ends, _beside(grid_s[ends] - begin_s, at_once_s)
-
-
-def _beside(times_s: np.ndarray, at_once_s: np.ndarray) -> np.ndarray:
-    return np.column_stack([times_s, np.tile(at_once_s, (len(times_s), 1))])
+    return masks, ends, grid_s[ends] - begin_s

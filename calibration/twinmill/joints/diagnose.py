@@ -53,7 +53,8 @@ class JointDiagnosis:
         for finding in told["findings"]:
             card = self.problem.effects[finding["effect"]]
             units = {n.key: n.unit for n in card.parameters}
-            finding |= {"summary": card.summary, "equation": card.equation, "in": card.held_in}
+            finding |= {"summary": card.summary, "equation": card.equation}
+            finding |= {"in": card.held_in, "in_mjcf": card.held_in == "mjcf"}
             for p in finding["parameters"]:
                 p["unit"] = units[p["name"]]
         return {
