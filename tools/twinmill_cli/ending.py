@@ -8,7 +8,7 @@ import os
 import re
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Any, NoReturn
 
@@ -24,7 +24,6 @@ WRONG_COMMAND_LINE = 2
 LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
 QUOTED = 80  # letters of what a sentence quotes
 TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
-OF_SWARM = (*TO_ROBOTS, "metrics", "plot", "watch", "compare", "phase", "matters", "ask")
 HALTS = ("halt", "abort", "kill", "off")  # other words for it
 NO_ROOM = {  # why a file takes no more, and what to do
     errno.ENOSPC: "no space is left there; make room, then do it again",
@@ -40,13 +39,19 @@ class NotText(typer.TyperException):
     exit_code = WRONG_COMMAND_LINE
 
 
-def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> NoReturn:
+def leave(
+    program: str,
+    run: Callable[[list[str]], Any],
+    stopped: str = "",
+    verbs: Collection[str] = (),
+) -> NoReturn:
     """Runs a program's command line and leaves with its exit code.
 
     Args:
         program: its name.
         run: does what the words of the command line say; returns an exit code, if an int.
         stopped: what to say after Ctrl-C.
+        verbs: words that may stand behind `swarm`, beside those to robots.
     """
     sys.excepthook = sys.__excepthook__  # all that every command needs is imported
     for stream in (sys.stdout, sys.stderr):
@@ -66,7 +71,7 @@ def leave(program: str, run: Callable[[list[str]], Any], stopped: str = "") -> N
     except (typer.TyperException, ImportError, OSError, ValueError) as error:
         code, sentence = _told(error)
         if sentence:
-            sentence += _of_no_stop(words) if code == WRONG_COMMAND_LINE else ""
+            sentence += _of_no_stop(words, verbs) if code == WRONG_COMMAND_LINE else ""
             say(sentence, program)
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
@@ -106,10 +111,10 @@ def _is_stop(words: list[str]) -> bool:
     return [word.lower() for word in words[:2]] == ["swarm", "stop"]
 
 
-def _of_no_stop(words: list[str]) -> str:
+def _of_no_stop(words: list[str], verbs: Collection[str]) -> str:
     """To whoever may have asked for a stop by words that are no command, as `swarm stop-all`."""
     asked = [word.lower() for word in words[:2] if not _is_stop(words)]
-    is_no_verb = asked[:1] == ["swarm"] and not {*asked[1:]} & {*OF_SWARM}
+    is_no_verb = asked[:1] == ["swarm"] and not {*asked[1:]} & {*TO_ROBOTS, *verbs}
     if not (is_no_verb or any(_means_stop(word) for word in asked)):
         return ""
     return " NOTHING WAS STOPPED: `twinmill swarm stop` stops robots."

@@ -337,7 +337,7 @@ def run(arguments: list[str]) -> Any:
 
 def main() -> None:
     """Entry point: leaves with the exit code."""
-    leave("twinmill", run)
+    leave("twinmill", run, verbs=BELOW["swarm"])
 
 
 if __name__ == "__main__":
