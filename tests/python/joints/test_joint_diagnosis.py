@@ -216,6 +216,7 @@ def test_what_the_own_log_shows_too_is_no_news_and_is_written(slide, tmp_path, c
     told = json.loads(capsys.readouterr().out)
     (found,) = told["findings"]
     assert (found["effect"], found["in"]) == ("viscous_friction_by_direction@x", "hook")
+    assert found["in_mjcf"] is False
     assert f"--own {own}" in told["command"]
     assert {a["effect"]: a["in"] for a in told["added"]} == {
         "viscous_friction@x": "mjcf", "viscous_friction_by_direction@x": "hook"
