@@ -2,12 +2,14 @@
 """Words of a command that moves robots keep nobody waiting, and are missed when they fail."""
 
 import io
+import json
 import os
 import pty
 import signal
 import subprocess
 import sys
 import termios
+import threading
 import time
 from contextlib import suppress
 
@@ -16,7 +18,7 @@ import pytest
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.terminal import PlainConsole
-from twinmill_cli.swarm_signals import commanding, ended_by_signals
+from twinmill_cli.swarm_signals import ENDING, HARMLESS, OF_FAULTS, commanding, ended_by_signals
 from twinmill_cli.voice import Voice
 
 BLOCKED_S = 0.3
@@ -189,6 +191,44 @@ def test_signals_end_waiting_and_no_stop():
     assert time.monotonic() - begin_s >= 0.5 and len(rang) == 2
     assert fleet.bus.said > said + 5 and not given[0].stands
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+# Gives each signal to a process that has changed nothing, and prints by which it ends or halts.
+FATES = """
+import json, os, signal, time
+signals, fated = sorted(signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP}), []
+for number in signals:
+    child = os.fork()
+    if child == 0:
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+        os._exit(0)
+    status = os.waitpid(child, os.WUNTRACED)[1]
+    if os.WIFSTOPPED(status):
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    fated += [number] if status else []
+print(json.dumps(fated))
+"""
+
+
+def test_every_signal_that_ends_or_halts_a_program_stops_its_robots_first():
+    """By the kernel's word. Python ignores two of them; a stop of who writes is ignored, too."""
+    command = ["bash", "-c", 'ulimit -c 0; exec "$@"', "bash", sys.executable, "-c", FATES]
+    fated = {*json.loads(subprocess.check_output(command))}
+    known = {signal.SIGPIPE, signal.SIGXFSZ, signal.SIGTTOU}
+    assert {*ENDING} | OF_FAULTS == fated - known and not HARMLESS & (fated - known)
+
+
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGSTKFLT, signal.SIGRTMAX])
+def test_a_signal_that_nobody_expects_ends_waiting(number):
+    fleet = Fleet("", connect=SilentBus, key=bytes(32))
+    with ended_by_signals(fleet, lambda: None) as asked:
+        signal.pthread_kill(threading.get_ident(), number)
+        with pytest.raises(KeyboardInterrupt):
+            fleet.listen(5)
+        signal.pthread_kill(threading.get_ident(), number)  # comes too late to end anything
+    assert asked == [number, number]
 
 
 def test_a_name_that_is_looked_up_for_long_keeps_no_stop_waiting(monkeypatch):

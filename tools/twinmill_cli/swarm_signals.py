@@ -20,13 +20,23 @@ from twinmill_cli.output import print_object, say
 if TYPE_CHECKING:
     from twinmill.robots.fleet import Fleet
 
-# All by which a terminal, a shell or a session that ends asks a program to end or to pause.
-ENDING = (
-    signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP,
-    # of others, which end a program by default: a robot would drive until it has lost its operator
-    signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGVTALRM, signal.SIGPROF,
-    signal.SIGXCPU, signal.SIGPWR, signal.SIGIO,
-)  # fmt: skip
+# By default these end no program, or are Python's own: it ignores two, and writing fails instead.
+HARMLESS = {
+    signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH,
+    signal.SIGPIPE, signal.SIGXFSZ,
+}  # fmt: skip
+# A fault of the program itself comes again for ever where it is handled. Held back, it ends the
+# program all the same, and what somebody sent waits (sigprocmask(2)).
+OF_FAULTS = {signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
+# All others end or halt a program: a robot would drive until it has lost its operator.
+ENDING = tuple(
+    sorted(
+        signal.valid_signals()
+        - {signal.SIGKILL, signal.SIGSTOP, signal.SIGTTOU}
+        - HARMLESS
+        - OF_FAULTS
+    )
+)
 # What became of robots where a command was ended that had said something, by its verb.
 BECAME = {
     "start": "nothing was started; robots were told that they may be (--arm)",
@@ -85,13 +95,24 @@ def counting_signals(numbers: Sequence[int] = ENDING) -> Iterator[list[int]]:
     robots would drive on until they had lost it.
     """
     asked: list[int] = []
+    held_back = signal.pthread_sigmask(signal.SIG_BLOCK, OF_FAULTS)
     before = {number: signal.signal(number, lambda n, _: asked.append(n)) for number in numbers}
     before[signal.SIGTTOU] = signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     try:
         yield asked
     finally:
+        asked += _sent_as_faults()
+        signal.pthread_sigmask(signal.SIG_SETMASK, held_back)
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _sent_as_faults() -> list[int]:
+    """Signals of faults that somebody sent: this program has none, or would have ended."""
+    sent = []
+    while info := signal.sigtimedwait(OF_FAULTS, 0):
+        sent.append(info.si_signo)
+    return sent
 
 
 @contextmanager
@@ -111,12 +132,13 @@ def ended_by_signals(fleet: Fleet, check: Callable[[], None]) -> Iterator[Sequen
 
 @contextmanager
 def watched(
-    fleet: Fleet, asked: Sequence[int], check: Callable[[], None] = lambda: None
+    fleet: Fleet, asked: list[int], check: Callable[[], None] = lambda: None
 ) -> Iterator[None]:
     """Listening ends by KeyboardInterrupt once a signal stands in the list."""
     watch = fleet.watch
 
     def look() -> None:
+        asked.extend(_sent_as_faults())
         if asked:
             raise KeyboardInterrupt
         watch()
