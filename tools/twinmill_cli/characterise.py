@@ -27,7 +27,7 @@ from twinmill_cli.options import (
     ScriptForm,
     SshConfig,
 )
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import AsJson, deliver, say
 
 if working():  # not for --help
     import numpy as np
@@ -127,7 +127,7 @@ def _characterise(
     name = Path(script).name
     if host:
         copy_script(Remote(host, ssh_config), Path(script), name)
-    fleet, voice = Fleet(lcm_url, channel_prefix, key=of_operator(key)), Voice()
+    fleet, voice = Fleet(lcm_url, channel_prefix, key=of_operator(key, say)), Voice()
     try:
         with Recorder(out, force) as recorder, any_key() as pressed:
             run = Run(fleet, recorder, robot, channel_prefix, voice, arm)

@@ -126,7 +126,7 @@ def join(lcm_url: str, channel_prefix: str | None, key: Path | None) -> Fleet:
         ValueError: the key cannot be used, or there is no such bus; the sentence says so.
     """
     try:
-        operator_key = of_operator(key)
+        operator_key = of_operator(key, say)
     except OSError as error:
         raise ValueError(f"{key_fault(error)} Nothing was said to any robot.") from error
     except ValueError as error:

@@ -5,6 +5,7 @@ import hmac
 import os
 import re
 import secrets
+from collections.abc import Callable
 from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
@@ -26,14 +27,29 @@ def default_path() -> Path:
     return Path(config) / "twinmill" / "swarm.key"
 
 
-def of_operator(path: Path | None = None) -> bytes:
+def of_operator(path: Path | None, on_new: Callable[[str], None]) -> bytes:
     """The operator's key: a file that is named must be there, the user's own is made at first use.
+
+    Args:
+        path: of the file; None: the user's own.
+        on_new: is told a sentence if one is made: robots have another, or none.
 
     Raises:
         ValueError: as of load() and load_or_make().
         OSError: it cannot be read.
     """
-    return load(path) if path else load_or_make()
+    if path:
+        return load(path)
+    file = default_path()
+    is_new = not file.exists()
+    key = load_or_make(file)
+    if is_new:
+        on_new(
+            f"a new operator's key was made, {file}, which no robot has yet: `twinmill robot flash "
+            f"HOST` brings robots theirs. If they were flashed with another, name its file: "
+            f"{option('key')}."
+        )
+    return key
 
 
 def load_or_make(path: Path | None = None) -> bytes:
