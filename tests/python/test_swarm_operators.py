@@ -10,9 +10,10 @@ import turbopi
 
 from twinmill.robots import key as keys
 from twinmill.robots import tell
-from twinmill.robots.fleet import MODES, TELEMETRY, Fleet, Robot, Step
+from twinmill.robots.fleet import GONE_S, MODES, TELEMETRY, Fleet, Robot, Step
 from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door
+from twinmill_cli.swarm_end import driving
 from twinmill_cli.swarm_screen import status_table
 from twinmill_cli.swarm_verdict import of_busy
 
@@ -197,6 +198,41 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R01 drives already, held by another operator" in said
     assert "R02 drives already, and no operator is heard who holds it" in said
     assert "R03 drives already, untethered" in said
+
+
+def telemetry(mode: int) -> bytes:
+    said = turbopi.telemetry_t()
+    said.mode = mode
+    return said.encode()
+
+
+@pytest.mark.parametrize(
+    ("before_s", "modes", "drives"),
+    [
+        (0.0, [DRIVING], ["R02"]),
+        (0.0, [DRIVING, TELEMETRY.MODE_STOPPED], []),  # a stop of somebody else reaches it
+        (0.0, [TELEMETRY.MODE_STOPPED, DRIVING, TELEMETRY.MODE_STOPPED], []),  # a late packet
+        (GONE_S + 0.1, [DRIVING], []),  # other words of it are heard since
+    ],
+)
+def test_who_drives_besides_is_told_by_what_is_heard_now(before_s, modes, drives):
+    """Not by a packet from before a stop that comes after one from behind it."""
+    fleet = fleet_of()
+    for mode in modes[: max(1, len(modes) - 1)]:
+        fleet.bus.hear("R02_TELEMETRY", telemetry(mode))
+    fleet.robots[2].recent[-1] = (
+        fleet.robots[2].recent[-1]._replace(heard_s=time.monotonic() - before_s)
+    )
+    coming = modes[1:][-1:]
+
+    def handle_timeout(_):
+        time.sleep(0.01)
+        for mode in coming or (modes if not before_s else []):
+            fleet.bus.hear("R02_TELEMETRY", telemetry(mode))
+        return False
+
+    fleet.bus.handle_timeout = handle_timeout
+    assert driving(fleet, {1}) == drives
 
 
 def test_arming_shows_for_whom_it_waits(monkeypatch, key_file, twinmill):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Group
 
-from twinmill.robots.tell import DRIVING
+from twinmill.robots.tell import OTHERS_S
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_screen import answer_table
@@ -22,9 +22,19 @@ if TYPE_CHECKING:
 
 
 def driving(fleet: Fleet, asked: set[int]) -> list[str]:
-    """Robots that drive and were not asked; nobody was asked where all were."""
+    """Robots that drive and were not asked; nobody was asked where all were.
+
+    Who says so is listened to for a moment: that word may have come late, or just before a stop of
+    somebody else.
+    """
+    with fleet.unwatched():
+        fleet.listen(OTHERS_S, lambda: not _said_to_drive(fleet, asked))
+    return _said_to_drive(fleet, asked)
+
+
+def _said_to_drive(fleet: Fleet, asked: set[int]) -> list[str]:
     others = [fleet.robots[i] for i in sorted(set(fleet.robots) - asked)] if asked else []
-    return [f"R{r.robot_id:02d}" for r in others if r.mode in DRIVING and r.is_here]
+    return [f"R{r.robot_id:02d}" for r in others if r.says_that_it_drives]
 
 
 def clocks(fleet: Fleet, robots: Iterable[int]) -> str:

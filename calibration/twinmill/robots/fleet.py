@@ -28,6 +28,7 @@ SIGNED_S = 2.0  # robots sign ten times a second; half of all lost, so many in a
 GONE_S = 1.0  # a robot that said nothing for so long is not there; it speaks 30 times a second
 ALL, ROBOTS_MAX = -1, 100  # in swarm_command_t, robot_id is one of 0..99, or all
 MODES = ("stopped", "running", "script", "fault")
+DRIVING = ("running", "script")
 TELEMETRY = turbopi.telemetry_t
 DRY_RUN = "dry run: its motor board is not opened"
 # What keeps a robot from doing what it is told, or hides it, loudest first.
@@ -166,6 +167,12 @@ class Robot:
     def is_here(self) -> bool:
         """It said something just now."""
         return time.monotonic() - self.heard_s < GONE_S
+
+    @property
+    def says_that_it_drives(self) -> bool:
+        """Its telemetry of just now does; not what it had said before it fell silent."""
+        is_new = bool(self.recent) and time.monotonic() - self.recent[-1].heard_s < GONE_S
+        return is_new and self.mode in DRIVING
 
     @property
     def stands(self) -> bool:

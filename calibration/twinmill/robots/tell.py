@@ -25,7 +25,7 @@ from twinmill.robots.countdown import (
     find_dropouts,
     stopped_by_another,
 )
-from twinmill.robots.fleet import ALL, ASK, LINK_TIMEOUT_MS, Fleet, Robot
+from twinmill.robots.fleet import ALL, ASK, DRIVING, LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
@@ -43,7 +43,6 @@ STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard 
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
 STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
-DRIVING = ("running", "script")
 STANDING = ("stopped", "fault")
 # Of looking a name up: nobody knows whether there is a machine of it.
 UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
