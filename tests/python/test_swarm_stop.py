@@ -247,6 +247,34 @@ def test_a_stop_whose_bus_cannot_be_read_says_that_nothing_was_stopped(twinmill,
     assert code == 2 and "NOTHING WAS STOPPED" in err and len(err.splitlines()) == 1
 
 
+def test_a_refused_value_is_named_once(twinmill):
+    _, _, err = twinmill("swarm", "stop", "--lcm-url", "x")
+    assert err.startswith("twinmill: Invalid value for '--lcm-url': x: ")
+    assert err.count("Invalid value") == 1
+
+
+@pytest.mark.parametrize("name", ["", " "])
+def test_a_machine_without_a_name_stops_all_and_is_named(monkeypatch, tmp_path, twinmill, name):
+    """As an unset variable of a script leaves; it was said that nothing was heard from `.`."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    words = ["stop", "--host", name, "--timeout-s", "0.5", "--lcm-url", "memq://"]
+    code, out, _ = twinmill("swarm", *words, "--json")
+    said = json.loads(out)["sentence"]
+    assert code == 2 and "'--host': is empty" in said and "So all robots are told to stop." in said
+    assert "heard from" not in said
+
+
+def test_a_key_that_is_made_is_told_with_what_to_do(monkeypatch, tmp_path, twinmill):
+    """Where HOME was wrong, robots answered, did not obey, and nobody knew why."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    _, _, err = twinmill("swarm", "arm", "--lcm-url", "memq://")
+    made = tmp_path / "twinmill" / "swarm.key"
+    assert made.exists() and f"a new operator's key was made, {made}, which no robot has" in err
+    assert "`twinmill robot flash HOST`" in err and "--key" in err
+    _, _, err = twinmill("swarm", "arm", "--lcm-url", "memq://")
+    assert "was made" not in err
+
+
 def test_what_is_to_be_done_with_a_key_can_be_pasted_into_a_shell(tmp_path):
     key = tmp_path / "USB STICK" / "swarm.key"
     key.parent.mkdir()

@@ -49,6 +49,12 @@ KEPT = (
 )
 
 
+class NothingStopped(typer.TyperException):
+    """A stop that was not said, with the sentence of what refused it."""
+
+    exit_code = WRONG_COMMAND_LINE
+
+
 @contextmanager
 def _refusing() -> Iterator[None]:
     """A command line that is refused says that nothing was stopped."""
@@ -57,7 +63,7 @@ def _refusing() -> Iterator[None]:
     except typer.TyperException as error:
         if error.exit_code != WRONG_COMMAND_LINE:
             raise
-        raise typer.BadParameter(f"{_sentence(error)} NOTHING WAS STOPPED.") from error
+        raise NothingStopped(f"{_sentence(error)} NOTHING WAS STOPPED.") from error
 
 
 def _sentence(error: typer.TyperException) -> str:
@@ -142,7 +148,8 @@ def stop(
     with counting_signals() as signals:
         with _refusing():
             check_network(lcm_url)
-        asked, prefix, misread = _read(robots, channel_prefix or "", context.meta.get(MISREAD, ""))
+        misread = context.meta.get(MISREAD, "") or _of_hosts(host or ())
+        asked, prefix, misread = _read(robots, channel_prefix or "", misread)
         fleet = _say_first(lcm_url, prefix, asked)
         begin_s = time.monotonic()
         fleet.key, fault = key_if_there(key)
@@ -150,7 +157,7 @@ def stop(
         with saying_nothing() as say:
             for words in filter(None, [misread, fault, deaf]):
                 say(words)
-            hosts = tell.Hosts(host or ())
+            hosts = tell.Hosts([name for name in host or () if name.strip()])
             given = tell.stop(
                 fleet,
                 asked,
@@ -161,8 +168,9 @@ def stop(
             )
             passed_s = time.monotonic() - begin_s
             reached_s = tell.reached_s(fleet, passed_s)
-            if asked:
+            if asked:  # who drives besides
                 fleet.listen(tell.OTHERS_S)
+        beside = driving(fleet, asked)
         fleet.close()
         is_cut_short = _ends_a_stop(signals) and passed_s < timeout_s
         how = Saying(
@@ -174,7 +182,7 @@ def stop(
             to_all=not asked,
             key_fault=deaf or (f"No robot's signature could be checked: {fault}" if fault else ""),
         )
-        verdict = of_stop(given, how, is_of_some=bool(asked)).beside(driving(fleet, asked))
+        verdict = of_stop(given, how, is_of_some=bool(asked)).beside(beside)
         verdict = verdict.more(of_dry_run(given))
         code = WRONG_COMMAND_LINE if misread else verdict.code
         if misread:
@@ -217,6 +225,16 @@ def _read(robots: str | None, prefix: str, misread: str) -> tuple[set[int], str,
         misread = _sentence(error)
     asked = set() if misread else asked
     return asked, prefix, f"{misread} So all robots are told to stop." if misread else ""
+
+
+def _of_hosts(names: Sequence[str]) -> str:
+    """Sentence on a machine that has no name, as an unset variable of a script leaves; or empty."""
+    if all(name.strip() for name in names):
+        return ""
+    return (
+        "Invalid value for '--host': is empty, and no machine has that name; give its name or "
+        "address, as robot03.local, or leave the option out."
+    )
 
 
 def _ends_a_stop(signals: Sequence[int]) -> bool:
