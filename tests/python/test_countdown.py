@@ -6,9 +6,11 @@ import time
 import pytest
 import turbopi
 
+from twinmill.robots import key as keys
 from twinmill.robots import tell
 from twinmill.robots.countdown import STOPPED, find_dropouts
 from twinmill.robots.fleet import GONE_S, TELEMETRY, Fleet, Heard, Robot
+from twinmill_cli.swarm_verdict import of_start
 
 KEY, SESSION, SEQ, OWN = bytes(range(32)), 7, 5, 1000
 VERBS, ARM = turbopi.swarm_command_t, turbopi.signed_command_t.VERB_ARM
@@ -161,3 +163,69 @@ def test_a_command_is_above_what_was_said_before_though_no_link_has_come_since(a
     arm, select = sorted(set(fleet.bus.counters))
     assert robot.link.counter < arm < select
     assert fleet.bus.counters == sorted(fleet.bus.counters)
+
+
+class SetBack:
+    """Robots that accept a start; then their clocks are set back, and its instant is far ahead."""
+
+    def __init__(self, *robots: int, drive: tuple[int, ...] = ()):
+        self.robots, self.drive, self.waiting = robots, drive, []
+        self.session_us, self.start_us = 1_000_000, None
+
+    def subscribe(self, _, handler):
+        self.hear = handler
+
+    def _say(self, robot_id: int, kind: str, message, **fields) -> None:
+        self.session_us += 1
+        usual = {"robot_id": robot_id, "utime_us": time.time_ns() // 1000}
+        if kind != "TELEMETRY":
+            usual |= {"session": SESSION, "session_us": self.session_us}
+            message.tag = bytes(keys.TAG_BYTES)
+        for name, value in (usual | fields).items():
+            setattr(message, name, value)
+        data = message.encode()
+        signed = data if kind == "TELEMETRY" else keys.sign(keys.of_robot(KEY, robot_id), data)
+        self.waiting.append((f"R{robot_id:02d}_{kind}", signed))
+
+    def publish(self, channel, data):
+        is_signed = channel == "SWARM_SIGNED"
+        sealed = turbopi.signed_command_t.decode(data) if is_signed else None
+        command = VERBS.decode(sealed.command if is_signed else data)
+        if command.verb == turbopi.signed_command_t.VERB_HOLD:
+            return
+        self.start_us = command.start_utime_us if command.verb == VERBS.VERB_START else None
+        answer = {"seq": command.seq, "verb": command.verb, "accepted": True, "stands": True}
+        for i in [command.robot_id] if is_signed else self.robots:
+            acked = {**answer, "command_utime_us": command.utime_us}
+            self._say(i, "SIGNED_ACK", turbopi.signed_ack_t(), **acked)
+
+    def handle_timeout(self, timeout_ms):
+        if not self.waiting:
+            time.sleep(timeout_ms / 1e3)
+            for i in self.robots:
+                is_past = self.start_us is not None and 1e6 * time.time() > self.start_us
+                mode = TELEMETRY.MODE_TABLE if is_past and i in self.drive else 0
+                self._say(i, "TELEMETRY", TELEMETRY(), mode=mode)
+                link = {"armed": True, "mode": mode, "stands": not mode}
+                self._say(i, "LINK", turbopi.link_t(), **link, link_timeout_ms=2000)
+            return False
+        self.hear(*self.waiting.pop(0))
+        return True
+
+
+@pytest.mark.parametrize(
+    ("drive", "words", "remedy"),
+    [
+        ((), "R01, R02 were not driving when the instant of the start was past", "(--arm)."),
+        ((1,), "R02 was not driving when the others had begun", "(--arm); --partial starts some."),
+    ],
+)
+def test_a_start_whose_instant_is_past_says_whether_others_had_begun(drive, words, remedy):
+    """Nobody had, and "when the others had begun" was said; no part of nobody could be started."""
+    fleet = Fleet("", connect=lambda _: SetBack(1, 2, drive=drive), key=KEY)
+    fleet.listen(0.2)
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=0.6, partial=False)
+    verdict = of_start(begun)
+    assert verdict.sentence.startswith(f"Called off: {words}. All were told to stop: ")
+    assert verdict.sentence.endswith(remedy) and verdict.code == 1
+    assert begun.begun_utime_us is None and not fleet.held

@@ -10,7 +10,7 @@ from datetime import datetime
 
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
-from twinmill.robots.countdown import STOPPED
+from twinmill.robots.countdown import NONE_BEGUN, STOPPED
 from twinmill.robots.fleet import DRY_RUN, Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
@@ -216,7 +216,12 @@ def _besides(given: list[Answer]) -> str:
     """Remarks on robots that have confirmed a stop."""
     lost_link = [a for a in given if a.lost_link]
     before = f"{_names(lost_link)} stood before: it had lost its operator." if lost_link else ""
-    return _joined(before, *(f"{_names([a])} {a.reason}." for a in given if a.reason))
+    return _joined(before, of_remarks(given))
+
+
+def of_remarks(given: list[Answer]) -> str:
+    """Words of robots that have confirmed a stop: that they forget it if started anew."""
+    return _joined(*(f"{_names([a])} {a.reason}." for a in given if a.reason))
 
 
 def _joined(*sentences: str) -> str:
@@ -435,7 +440,8 @@ def _of_called_off(begun: Start) -> Verdict:
     if begun.stopped:
         whom = "The others" if taken else "All"
         stopped = of_stop(begun.stopped, is_of_some=bool(taken)).sentence
-        more = "" if STOPPED in begun.dropouts.words.values() else "; --partial starts some"
+        is_of_all = any(w.startswith((STOPPED, NONE_BEGUN)) for w in begun.dropouts.words.values())
+        more = "" if is_of_all else "; --partial starts some"
         words += f" {whom} were told to stop: {stopped} They must be armed before they start"
         words += f" (--arm){more}."
     return Verdict(False, words)
