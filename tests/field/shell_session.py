@@ -247,11 +247,11 @@ class Laboratory(Field):
         return self.told(shell, fault_s, shell.end()) | {"drove": drove}
 
     def quota(self) -> dict:
-        """The file below stdout takes no byte: from the first move on."""
+        """The file below stdout takes no byte."""
         shell = self.script(f"ulimit -f 0; exec {self.started()} > log.txt", terminal=False)
         code = shell.end()
-        moves_s = [t for t, d in self.robots[1].rows() if t > self.begin_s and d != ZERO]
-        return self.told(shell, moves_s[0] if moves_s else self.begin_s, code)
+        self.operator = shell
+        return self._unmoved(self.begin_s, code)
 
     def one_of_two_is_heard(self) -> dict:
         """Nobody has said how many there are: a robot may be there and not be heard."""

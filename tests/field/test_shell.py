@@ -55,7 +55,11 @@ CASES = {
     "nohup_and_the_terminal_closed": Case((BY_KEY, "All stand."), -1),
     "pipe_into_tee": Case((BY_KEY, "All stand."), BY_SIGINT),
     "nap": Case((BY_KEY, "All stand."), BY_SIGINT),
-    "quota": Case(("All stand.", "standard output (/", "log.txt): no file may become so large"), 1),
+    "quota": Case(
+        ("nothing was started: standard output (/", "log.txt): no file may become so large"),
+        1,
+        NEVER,
+    ),
     "one_of_two_is_heard": Case(
         ("1 robot was heard: R01; --robots says who is to answer.", "All stand. 1 robot was heard"),
         0,

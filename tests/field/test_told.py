@@ -77,7 +77,36 @@ FAULTS = {
     "slept": Fault(
         "laptop sleeps for 3 s", ("All stand: R01, R02: it had lost its link",), 1, LINK_LOST_S
     ),
-    "output_full": Fault("disk below the tool's output full", ("no space is left",), 1),
+    "output_full": Fault(
+        "disk below the tool's output full",
+        ("nothing was started: standard output: no space is left",),
+        1,
+        NEVER,
+        is_brief=True,
+    ),
+    "signalled_in_real_time": Fault("SIGRTMIN", ("Started at", "All stand."), 0),
+    "signalled_as_by_a_fault": Fault("`kill -SEGV`", ("Started at", "All stand."), 0),
+    "run_dir_lost": Fault(
+        "the robots' run_dir is gone while they are held; then Ctrl-C",
+        ("All stand.", "R01 stands, but forgets this stop if started anew: run_dir"),
+        130,
+    ),
+    "log_deleted": Fault(
+        "the folder of the tool's output is deleted while it holds; then Ctrl-C",
+        ("All stand.", "was deleted meanwhile, and what was told there is lost."),
+        1,
+    ),
+    "stop_of_a_host_without_a_name": Fault(
+        '`swarm stop --host ""` (from its first packet)',
+        ("'--host': is empty", "So all robots are told to stop.", "All stand."),
+        2,
+    ),
+    "start_with_a_key_made_now": Fault(
+        "`swarm start` in a home folder without a key",
+        ("a new operator's key was made", "signs nothing with this operator's key"),
+        1,
+        NEVER,
+    ),
     "stopped_by_another": Fault(
         "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 0
     ),

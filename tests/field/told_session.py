@@ -62,7 +62,7 @@ class Operator:
 
     def __init__(
         self,
-        key: Path,
+        key: Path | None,
         *words: str,
         terminal: bool = True,
         clock_ahead_s: int = 0,
@@ -72,7 +72,8 @@ class Operator:
     ):
         program = (CLOCK.format(clock_ahead_s) if clock_ahead_s else "") + COMMAND
         program = (LATE.format(late_s) if late_s else "") + program
-        command = [sys.executable, "-c", program, "swarm", *words, "--key", str(key)]
+        command = [sys.executable, "-c", program, "swarm", *words]
+        command += ["--key", str(key)] if key else []
         if elsewhere:  # a computer without any network
             command = ["unshare", "--net", *command]
         self.said = ""
@@ -312,13 +313,70 @@ class Field:
         return self.row(fault_s, operator.end())
 
     def output_full(self) -> dict:
+        begin_s = time.monotonic()
         with open("/dev/full", "w") as full:
-            operator = self.start("--json", terminal=False, stdout=full, stderr=subprocess.PIPE)
-            fault_s = time.monotonic()
-            operator._ear = None
+            self.operator = operator = Operator(
+                self.key_file, *START, terminal=False, stdout=full, stderr=subprocess.PIPE
+            )
             _, said = operator.process.communicate(timeout=20)
         operator.said = said.decode()
-        return self.row(fault_s, operator.process.returncode)
+        return self._unmoved(begin_s, operator.process.returncode)
+
+    def signalled_in_real_time(self) -> dict:
+        return self._signalled(signal.SIGRTMIN)
+
+    def signalled_as_by_a_fault(self) -> dict:
+        """By a person: a fault of the program itself ends it at once."""
+        return self._signalled(signal.SIGSEGV)
+
+    def _signalled(self, number: int) -> dict:
+        operator = self.held(terminal=False)
+        fault_s = time.monotonic()
+        operator.process.send_signal(number)
+        return self.row(fault_s, operator.end())
+
+    def run_dir_lost(self) -> dict:
+        """As by somebody who tidies up: a robot cannot write down that it was stopped."""
+        operator = self.held(terminal=False)
+        kept = [self.folder / f"run{i}" for i in IDS]  # as robot_options() names them
+        for folder in kept:
+            folder.rename(f"{folder} gone")
+        time.sleep(0.5)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end())
+        for folder in kept:
+            Path(f"{folder} gone").rename(folder)
+        time.sleep(2)
+        return row
+
+    def log_deleted(self) -> dict:
+        """The folder goes in which the tool's output is; its sentences have a reader."""
+        folder = self.folder / "logs"
+        folder.mkdir()
+        with open(folder / "log", "w") as log:
+            operator = self.start(terminal=False, stdout=log, stderr=subprocess.PIPE)
+        operator._ear = None
+        time.sleep(0.5)
+        (folder / "log").unlink()
+        folder.rmdir()
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        _, said = operator.process.communicate(timeout=20)
+        operator.said = said.decode()
+        return self.row(fault_s, operator.end())
+
+    def stop_of_a_host_without_a_name(self) -> dict:
+        return self._stopped_by("--host", "")
+
+    def start_with_a_key_made_now(self) -> dict:
+        """HOME is another user's, or new: robots answer to nothing that is signed there."""
+        begin_s, home = time.monotonic(), self.folder / "home"
+        env = {k: v for k, v in os.environ.items() if k != "XDG_CONFIG_HOME"}
+        self.operator = Operator(
+            None, "start", "--robots", "1,2", terminal=False, env={**env, "HOME": str(home)}
+        )
+        return self._unmoved(begin_s, self.operator.end())
 
     def stopped_by_another(self) -> dict:
         operator = self.held(terminal=False)

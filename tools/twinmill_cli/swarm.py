@@ -41,6 +41,7 @@ if working():  # not for --help
     from twinmill.robots.fleet import LINK_TIMEOUT_MS, RUN_PERIOD_S, Fleet
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
+    from twinmill_cli.room import refuse_deleted, refuse_full
     from twinmill_cli.swarm_end import clocks, driving, finish
     from twinmill_cli.swarm_screen import status_table
     from twinmill_cli.swarm_verdict import (
@@ -50,6 +51,7 @@ if working():  # not for --help
         of_busy,
         of_end,
         of_heard,
+        of_remarks,
         of_select,
         of_start,
         of_stop,
@@ -115,6 +117,7 @@ def _start(
     asked, behavior = parse_robots(robots), check_behavior(behavior, "'--behavior'")
     check_bus(lcm_url, channel_prefix)
     refuse_deaf()
+    files = refuse_full()
     timeout_ms = 0 if untethered else round(1e3 * (link_timeout_s or LINK_TIMEOUT_MS / 1e3))
     options = {"ahead_s": in_s, "partial": partial, "link_timeout_ms": timeout_ms}
     with commanding("start", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
@@ -157,6 +160,7 @@ def _start(
                 voice.end(code, asked_to_end)
                 decide(code)
         voice.check()
+        refuse_deleted(files)
         return code
 
 
@@ -210,7 +214,8 @@ def _drive(
         stopped = of_stop(given, Saying(reach=fleet.reach))
         ended = of_end(begun, states, stopped, was_confirmed=known)
         ended = (
-            ended.more(heard)
+            ended.more(of_remarks(given) if stopped.ok else "")
+            .more(heard)
             .beside(driving(fleet, asked))
             .more("" if odd else clocks(fleet, asked))
         )
