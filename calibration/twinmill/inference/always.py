@@ -23,6 +23,7 @@ from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
+from twinmill.inference.noise import usual_after
 from twinmill.inference.planar import PlanarProblem, problem_of
 from twinmill.inference.prior import Always, weight_labels
 from twinmill.inference.problem import View
@@ -63,12 +64,16 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
     each = [_grown(p, h, search.view), _grown(p, h, p.view(noise_of(h, p)))]
-    beside = [size * kernel.columns for kernel, size in each[0].kernels]
-    if beside:
-        each.append(_grown(p, h, p.view(noise_of(h, p, np.concatenate(beside)))))
+    if beside := each[0].kernels:
+        each.append(_grown(p, h, p.view(noise_of(h, p, _columns(beside)))))
     words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
-    wander = {word: _sizes(p, h, each, word) for word in words}
+    wander = {name: sizes for word in words for name, sizes in _sizes(p, h, each, word).items()}
     return _conditioned(p, h, max(each, key=lambda g: g.log_evidence), wander)
+
+
+def _columns(found: list[tuple[Kernel, float]]) -> np.ndarray | None:
+    """(K, W, 3) of kernels at their sizes; None if there is none."""
+    return np.concatenate([size * kernel.columns for kernel, size in found]) if found else None
 
 
 def _lasts(effects: tuple[str, ...]) -> bool:
@@ -116,8 +121,13 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     return np.concatenate([view.stacked.columns[:0], *own])
 
 
-def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.ndarray:
-    """(S,) posterior probabilities of the sizes of a dependence, each under its best noise."""
+def _sizes(
+    p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str
+) -> dict[str, np.ndarray]:
+    """(S,) posterior probabilities of the sizes of each kernel of a dependence.
+
+    One of them at most is there; each hypothesis under its best noise.
+    """
     none, some = [], []
     at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
     for grown in each:
@@ -127,10 +137,11 @@ def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -
         own = evidence(h, view, linear)
         prior = sum(float(np.log(_odds(p, k)[size == SIZES][0])) for k, size in rest)
         none.append(own.alone - view.log_size + prior)
-        some.append(none[-1] + logsumexp(own.gains[at], axis=0) - np.log(len(at)))
+        some.append(none[-1] + own.gains[at])
     there = PRIORS.outside / _count_words(p)
-    logs = np.r_[np.log(1 - there) + max(none), np.log(there * CHANCE) + np.max(some, axis=0)]
-    return np.exp(logs - logsumexp(logs))[1:]
+    logs = np.log(there * CHANCE / len(at)) + np.max(some, axis=0)
+    found = np.exp(logs - np.logaddexp(np.log(1 - there) + max(none), logsumexp(logs)))
+    return dict(zip((p.kernels[f].name for f in at), found, strict=True))
 
 
 def _conditioned(
@@ -160,6 +171,6 @@ def _conditioned(
         rate=grown.rate,
         usual=p.motion.usual,
         top=p.motion.top,
-        noise=np.exp(view.fitter.noise.logs),
+        noise=usual_after(*h.about_mean(_columns(grown.kernels)), view.fitter.noise),
         hidden=replace(hidden, shift=hidden.shift[kept]),
     )

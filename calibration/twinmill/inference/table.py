@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP
+from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP, TIME
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
@@ -210,11 +210,7 @@ def noise_of(h: Hypothesis, p: Problem, beside: np.ndarray | None = None) -> Noi
         p: of the logs.
         beside: (K, W, 3) columns of a dependence that is there as well.
     """
-    columns = np.tensordot(np.linalg.cholesky(h.cov).T, h.slopes, 1)
-    if beside is not None:
-        columns = np.concatenate([columns, beside])
-    at_mean = h.errors + np.tensordot(h.value - h.mean, h.slopes, 1)
-    return fit_noise(at_mean, columns, p.noise)
+    return fit_noise(*h.about_mean(beside), p.noise, p.usual)
 
 
 @dataclass(frozen=True)
@@ -258,6 +254,7 @@ class _Comparison:
         (usual, own), *others = self._plain
         news = self._usual_and_news[1]
         out = [self._alone(usual), *self._with_words(usual, own), self._alone(news)]
+        out += self._of_noise(usual)
         for other, of_other in others:
             out += [self._alone(other), *self._with_words(other, of_other)]
         if whole:
@@ -315,13 +312,21 @@ class _Comparison:
         return out
 
     def always(self) -> list[tuple[tuple[str, ...], float]]:
-        """Log odds of each of `subsets` that it always was there, against its being new."""
+        """Log odds of each of `subsets` that it always was there, against its being new.
+
+        What may decide is fitted anew: numbers that the base's own log tells can be far from
+        these, where the model is another linear one.
+        """
         found, fitter = [], self.view.fitter
+        new = self.h.log_evidence(self._known)
         for names in subsets(self.h.effects):
             if there := self.problem.always_there(self.h, names):
                 told, log_factor = there
-                then = told.log_evidence(told.linear(fitter)) + log_factor
-                found.append((names, then - self.h.log_evidence(self._known)))
+                log_odds = told.log_evidence(told.linear(fitter)) + log_factor - new
+                if log_odds > -BEYOND:
+                    told = fitter.fit(told)
+                    log_odds = told.log_evidence(told.linear(fitter)) + log_factor - new
+                found.append((names, log_odds))
         return found
 
     @cached_property
@@ -460,28 +465,47 @@ class _Comparison:
 
         As far as the robot wanders with time or place by itself it is no news.
         """
-        out = []
+        out, usual = [], self.problem.wander
         for word in self.words[:-1]:
             if word not in beside.words:
-                words = (*beside.words, word)
-                out.append(self._with_word(beside, own, word, chance=CHANCE, words=words))
-                if word in self.problem.wander:
-                    usual = self.problem.wander[word]
-                    out.append(self._with_word(beside, own, word, chance=usual, words=beside.words))
+                at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
+                names = [self.view.kernels[k].name for k in at]
+                of_each = {beside.words: [usual.get(name, 0 * CHANCE) for name in names],
+                           (*beside.words, word): [CHANCE / len(at)] * len(at)}  # fmt: skip
+                for words, chance in of_each.items():
+                    if np.any(chance):
+                        out.append(self._with_word(beside, own, at, np.array(chance), words))
         return out
 
+    def _of_noise(self, beside: _Beside) -> list[Entry]:
+        """An entry in which the noise itself is a thing that comes and goes, and new."""
+        if self.view.growth is None:
+            return []
+        log_odds, fall = self.view.growth
+        forms = sum(kernel.depends_on == TIME for kernel in self.view.kernels) + 1
+        alone = self._alone(beside)
+        log_evidence = alone.log_evidence + log_odds - np.log(forms)
+        relative = np.broadcast_to(self._log_relative(np.array(fall)), len(self.squares))
+        mimicked = tuple((log_evidence + relative).tolist())
+        entry = replace(alone, words=(TIME,), log_evidence=log_evidence, log_mimicked=mimicked, fall=fall)
+        return [entry]
+
     def _with_word(
-        self, beside: _Beside, own: Evidence, word: str, *, chance: np.ndarray, words: tuple
+        self,
+        beside: _Beside,
+        own: Evidence,
+        at: list[int],
+        chance: np.ndarray,
+        words: tuple[str, ...],
     ) -> Entry:
-        """With a dependence whose sizes have these chances, told in these words."""
-        at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
-        gains = own.gains[at] - np.log(len(at))
-        likely = gains + np.log(np.maximum(chance, 1e-300))
+        """With a dependence, told in these words, whose kernels have (F, S) chances of sizes."""
+        likely = own.gains[at] + np.log(np.maximum(chance, 1e-300))
         total = float(np.logaddexp.reduce(likely, axis=None))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
         if words and not beside.words:
             relative = self._log_relative(own.falls[at])
-            each = (gains + relative).reshape(len(relative), gains.size)
+            each = own.gains[at] - np.log(len(at)) + relative
+            each = each.reshape(len(relative), likely.size)
             mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
         linear = own.with_kernel(self.view, at[f], SIZES[s])
