@@ -82,6 +82,11 @@ def kernels(m: Motion) -> list[Kernel]:
     return found
 
 
+def dependence_of(kernel: str) -> str:
+    """Word of the dependence that a kernel of this name is a form of."""
+    return kernel.split(":")[0]
+
+
 def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
     """Arrays (K, W, 3): what an effect's formula may miss, each for a relative error of one.
 

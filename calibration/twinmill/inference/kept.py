@@ -38,7 +38,7 @@ def kept(model_file: ModelFile) -> Always | None:
             mean=np.array(table["mean"], float),
             cov=low @ low.T,
             kernels=tuple((str(name), float(size)) for name, size in table["kernels"].items()),
-            wander={str(word): np.array(p, float) for word, p in table["wander"].items()},
+            wander={str(name): np.array(p, float) for name, p in table["wander"].items()},
             rate=Rate(**table["rate"]),
             usual=np.array(table["usual"], float),
             top=np.array(table["top"], float),
@@ -69,7 +69,7 @@ def as_table(always: Always) -> dict[str, Any]:
     return {
         "effects": list(always.effects),
         "kernels": dict(always.kernels),
-        "wander": {word: _short(p) for word, p in always.wander.items()},
+        "wander": {name: _short(p) for name, p in always.wander.items()},
         "rate": {k: _short([getattr(always.rate, k)])[0] for k in ("there", "on", "off")},
         "usual": _short(always.usual),
         "top": _short(always.top),

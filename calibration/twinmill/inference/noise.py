@@ -230,7 +230,8 @@ def usual_after(errors: np.ndarray, columns: np.ndarray, noise: Noise) -> Usual:
     """Knowledge of the noise of other logs, from one log in which it was found.
 
     Args:
-        errors, columns: of that log, as of `fit_noise`.
+        errors: (W, C) of that log.
+        columns: (K, W, C), as of `fit_noise`.
         noise: as found there.
     """
     usual = Usual.about(noise)

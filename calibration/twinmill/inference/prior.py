@@ -9,7 +9,7 @@ import twinmill_native as native
 from scipy.linalg import block_diag
 
 from twinmill.inference.candidate import size_std
-from twinmill.inference.discrepancy import Kernel
+from twinmill.inference.discrepancy import Kernel, dependence_of
 from twinmill.inference.duties import refined
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.moments import Rate
@@ -64,6 +64,14 @@ class Always:
     top: np.ndarray
     noise: Usual
     hidden: Hidden
+
+    def sizes_of_wander(self) -> dict[str, np.ndarray]:
+        """(S,) probabilities of each of SIZES of a wander, by dependence."""
+        found: dict[str, np.ndarray] = {}
+        for name, chance in self.wander.items():
+            word = dependence_of(name)
+            found[word] = found.get(word, 0) + chance
+        return found
 
 
 @dataclass(frozen=True)

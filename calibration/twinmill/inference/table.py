@@ -474,7 +474,9 @@ class _Comparison:
                            (*beside.words, word): [CHANCE / len(at)] * len(at)}  # fmt: skip
                 for words, chance in of_each.items():
                     if np.any(chance):
-                        out.append(self._with_word(beside, own, at, np.array(chance), words))
+                        out.append(
+                            self._with_word(beside, own, at, chance=np.array(chance), words=words)
+                        )
         return out
 
     def _of_noise(self, beside: _Beside) -> list[Entry]:
@@ -487,7 +489,9 @@ class _Comparison:
         log_evidence = alone.log_evidence + log_odds - np.log(forms)
         relative = np.broadcast_to(self._log_relative(np.array(fall)), len(self.squares))
         mimicked = tuple((log_evidence + relative).tolist())
-        entry = replace(alone, words=(TIME,), log_evidence=log_evidence, log_mimicked=mimicked, fall=fall)
+        entry = replace(
+            alone, words=(TIME,), log_evidence=log_evidence, log_mimicked=mimicked, fall=fall
+        )
         return [entry]
 
     def _with_word(
@@ -495,6 +499,7 @@ class _Comparison:
         beside: _Beside,
         own: Evidence,
         at: list[int],
+        *,
         chance: np.ndarray,
         words: tuple[str, ...],
     ) -> Entry:
