@@ -120,7 +120,7 @@ Form = tuple[str, np.ndarray, np.ndarray | float]
 
 def _of_time(m: Motion) -> Iterator[Form]:
     for name, shortest_s, smooth_s in (("slow", 12.0, 8.0), ("quick", 3.0, 1.5)):
-        w, share = waves(m.t_s, shortest_s, smooth_s)
+        w, share = waves(m.t_s, shortest_s, smooth_s, most=120)  # those of a log of three minutes
         yield f"{name} gain", _gains(m, w, "all"), share
         yield f"{name} gain of travel", _gains(m, w, "travel"), share
         yield f"{name} gain of turns", _gains(m, w, "turn"), share
@@ -291,10 +291,19 @@ def _compass(m: Motion, orders) -> np.ndarray:
     return np.array(out)
 
 
-def waves(along: np.ndarray, shortest: float, smooth: float) -> tuple[np.ndarray, np.ndarray]:
-    """(K, W) cosines over a span, and the variance shares of a Matern 3/2 of that length scale."""
+def waves(
+    along: np.ndarray, shortest: float, smooth: float, most: int = 60
+) -> tuple[np.ndarray, np.ndarray]:
+    """(K, W) cosines over a span, and the variance shares of a Matern 3/2 of that length scale.
+
+    Args:
+        along: (W,) positions.
+        shortest: wave, in their unit; longer where more than `most` waves would be needed.
+        smooth: length scale, in their unit.
+        most: so many waves at most.
+    """
     span = max(np.ptp(along), 1e-9)
-    k = np.arange(1, int(np.clip(2 * span / shortest, 3, 120)) + 1)
+    k = np.arange(1, int(np.clip(2 * span / shortest, 3, most)) + 1)
     waves = np.sqrt(2) * np.cos(np.pi * k[:, None] * (along - along.min()) / span)
     share = (1 + (np.pi * k / span * smooth) ** 2) ** -1.5
     return waves, share / share.sum()

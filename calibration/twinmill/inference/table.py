@@ -264,6 +264,7 @@ class _Comparison:
             for first in (news, self._likeliest(usual, own)):
                 if first.fall > 0:
                     out += self._with_words(first, self._evidence(first))
+                    out += self._of_noise(first)
         return _as_without_moments(out)
 
     def numbers(self) -> Numbers:
@@ -487,12 +488,17 @@ class _Comparison:
         forms = sum(kernel.depends_on == TIME for kernel in self.view.kernels) + 1
         alone = self._alone(beside)
         log_evidence = alone.log_evidence + log_odds - np.log(forms)
-        relative = np.broadcast_to(self._log_relative(np.array(fall)), len(self.squares))
-        mimicked = tuple((log_evidence + relative).tolist())
-        entry = replace(
-            alone, words=(TIME,), log_evidence=log_evidence, log_mimicked=mimicked, fall=fall
-        )
-        return [entry]
+        relative = beside.log_relative if beside.words else self._log_relative(np.array(fall))
+        relative = np.broadcast_to(relative, len(self.squares))
+        return [
+            replace(
+                alone,
+                words=tuple(dict.fromkeys((*beside.words, TIME))),
+                log_evidence=log_evidence,
+                log_mimicked=tuple((log_evidence + relative).tolist()),
+                fall=beside.fall if beside.words else fall,
+            )
+        ]
 
     def _with_word(
         self,
