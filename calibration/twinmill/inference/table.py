@@ -131,8 +131,8 @@ def table_of(search: Search) -> Table:
     for h, beside in ((fitted[order[0]], _likeliest_columns(best_set, p)), (fitted[()], None)):
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
-    entries: dict[tuple, Entry] = {}
-    falls: dict[tuple, float] = {}  # under the first of them, as the excess is ...
+    entries: list[Entry] = []
+    first: list[Entry] = []  # under the first noise, as are the excess ...
     takes: dict[tuple[str, ...], np.ndarray] = {}  # ... and this
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
     for names in kept:
@@ -147,17 +147,16 @@ def table_of(search: Search) -> Table:
             squares = np.array([each[index].sum() for index in within])
             own = _Comparison(p, search.words, h, forms, squares, view)
             of_noise = own.entries(names in whole)
-            for entry in of_noise:
-                key = entry.effects, entry.stale, tuple(sorted(entry.words))
-                falls.setdefault(key, entry.fall)
-                if key not in entries or entry.log_evidence > entries[key].log_evidence:
-                    entries[key] = entry
+            entries += of_noise
+            if view is views[0]:
+                first += of_noise
             likely = max(entry.log_evidence for entry in of_noise)
             if likely > best.get(names, (-np.inf,))[0]:
                 best[names] = likely, own
+    falls = {key: entry.fall for key, entry in _likeliest_of_each(first).items()}
     rows = len(p.steps) * int(p.steps.observed.sum())
     return Table(
-        [replace(entry, fall=falls[key]) for key, entry in entries.items()],
+        [replace(e, fall=falls.get(k, e.fall)) for k, e in _likeliest_of_each(entries).items()],
         {names: own.numbers() for names, (_, own) in best.items()},
         takes,
         max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
@@ -167,6 +166,12 @@ def table_of(search: Search) -> Table:
         {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
         p.kinds,
     )
+
+
+def _likeliest_of_each(entries: list[Entry]) -> dict[tuple, Entry]:
+    """Of each set of effects, kind of base and dependences the entry with the most evidence."""
+    order = sorted(entries, key=lambda e: e.log_evidence)
+    return {(e.effects, e.stale, frozenset(e.words)): e for e in order}
 
 
 def _swells(h: Hypothesis, kinds: Kinds) -> str | None:
