@@ -15,14 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from twinmill.data.measurement import Measurement
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel
+from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel, dependence_of
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
+from twinmill.inference.noise import usual_after
 from twinmill.inference.planar import PlanarProblem, problem_of
 from twinmill.inference.prior import Always, weight_labels
 from twinmill.inference.problem import View
@@ -63,12 +64,22 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
     each = [_grown(p, h, search.view), _grown(p, h, p.view(noise_of(h, p)))]
-    beside = [size * kernel.columns for kernel, size in each[0].kernels]
-    if beside:
-        each.append(_grown(p, h, p.view(noise_of(h, p, np.concatenate(beside)))))
+    if beside := each[0].kernels:
+        each.append(_grown(p, h, p.view(noise_of(h, p, _columns(beside)))))
+    likely = max(each, key=lambda g: g.log_evidence)
     words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
-    wander = {word: _sizes(p, h, each, word) for word in words}
-    return _conditioned(p, h, max(each, key=lambda g: g.log_evidence), wander)
+    chance = _sizes(p, h, likely)
+    for word in words:
+        own = [name for name in chance if dependence_of(name) == word]
+        whole = sum(chance[name].sum() for name in own)
+        there = _probability(p, h, each, word)
+        chance |= {name: there * chance[name] / whole for name in own}
+    return _conditioned(p, h, likely, chance)
+
+
+def _columns(found: list[tuple[Kernel, float]]) -> np.ndarray | None:
+    """(K, W, 3) of kernels at their sizes; None if there is none."""
+    return np.concatenate([size * kernel.columns for kernel, size in found]) if found else None
 
 
 def _lasts(effects: tuple[str, ...]) -> bool:
@@ -116,8 +127,28 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     return np.concatenate([view.stacked.columns[:0], *own])
 
 
-def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -> np.ndarray:
-    """(S,) posterior probabilities of the sizes of a dependence, each under its best noise."""
+def _sizes(p: PlanarProblem, h: Hypothesis, grown: _Grown) -> dict[str, np.ndarray]:
+    """(S,) posterior probabilities of the sizes of each kernel that is not lasting.
+
+    A wander may have several forms: each is as probable as not before, beside all others found.
+    """
+    found, view = {k.name for k, _ in grown.kernels}, grown.view
+
+    def gains(without: str) -> np.ndarray:
+        rest = [(k, size) for k, size in grown.kernels if k.name != without]
+        return evidence(h, view, h.linear(view.fitter).with_columns(_white(view, rest))).gains
+
+    beside, out = gains(""), {}
+    for f, kernel in enumerate(p.kernels):
+        if not kernel.lasting:
+            own = gains(kernel.name)[f] if kernel.name in found else beside[f]
+            logs = np.log(CHANCE) + own
+            out[kernel.name] = np.exp(logs - logsumexp([0.0, *logs]))
+    return out
+
+
+def _probability(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -> float:
+    """Posterior probability of a dependence, each hypothesis under its best noise."""
     none, some = [], []
     at = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
     for grown in each:
@@ -127,10 +158,9 @@ def _sizes(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: str) -
         own = evidence(h, view, linear)
         prior = sum(float(np.log(_odds(p, k)[size == SIZES][0])) for k, size in rest)
         none.append(own.alone - view.log_size + prior)
-        some.append(none[-1] + logsumexp(own.gains[at], axis=0) - np.log(len(at)))
+        some.append(none[-1] + logsumexp(own.gains[at] + np.log(CHANCE / len(at))))
     there = PRIORS.outside / _count_words(p)
-    logs = np.r_[np.log(1 - there) + max(none), np.log(there * CHANCE) + np.max(some, axis=0)]
-    return np.exp(logs - logsumexp(logs))[1:]
+    return float(expit(np.log(there / (1 - there)) + max(some) - max(none)))
 
 
 def _conditioned(
@@ -160,6 +190,6 @@ def _conditioned(
         rate=grown.rate,
         usual=p.motion.usual,
         top=p.motion.top,
-        noise=np.exp(view.fitter.noise.logs),
+        noise=usual_after(*h.about_mean(_columns(grown.kernels)), view.fitter.noise),
         hidden=replace(hidden, shift=hidden.shift[kept]),
     )

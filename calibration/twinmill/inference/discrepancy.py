@@ -11,18 +11,20 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.special import ndtr
 
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 
+TIME = "time"  # the word for what comes and goes
 SIZES = np.array([0.01, 0.03, 0.1, 0.3])  # from barely seen to a third of the way, relative
 CHANCE = np.array([0.6, 0.25, 0.1, 0.05])  # that a dependence has each: small ones are common
 STEP = float(np.sqrt(SIZES[1] / SIZES[0]))  # half the distance of two sizes, as a factor
-GROWS = 1.01 * STEP**2  # times its size in one log, that a wander may have in another: one distance
 # Chance that the relative error of a formula has each: an exponential distribution, of those with a
 # known mean the one that says least; the rest is too small to be seen, or too large for a formula.
 BINS = np.r_[SIZES[0] / STEP, np.sqrt(SIZES[1:] * SIZES[:-1]), SIZES[-1] * STEP]
 OF_FORM = -np.diff(np.exp(-BINS / PRIORS.form))
+WITHIN = 20  # points within a bin of sizes: fine beside PRIORS.sheet
 ORDERS = np.arange(1, 5)  # of a smooth function of heading, of a length scale of 1 rad
 OF_ORDERS = (1.0 + ORDERS**2) ** -1.5 / np.sum((1.0 + ORDERS**2) ** -1.5)
 NODES = 7  # of a curve over speed: as a table of duties has
@@ -49,16 +51,22 @@ class Kernel:
 
 
 def in_another_log(own: np.ndarray) -> np.ndarray:
-    """(S,) probabilities of the sizes of a robot's wander in a log, from (S,) those in its own."""
-    up_to = (GROWS * SIZES[:, None] >= SIZES) * CHANCE
-    return own @ (up_to / up_to.sum(axis=1, keepdims=True))
+    """(S,) probabilities of the sizes of a robot's wander in a log, from (S,) those in its own.
+
+    A size stands for a bin of the grid, uniform in its logarithm, and differs a little between
+    logs.
+    """
+    within = (np.arange(WITHIN) + 0.5) / WITHIN - 0.5
+    own_logs = np.log(SIZES)[:, None] + 2 * np.log(STEP) * within
+    below = ndtr((np.log(BINS) - own_logs[..., None]) / PRIORS.sheet)
+    return own @ np.diff(below, axis=2).mean(axis=1)
 
 
 def kernels(m: Motion) -> list[Kernel]:
     """All forms of dependences that compete, of the motion of one log."""
     found = []
     families = {
-        "time": (_of_time, False),
+        TIME: (_of_time, False),
         "place": (_of_place, False),
         "heading": (_of_heading, True),
         "speed": (_of_speed, True),
@@ -72,6 +80,11 @@ def kernels(m: Motion) -> list[Kernel]:
             if np.abs(scaled).max(initial=0.0) > 1e-9:
                 found.append(Kernel(word, f"{word}: {name}", scaled, lasting))
     return found
+
+
+def dependence_of(kernel: str) -> str:
+    """Word of the dependence that a kernel of this name is a form of."""
+    return kernel.split(":")[0]
 
 
 def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
@@ -107,7 +120,7 @@ Form = tuple[str, np.ndarray, np.ndarray | float]
 
 def _of_time(m: Motion) -> Iterator[Form]:
     for name, shortest_s, smooth_s in (("slow", 12.0, 8.0), ("quick", 3.0, 1.5)):
-        w, share = waves(m.t_s, shortest_s, smooth_s)
+        w, share = waves(m.t_s, shortest_s, smooth_s, most=120)  # those of a log of three minutes
         yield f"{name} gain", _gains(m, w, "all"), share
         yield f"{name} gain of travel", _gains(m, w, "travel"), share
         yield f"{name} gain of turns", _gains(m, w, "turn"), share
@@ -278,10 +291,19 @@ def _compass(m: Motion, orders) -> np.ndarray:
     return np.array(out)
 
 
-def waves(along: np.ndarray, shortest: float, smooth: float) -> tuple[np.ndarray, np.ndarray]:
-    """(K, W) cosines over a span, and the variance shares of a Matern 3/2 of that length scale."""
+def waves(
+    along: np.ndarray, shortest: float, smooth: float, most: int = 60
+) -> tuple[np.ndarray, np.ndarray]:
+    """(K, W) cosines over a span, and the variance shares of a Matern 3/2 of that length scale.
+
+    Args:
+        along: (W,) positions.
+        shortest: wave, in their unit; longer where more than `most` waves would be needed.
+        smooth: length scale, in their unit.
+        most: so many waves at most.
+    """
     span = max(np.ptp(along), 1e-9)
-    k = np.arange(1, int(np.clip(2 * span / shortest, 3, 60)) + 1)
+    k = np.arange(1, int(np.clip(2 * span / shortest, 3, most)) + 1)
     waves = np.sqrt(2) * np.cos(np.pi * k[:, None] * (along - along.min()) / span)
     share = (1 + (np.pi * k / span * smooth) ** 2) ** -1.5
     return waves, share / share.sum()

@@ -106,6 +106,16 @@ class Hypothesis:
         span = np.linalg.qr(own[self.of_effects[self.named]].T)[0].T
         return np.concatenate([own, span, y[None]])
 
+    def about_mean(self, beside: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """(W, C) errors at the prior's mean, and (N', W, C) columns of standard normal numbers.
+
+        Args:
+            beside: (K, W, C) columns that are there as well.
+        """
+        columns = np.tensordot(np.linalg.cholesky(self.cov).T, self.slopes, 1)
+        at_mean = self.errors + np.tensordot(self.value - self.mean, self.slopes, 1)
+        return at_mean, columns if beside is None else np.concatenate([columns, beside])
+
     def linear(
         self, fitter: "Fitter", cov: np.ndarray | None = None, rows: np.ndarray | None = None
     ) -> Linear:

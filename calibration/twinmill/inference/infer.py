@@ -43,7 +43,7 @@ class Inference:
     def to_json(self) -> dict:
         """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
-        wander = self.always.wander.items() if self.always else ()
+        wander = self.always.sizes_of_wander().items() if self.always else ()
         return {
             **self.answer.to_json(),
             "robot_id": self.measurements[0].track.robot_id,

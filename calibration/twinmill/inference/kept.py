@@ -10,6 +10,7 @@ import tomlkit
 from twinmill.arguments import option
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.moments import Rate
+from twinmill.inference.noise import Usual
 from twinmill.inference.prior import Always
 from twinmill.model.model_file import ModelError, ModelFile
 
@@ -37,11 +38,13 @@ def kept(model_file: ModelFile) -> Always | None:
             mean=np.array(table["mean"], float),
             cov=low @ low.T,
             kernels=tuple((str(name), float(size)) for name, size in table["kernels"].items()),
-            wander={str(word): np.array(p, float) for word, p in table["wander"].items()},
+            wander={str(name): np.array(p, float) for name, p in table["wander"].items()},
             rate=Rate(**table["rate"]),
             usual=np.array(table["usual"], float),
             top=np.array(table["top"], float),
-            noise=np.array(table["noise"], float),
+            noise=Usual(
+                np.log(np.array(table["noise"], float)), np.array(table["noise_cov"], float)
+            ),
             hidden=_hidden(table["hidden"], len(low)),
         )
     except (KeyError, TypeError, ValueError) as error:
@@ -66,11 +69,12 @@ def as_table(always: Always) -> dict[str, Any]:
     return {
         "effects": list(always.effects),
         "kernels": dict(always.kernels),
-        "wander": {word: _short(p) for word, p in always.wander.items()},
+        "wander": {name: _short(p) for name, p in always.wander.items()},
         "rate": {k: _short([getattr(always.rate, k)])[0] for k in ("there", "on", "off")},
         "usual": _short(always.usual),
         "top": _short(always.top),
-        "noise": [_short(row) for row in always.noise],
+        "noise": [_short(row) for row in np.exp(always.noise.logs)],
+        "noise_cov": [[_short(row) for row in cov] for cov in always.noise.cov],
         "labels": list(always.labels),
         "mean": _short(always.mean),
         "cholesky": [_short(row[: k + 1]) for k, row in enumerate(low)],

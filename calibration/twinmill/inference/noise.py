@@ -12,7 +12,7 @@ alike (Box, Jenkins and Reinsel 2008, ch. 4).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -22,9 +22,12 @@ from scipy.linalg.lapack import dpbtrf
 from scipy.optimize import minimize
 
 from twinmill.inference.evidence import log_evidence
+from twinmill.inference.settings import PRIORS
 
 MEMORY_S = (0.02, 2.0)  # shorter is white over a step, longer is a dependence on time
 LEAST = 5e-5, 1e-4  # sensor in m or rad, drive in m/s or rad/s: a tenth of a good capture's
+NUDGE = 0.1  # of logarithms, in the differences that tell how well they are known
+DRIFT = PRIORS.sheet  # of the logarithms, between two logs of a robot: as of a discrepancy
 EVALUATIONS = 60  # of the simplex: its evidence is flat within half a unit by then
 SEEN = 0.5  # information in units of the prior, below which a direction says nothing of the noise
 HEAVY = 5.0  # standard deviations, beyond which a step weighs as under Student's t
@@ -90,9 +93,12 @@ class Noise:
             found = found - np.log(self.weight).ravel()
         return found * np.repeat(observed, len(self.course.pace))
 
-    def log_odds(self, usual: "Noise") -> float:
-        """Log prior of such a noise over that of the usual one: one unit of the logarithms wide."""
-        return -0.5 * float(np.sum((self.logs - usual.logs) ** 2))
+    def at(self, logs: np.ndarray) -> "Noise":
+        """A noise of the same steps with (4, C) other logarithms."""
+        sensor, drive, gain, memory = np.exp(logs)
+        return replace(
+            self, sensor=sensor, drive=drive, gain=gain, memory_s=np.clip(memory, *MEMORY_S)
+        )
 
     @property
     def logs(self) -> np.ndarray:
@@ -102,6 +108,40 @@ class Noise:
     @cached_property
     def _filter(self) -> "Filter":
         return Filter.of(self.logs, self.course)
+
+
+@dataclass(frozen=True)
+class Usual:
+    """Knowledge of a noise before a log is seen: logarithms with a normal distribution.
+
+    Attributes:
+        logs: (4, C) mean of sensor, drive, gain and memory of each channel, see `Noise.logs`.
+        cov: (C, 4, 4).
+        told: another log told it; then a noise that is unlike it is news.
+    """
+
+    logs: np.ndarray
+    cov: np.ndarray
+    told: bool = True
+
+    @classmethod
+    def about(cls, noise: Noise) -> "Usual":
+        """Weak: one unit of the logarithms wide."""
+        return cls(noise.logs, np.tile(np.eye(4), (noise.logs.shape[1], 1, 1)), told=False)
+
+    def log_density(self, noise: Noise) -> float:
+        """Log prior of a noise, up to a constant."""
+        return self._log_density(noise, self.cov)
+
+    def log_growth(self, noise: Noise) -> float:
+        """Log prior of a noise that something new makes one unit wider, over that of the usual."""
+        wide, narrow = (np.linalg.slogdet(c)[1].sum() for c in (self.cov + np.eye(4), self.cov))
+        new = self._log_density(noise, self.cov + np.eye(4)) - self.log_density(noise)
+        return new - 0.5 * float(wide - narrow)
+
+    def _log_density(self, noise: Noise, cov: np.ndarray) -> float:
+        away = (noise.logs - self.logs).T
+        return -0.5 * float(np.sum(away * np.linalg.solve(cov, away[..., None])[..., 0]))
 
 
 @dataclass(frozen=True)
@@ -169,26 +209,49 @@ def first_noise(course: Course, recorded: dict[str, float]) -> Noise:
     )
 
 
-def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise) -> Noise:
-    """The noise with the largest evidence of a linear model, channel by channel.
+def fit_noise(
+    errors: np.ndarray, columns: np.ndarray, begin: Noise, usual: Usual | None = None
+) -> Noise:
+    """The noise with the largest posterior of a linear model, channel by channel.
 
     Args:
         errors: (W, C) of the base.
         columns: (K, W, C) of what is free, each with a standard normal prior.
-        begin: where to begin, with a weak prior of one unit of the logarithms about it.
+        begin: where to begin.
+        usual: its prior; None for one about where it begins.
     """
     logs = begin.logs
+    for c, channel in _channels(errors, columns, begin, usual or Usual.about(begin)):
+        logs[:, c] = channel.fitted(logs[:, c])
+    return begin.at(logs)
+
+
+def usual_after(errors: np.ndarray, columns: np.ndarray, noise: Noise) -> Usual:
+    """Knowledge of the noise of other logs, from one log in which it was found.
+
+    Args:
+        errors: (W, C) of that log.
+        columns: (K, W, C), as of `fit_noise`.
+        noise: as found there.
+    """
+    usual = Usual.about(noise)
+    cov = usual.cov.copy()
+    for c, channel in _channels(errors, columns, noise, usual):
+        cov[c] = channel.spread(noise.logs[:, c])
+    return Usual(noise.logs, cov + DRIFT**2 * np.eye(4))
+
+
+def _channels(
+    errors: np.ndarray, columns: np.ndarray, begin: Noise, usual: Usual
+) -> Iterator[tuple[int, "_Channel"]]:
+    """Number and posterior of each channel that has errors."""
     for c in range(errors.shape[1]):
         if np.any(errors[:, c]):
             used = np.abs(columns[:, :, c]).max(axis=1, initial=0.0) > 1e-12
             course = begin.course.of(c)
-            own = _seen(columns[used][:, :, c], Filter.of(logs[:, [c]], course))
+            own = _seen(columns[used][:, :, c], Filter.of(begin.logs[:, [c]], course))
             both = np.concatenate([errors[None, :, c], own])
-            logs[:, c] = _fit_channel(both, logs[:, c], course)
-    sensor, drive, gain, memory = np.exp(logs)
-    return replace(
-        begin, sensor=sensor, drive=drive, gain=gain, memory_s=np.clip(memory, *MEMORY_S)
-    )
+            yield c, _Channel(both, usual.logs[:, c], np.linalg.inv(usual.cov[c]), course)
 
 
 def _seen(columns: np.ndarray, whitening: Filter) -> np.ndarray:
@@ -198,22 +261,48 @@ def _seen(columns: np.ndarray, whitening: Filter) -> np.ndarray:
     return ways[:, values > SEEN].T @ columns
 
 
-def _fit_channel(both: np.ndarray, start: np.ndarray, course: Course) -> np.ndarray:
-    """(4,) logarithms of a channel's noise; `both` holds (1 + K, W) errors and columns."""
+@dataclass(frozen=True)
+class _Channel:
+    """Posterior of the noise of one channel.
 
-    def cost(logs: np.ndarray) -> float:
-        whitening = Filter.of(logs[:, None], course)
-        white = whitening.white(both[..., None])
+    Attributes:
+        both: (1 + K, W) errors and columns of what is free.
+        mean, precision: (4,), (4, 4) of the logarithms before.
+        course: the steps.
+    """
+
+    both: np.ndarray
+    mean: np.ndarray
+    precision: np.ndarray
+    course: Course
+
+    def cost(self, logs: np.ndarray) -> float:
+        """Negative log posterior of (4,) logarithms, up to a constant."""
+        whitening, away = Filter.of(logs[:, None], self.course), logs - self.mean
+        white = whitening.white(self.both[..., None])
         found = log_evidence(white[0], white[1:]) - whitening.log_sizes.sum()
-        return -found + 0.5 * float(np.sum((logs - start) ** 2))
+        return -found + 0.5 * float(away @ self.precision @ away)
 
-    options = {
-        "maxfev": EVALUATIONS,
-        "xatol": 0.05,
-        "fatol": 0.3,
-        "initial_simplex": np.vstack([start, *(start + 0.5 * np.eye(4))]),
-    }
-    return minimize(cost, start, method="Nelder-Mead", options=options).x
+    def fitted(self, start: np.ndarray) -> np.ndarray:
+        """(4,) where it is largest."""
+        options = {
+            "maxfev": EVALUATIONS,
+            "xatol": 0.05,
+            "fatol": 0.3,
+            "initial_simplex": np.vstack([start, *(start + 0.5 * np.eye(4))]),
+        }
+        return minimize(self.cost, start, method="Nelder-Mead", options=options).x
+
+    def spread(self, at: np.ndarray) -> np.ndarray:
+        """(4, 4) covariance by the curvature there; no direction is less known than before."""
+        ways = NUDGE * np.eye(4)
+        curved = np.empty((4, 4))
+        for i, a in enumerate(ways):
+            for j, b in enumerate(ways[: i + 1]):
+                four = [self.cost(at + s * a + t * b) * s * t for s in (1, -1) for t in (1, -1)]
+                curved[i, j] = curved[j, i] = sum(four) / (2 * NUDGE) ** 2
+        values, axes = np.linalg.eigh(curved)
+        return axes / np.maximum(values, np.linalg.eigvalsh(self.precision)[0]) @ axes.T
 
 
 def weights_of(left: np.ndarray) -> np.ndarray:

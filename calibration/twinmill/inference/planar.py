@@ -12,7 +12,7 @@ from twinmill.inference import candidates, discrepancy, moments
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.duties import refined
 from twinmill.inference.hypothesis import Fitter, Hypothesis
-from twinmill.inference.noise import Course, Noise, first_noise
+from twinmill.inference.noise import Course, Noise, Usual, first_noise
 from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
 from twinmill.inference.settings import PRIORS
@@ -144,6 +144,7 @@ def problem_of(
     motion = _motion(steps, bare, always)  # as in its own log: weights belong to these columns
     found = discrepancy.kernels(motion)
     noise = _begin_noise(steps, motion, model_file, always)
+    usual = always.noise if always is not None else Usual.about(noise)
     if always is not None:
         prior = with_always(prior, always, found)
         missed = _missed_by_formulas(steps, model, motion, always.effects)
@@ -151,9 +152,9 @@ def problem_of(
     base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
-    wander = {w: discrepancy.in_another_log(p) for w, p in always.wander.items()} if always else {}
+    wander = {k: discrepancy.in_another_log(p) for k, p in always.wander.items()} if always else {}
     rough = PlanarProblem(
-        steps, prior, base, found, names, rate, noise, noise, wander, planar_kinds(), motion, always
+        steps, prior, base, found, names, rate, usual, noise, wander, planar_kinds(), motion, always
     )
     noise = flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
@@ -236,5 +237,5 @@ def _begin_noise(
 ) -> Noise:
     course = Course(float(np.median(steps.step_s)), steps.stretches, motion.pace)
     if always is not None:
-        return Noise(*always.noise, course)
+        return Noise(*np.exp(always.noise.logs), course)
     return first_noise(course, model_file.recorded_noise)

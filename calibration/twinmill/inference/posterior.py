@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
+from twinmill.inference.discrepancy import TIME
 from twinmill.inference.search import log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Entry, Table, subsets
 from twinmill.model.parameters import catalogue_name
 
 DRAWS = 400  # of blocks
-AGAIN = "time"  # what a thing depends on that comes and goes
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,8 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
     def once(effects) -> tuple[str, ...]:
         return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in steps)
 
-    again = steps and swells is None and AGAIN not in entry.words
-    words = (AGAIN, *entry.words) if again else entry.words
+    again = steps and swells is None and TIME not in entry.words
+    words = (TIME, *entry.words) if again else entry.words
     real = once(n for n in entry.effects if n not in (*row.mimicked, *row.always))
     like = tuple(n for n in once(row.mimicked) if n not in real)
     return Belief(real, like, words, entry, probability)

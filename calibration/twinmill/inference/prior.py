@@ -9,10 +9,11 @@ import twinmill_native as native
 from scipy.linalg import block_diag
 
 from twinmill.inference.candidate import size_std
-from twinmill.inference.discrepancy import Kernel
+from twinmill.inference.discrepancy import Kernel, dependence_of
 from twinmill.inference.duties import refined
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.moments import Rate
+from twinmill.inference.noise import Usual
 from twinmill.inference.settings import PRIORS
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
@@ -44,11 +45,11 @@ class Always:
             of them.
         mean, cov: (N,), (N, N) of these.
         kernels: name and size of each kernel of the discrepancy.
-        wander: probabilities of each of SIZES, by dependence whose function holds for one log
-            alone; the rest is that of none.
+        wander: probabilities of each of SIZES, by kernel whose function holds for one log alone;
+            what is left of one is the probability of none.
         rate: of moments.
         usual, top: scale of the kernels, see `Motion`.
-        noise: (4, 3) sensor, drive, gain, memory of each channel, see `Noise`.
+        noise: as it may be in another log.
         hidden: what its own log tells of other effects.
     """
 
@@ -61,8 +62,16 @@ class Always:
     rate: Rate
     usual: np.ndarray
     top: np.ndarray
-    noise: np.ndarray
+    noise: Usual
     hidden: Hidden
+
+    def sizes_of_wander(self) -> dict[str, np.ndarray]:
+        """(S,) probabilities of each of SIZES of a wander, by dependence."""
+        found: dict[str, np.ndarray] = {}
+        for name, chance in self.wander.items():
+            word = dependence_of(name)
+            found[word] = found.get(word, 0) + chance
+        return found
 
 
 @dataclass(frozen=True)

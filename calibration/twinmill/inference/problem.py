@@ -18,7 +18,7 @@ from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.evidence import Bank, Linear
 from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.moments import Rate
-from twinmill.inference.noise import Noise, fit_noise, weights_of
+from twinmill.inference.noise import Noise, Usual, fit_noise, weights_of
 from twinmill.inference.prior import Prior
 from twinmill.inference.settings import PRIORS
 
@@ -70,6 +70,8 @@ class View:
         moments: white columns of moments, and their products, as `moments.find` takes them.
         log_sizes: (R,) of the noise, less a share of its log prior.
         block: (R,) number of the block of time of each white row.
+        growth: log odds of the noise as something new, and the squares that it takes beyond those
+            of the usual noise; None where no other log told that.
     """
 
     fitter: Fitter
@@ -80,6 +82,7 @@ class View:
     moments: tuple[Bank, np.ndarray]
     log_sizes: np.ndarray
     block: np.ndarray
+    growth: tuple[float, float] | None
 
     @property
     def log_size(self) -> float:
@@ -104,7 +107,7 @@ class Problem(ABC):
         rate: of moments, as the base's own log had them; None where that is not known.
         usual: noise as other logs had it.
         noise: what all flexible terms together leave.
-        wander: dependences on time and place that are no news, and the probability of each size.
+        wander: kernels of time and place that are no news, and the probability of each size.
         kinds: of effects.
     """
 
@@ -114,7 +117,7 @@ class Problem(ABC):
     kernels: list[Kernel]
     names: list[str]
     rate: Rate | None
-    usual: Noise
+    usual: Usual
     noise: Noise
     wander: dict[str, np.ndarray]
     kinds: Kinds
@@ -165,9 +168,15 @@ class Problem(ABC):
             [stacked[part] @ stacked[part].T for part in parts],
             (Bank(at_moments), flat @ flat.T),
             noise.log_sizes(self.steps.observed)
-            - noise.log_odds(self.usual) / (channels * len(self.steps)),
+            - self.usual.log_density(noise) / (channels * len(self.steps)),
             np.tile(self.steps.block, channels),
+            self._growth(noise) if self.usual.told else None,
         )
+
+    def _growth(self, noise: Noise) -> tuple[float, float]:
+        observed, usual = self.steps.observed, noise.at(self.usual.logs)
+        smaller = np.exp(2 * (usual.log_sizes(observed) - noise.log_sizes(observed)))
+        return self.usual.log_growth(noise), max(float(np.sum(1 - smaller)), 0.0)
 
     def told(self, h: Hypothesis) -> Hypothesis:
         """A hypothesis with the base's numbers where other logs told them, which is no clock.
@@ -205,7 +214,7 @@ def flexible_noise(p: Problem) -> Noise:
             free.append(PRIORS.size * c.columns)
     free += [FLEXIBLE * k.columns for k in p.kernels]
     columns = np.concatenate(free)
-    noise = fit_noise(base.errors, columns, p.noise)
+    noise = fit_noise(base.errors, columns, p.noise, p.usual)
     white = noise.whiten(columns)
     y = noise.whiten(base.errors)
     left = Linear.of(y, white).residuals.reshape(len(p.steps.observed), -1)

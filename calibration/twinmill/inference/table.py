@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from twinmill.inference import moments
-from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP
+from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP, TIME
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import MOMENTS, Rate
@@ -131,8 +131,8 @@ def table_of(search: Search) -> Table:
     for h, beside in ((fitted[order[0]], _likeliest_columns(best_set, p)), (fitted[()], None)):
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
-    entries: dict[tuple, Entry] = {}
-    falls: dict[tuple, float] = {}  # under the first of them, as the excess is ...
+    entries: list[Entry] = []
+    first: list[Entry] = []  # under the first noise, as are the excess ...
     takes: dict[tuple[str, ...], np.ndarray] = {}  # ... and this
     best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
     for names in kept:
@@ -147,17 +147,16 @@ def table_of(search: Search) -> Table:
             squares = np.array([each[index].sum() for index in within])
             own = _Comparison(p, search.words, h, forms, squares, view)
             of_noise = own.entries(names in whole)
-            for entry in of_noise:
-                key = entry.effects, entry.stale, tuple(sorted(entry.words))
-                falls.setdefault(key, entry.fall)
-                if key not in entries or entry.log_evidence > entries[key].log_evidence:
-                    entries[key] = entry
+            entries += of_noise
+            if view is views[0]:
+                first += of_noise
             likely = max(entry.log_evidence for entry in of_noise)
             if likely > best.get(names, (-np.inf,))[0]:
                 best[names] = likely, own
+    falls = {key: entry.fall for key, entry in _likeliest_of_each(first).items()}
     rows = len(p.steps) * int(p.steps.observed.sum())
     return Table(
-        [replace(entry, fall=falls[key]) for key, entry in entries.items()],
+        [replace(e, fall=falls.get(k, e.fall)) for k, e in _likeliest_of_each(entries).items()],
         {names: own.numbers() for names, (_, own) in best.items()},
         takes,
         max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
@@ -167,6 +166,12 @@ def table_of(search: Search) -> Table:
         {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
         p.kinds,
     )
+
+
+def _likeliest_of_each(entries: list[Entry]) -> dict[tuple, Entry]:
+    """Of each set of effects, kind of base and dependences the entry with the most evidence."""
+    order = sorted(entries, key=lambda e: e.log_evidence)
+    return {(e.effects, e.stale, frozenset(e.words)): e for e in order}
 
 
 def _swells(h: Hypothesis, kinds: Kinds) -> str | None:
@@ -210,11 +215,7 @@ def noise_of(h: Hypothesis, p: Problem, beside: np.ndarray | None = None) -> Noi
         p: of the logs.
         beside: (K, W, 3) columns of a dependence that is there as well.
     """
-    columns = np.tensordot(np.linalg.cholesky(h.cov).T, h.slopes, 1)
-    if beside is not None:
-        columns = np.concatenate([columns, beside])
-    at_mean = h.errors + np.tensordot(h.value - h.mean, h.slopes, 1)
-    return fit_noise(at_mean, columns, p.noise)
+    return fit_noise(*h.about_mean(beside), p.noise, p.usual)
 
 
 @dataclass(frozen=True)
@@ -258,6 +259,7 @@ class _Comparison:
         (usual, own), *others = self._plain
         news = self._usual_and_news[1]
         out = [self._alone(usual), *self._with_words(usual, own), self._alone(news)]
+        out += self._of_noise(usual)
         for other, of_other in others:
             out += [self._alone(other), *self._with_words(other, of_other)]
         if whole:
@@ -267,6 +269,7 @@ class _Comparison:
             for first in (news, self._likeliest(usual, own)):
                 if first.fall > 0:
                     out += self._with_words(first, self._evidence(first))
+                    out += self._of_noise(first)
         return _as_without_moments(out)
 
     def numbers(self) -> Numbers:
@@ -315,13 +318,21 @@ class _Comparison:
         return out
 
     def always(self) -> list[tuple[tuple[str, ...], float]]:
-        """Log odds of each of `subsets` that it always was there, against its being new."""
+        """Log odds of each of `subsets` that it always was there, against its being new.
+
+        What may decide is fitted anew: numbers that the base's own log tells can be far from
+        these, where the model is another linear one.
+        """
         found, fitter = [], self.view.fitter
+        new = self.h.log_evidence(self._known)
         for names in subsets(self.h.effects):
             if there := self.problem.always_there(self.h, names):
                 told, log_factor = there
-                then = told.log_evidence(told.linear(fitter)) + log_factor
-                found.append((names, then - self.h.log_evidence(self._known)))
+                log_odds = told.log_evidence(told.linear(fitter)) + log_factor - new
+                if log_odds > -BEYOND:
+                    told = fitter.fit(told)
+                    log_odds = told.log_evidence(told.linear(fitter)) + log_factor - new
+                found.append((names, log_odds))
         return found
 
     @cached_property
@@ -460,28 +471,57 @@ class _Comparison:
 
         As far as the robot wanders with time or place by itself it is no news.
         """
-        out = []
+        out, usual = [], self.problem.wander
         for word in self.words[:-1]:
             if word not in beside.words:
-                words = (*beside.words, word)
-                out.append(self._with_word(beside, own, word, chance=CHANCE, words=words))
-                if word in self.problem.wander:
-                    usual = self.problem.wander[word]
-                    out.append(self._with_word(beside, own, word, chance=usual, words=beside.words))
+                at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
+                names = [self.view.kernels[k].name for k in at]
+                of_each = {beside.words: [usual.get(name, 0 * CHANCE) for name in names],
+                           (*beside.words, word): [CHANCE / len(at)] * len(at)}  # fmt: skip
+                for words, chance in of_each.items():
+                    if np.any(chance):
+                        out.append(
+                            self._with_word(beside, own, at, chance=np.array(chance), words=words)
+                        )
         return out
 
+    def _of_noise(self, beside: _Beside) -> list[Entry]:
+        """An entry in which the noise itself is a thing that comes and goes, and new."""
+        if self.view.growth is None:
+            return []
+        log_odds, fall = self.view.growth
+        forms = sum(kernel.depends_on == TIME for kernel in self.view.kernels) + 1
+        alone = self._alone(beside)
+        log_evidence = alone.log_evidence + log_odds - np.log(forms)
+        relative = beside.log_relative if beside.words else self._log_relative(np.array(fall))
+        relative = np.broadcast_to(relative, len(self.squares))
+        return [
+            replace(
+                alone,
+                words=tuple(dict.fromkeys((*beside.words, TIME))),
+                log_evidence=log_evidence,
+                log_mimicked=tuple((log_evidence + relative).tolist()),
+                fall=beside.fall if beside.words else fall,
+            )
+        ]
+
     def _with_word(
-        self, beside: _Beside, own: Evidence, word: str, *, chance: np.ndarray, words: tuple
+        self,
+        beside: _Beside,
+        own: Evidence,
+        at: list[int],
+        *,
+        chance: np.ndarray,
+        words: tuple[str, ...],
     ) -> Entry:
-        """With a dependence whose sizes have these chances, told in these words."""
-        at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
-        gains = own.gains[at] - np.log(len(at))
-        likely = gains + np.log(np.maximum(chance, 1e-300))
+        """With a dependence, told in these words, whose kernels have (F, S) chances of sizes."""
+        likely = own.gains[at] + np.log(np.maximum(chance, 1e-300))
         total = float(np.logaddexp.reduce(likely, axis=None))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
         if words and not beside.words:
             relative = self._log_relative(own.falls[at])
-            each = (gains + relative).reshape(len(relative), gains.size)
+            each = own.gains[at] - np.log(len(at)) + relative
+            each = each.reshape(len(relative), likely.size)
             mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
         linear = own.with_kernel(self.view, at[f], SIZES[s])

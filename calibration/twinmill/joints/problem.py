@@ -9,7 +9,7 @@ import numpy as np
 
 from twinmill.inference.candidate import Candidate, with_limits, with_sizes
 from twinmill.inference.hypothesis import Fitter, Hypothesis
-from twinmill.inference.noise import Course, Noise
+from twinmill.inference.noise import Course, Noise, Usual
 from twinmill.inference.prior import Prior
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
 from twinmill.inference.settings import PRIORS
@@ -113,7 +113,7 @@ def problem_of(
         found,
         [*effects],
         None,
-        noise,
+        Usual.about(noise),
         noise,
         {},
         kinds,
@@ -124,7 +124,7 @@ def problem_of(
     for _ in range(ROUNDS):
         noise = flexible_noise(p)
         fitted = Fitter(steps, noise, prior.columns).fit(p.base)
-        p = replace(p, noise=noise, usual=noise, base=fitted)
+        p = replace(p, noise=noise, usual=Usual.about(noise), base=fitted)
     return p
 
 

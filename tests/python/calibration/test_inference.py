@@ -412,3 +412,18 @@ def test_a_wander_that_the_base_has_is_no_news_and_a_loss_that_comes_again_is(
         assert next(iter(found.depends_on)) == "time"
     else:
         assert found.verdict in ("model_adequate", "refit_enough", "cannot_tell")
+
+
+@pytest.mark.parametrize("times, news", [(1.0, False), (3.0, True)])
+def test_a_disturbance_that_is_larger_than_in_its_own_log_depends_on_time(
+    measure, tanh_robot, one_clock_base, own, times, news
+):
+    """No function of time shows it: it has a memory of some steps."""
+    usual = tanh_robot()
+    log = measure(tanh_robot(drive_mps=times * usual.drive_mps), 31, 60.0)
+    found = infer([log], one_clock_base, [own]).answer
+    if news:
+        assert found.verdict == "outside_catalogue"
+        assert next(iter(found.depends_on)) == "time"
+    else:
+        assert found.verdict in ("model_adequate", "refit_enough", "cannot_tell")

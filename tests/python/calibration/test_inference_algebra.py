@@ -27,7 +27,7 @@ from twinmill.inference.discrepancy import (
 from twinmill.inference.evidence import Bank, Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.moments import Rate
-from twinmill.inference.noise import Course, Noise
+from twinmill.inference.noise import Course, Noise, Usual, fit_noise, usual_after
 from twinmill.inference.planar import planar_kinds
 from twinmill.inference.posterior import beliefs
 from twinmill.inference.screening import _products, _products_of_whiles, gains_of_pairs
@@ -75,12 +75,46 @@ def test_whitened_errors_have_the_likelihood_of_the_dense_covariance(sensor, dri
     assert ours == pytest.approx(exact, abs=1e-6)
 
 
-def test_a_wander_is_as_probable_in_a_later_log_as_in_its_own():
-    """Sizes are mixed: by algebra no probability appears or goes, and none grows by two steps."""
-    one = np.array([0.7, 0.0, 0.0, 0.0])
-    assert in_another_log(one).sum() == pytest.approx(0.7)
-    assert in_another_log(one)[2] == 0 < in_another_log(one)[1]
-    assert np.all(in_another_log(np.zeros(4)) == 0)
+def test_the_size_of_a_wander_in_a_later_log_is_that_of_its_own_give_or_take_what_drifts():
+    """Sizes drawn as the docstring says, and counted."""
+    random, half = np.random.default_rng(4), np.log(STEP)
+    for k, size in enumerate(SIZES):
+        own = np.log(size) + random.uniform(-half, half, 40_000)
+        later = own + PRIORS.sheet * random.normal(size=len(own))
+        bins = np.abs(later[:, None] - np.log(SIZES)) < half
+        assert in_another_log(0.7 * np.eye(4)[k]) == pytest.approx(
+            0.7 * bins.mean(axis=0), abs=0.02
+        )
+
+
+def test_a_noise_is_known_as_well_as_many_logs_of_it_scatter():
+    """Fits to forty series of the dense covariance, against the spread that one of them tells."""
+    count, logs = 600, np.log([1e-3, 1e-3, 2e-3, 0.4])
+    random = np.random.default_rng(5)
+    pace = np.abs(random.normal(size=count)) * (random.random(count) > 0.4)
+    covariance = dense_covariance(*np.exp(logs), pace)
+    noise = Noise(*np.exp(logs)[:, None], Course(STEP_S, [slice(0, count)], pace))
+    none = np.zeros((0, count, 1))
+    errors = random.multivariate_normal(np.zeros(count), covariance, size=40)[..., None]
+    found = np.array([fit_noise(one, none, noise).logs[:, 0] for one in errors])
+    of_one = [usual_after(one, none, fit_noise(one, none, noise)).cov[0] for one in errors[:5]]
+    told = np.mean([np.diag(cov) for cov in of_one], axis=0) - PRIORS.sheet**2
+    assert np.sqrt(told) == pytest.approx(found.std(axis=0), rel=0.5)
+
+
+def test_a_noise_is_news_where_it_left_what_is_usual():
+    usual = Usual(np.zeros((4, 1)), 0.04 * np.eye(4)[None])
+
+    def growth(log_size):
+        logs = np.array([0.0, 0.0, log_size, 0.0])
+        noise = Noise(*np.exp(logs)[:, None], Course(STEP_S, [], np.zeros(0)))
+        by_scipy = [
+            multivariate_normal(np.zeros(4), cov * np.eye(4)).logpdf(logs) for cov in (1.04, 0.04)
+        ]
+        assert usual.log_growth(noise) == pytest.approx(by_scipy[0] - by_scipy[1])
+        return usual.log_growth(noise)
+
+    assert growth(0.1) < growth(-0.6) < 0 < growth(1.0)
 
 
 def test_evidence_is_that_of_the_marginal_normal_distribution():
