@@ -3,6 +3,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -90,13 +91,13 @@ def candidates(
 
 
 def _best_columns(
-    logs: list[ModelledLog], entry: dict, without: list[np.ndarray]
+    logs: list[ModelledLog], entry: dict[str, Any], without: list[np.ndarray]
 ) -> tuple[Candidate, np.ndarray]:
     """Derivatives at the neutral value, or the way to the default where these say nothing of it."""
     smooth, corner = _smooth(entry), _corner(entry)
     columns, whole = smooth.columns(logs, without), corner.columns(logs, without)
     predicted = columns @ smooth.strength
-    size, reached = np.linalg.norm(predicted), np.linalg.norm(whole)
+    size, reached = float(np.linalg.norm(predicted)), float(np.linalg.norm(whole))
     alike = predicted @ whole[:, 0] / max(size * reached, 1e-12)
     if alike < ALIKE or not 1 / MISJUDGED < size / max(reached, 1e-12) < MISJUDGED:
         return corner, whole
@@ -109,7 +110,7 @@ def _energy(candidate: Candidate, columns: np.ndarray) -> np.ndarray:
     return np.sum(columns**2, axis=0) * candidate.strength**2
 
 
-def _smooth(entry: dict, shown: np.ndarray | None = None) -> Candidate:
+def _smooth(entry: dict[str, Any], shown: np.ndarray | None = None) -> Candidate:
     parameters = entry["parameters"]
     if shown is not None:
         parameters = [p for p, s in zip(parameters, shown, strict=True) if s]
@@ -126,7 +127,7 @@ def _smooth(entry: dict, shown: np.ndarray | None = None) -> Candidate:
     )
 
 
-def _corner(entry: dict) -> Candidate:
+def _corner(entry: dict[str, Any]) -> Candidate:
     parameters = entry["parameters"]
     return Candidate(
         entry["name"],

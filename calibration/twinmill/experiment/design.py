@@ -4,12 +4,14 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.data.track import Track
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.experiment.hypotheses import Hypotheses, candidate_effects, hypotheses_of, question
@@ -110,7 +112,7 @@ class Plan:
         at = self.paths[..., :2].reshape(-1, 2)
         return np.ptp(at, axis=0) + 2 * self.radius_m
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object, but for the path."""
         return {
             "separates": self.separates,
@@ -162,7 +164,7 @@ def design(
     logs = [o for o in diagnosis.opened if o.floor]
     hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
-    moves = family(_axes([o.measurement for o in logs], model_file.model, limits))
+    moves = family(_axes([o.track for o in logs], model_file.model, limits))
     progress("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
     asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
@@ -230,7 +232,10 @@ def check(
             f"a run of {limits.duration_s:g} s is too short: no model is judged on less than "
             f"{SHORTEST_LOG_S:g} s, and moves come whole; allow {SHORTEST_RUN_S:g} s."
         )
-    floor, axes = Floor(limits, modelled, []), _axes(logs, modelled.model, limits)
+    floor, axes = (
+        Floor(limits, modelled, []),
+        _axes([m.track for m in logs], modelled.model, limits),
+    )
     if not any(floor.holds([m]) for m in family(axes)):
         size = "x".join(f"{side:g}" for side in limits.floor_m)
         need_m = 2 * (modelled.model.get("robot.body_radius_m") + WANDER_M)
@@ -240,7 +245,7 @@ def check(
         )
 
 
-def _axes(logs: Sequence[Measurement], model: native.Model, limits: Limits) -> list[Axis]:
+def _axes(tracks: Sequence[Track], model: native.Model, limits: Limits) -> list[Axis]:
     """Ways to drive within the limits; velocities as high as any in the logs are known to be safe.
 
     Raises:
@@ -248,7 +253,7 @@ def _axes(logs: Sequence[Measurement], model: native.Model, limits: Limits) -> l
     """
     if model.drive == "duty":
         return duty_axes(limits.max_duty, model.wheel_kind)
-    told = np.vstack([log.track.command[:, :3] for log in logs])
+    told = np.vstack([track.command[:, :3] for track in tracks])
     axes = twist_axes(limits.max_duty * np.abs(told).max(axis=0))
     if not axes:
         raise ValueError(

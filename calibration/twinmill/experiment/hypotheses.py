@@ -2,6 +2,7 @@
 """Which effects the next run must part, and the model without them."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -123,7 +124,7 @@ def candidate_effects(
     ]
 
 
-def _whole(card: dict, fitted: dict[str, dict[str, float]]) -> Candidate:
+def _whole(card: dict[str, Any], fitted: dict[str, dict[str, float]]) -> Candidate:
     """The one step from neutral to the effect's strength, by its card of such a robot."""
     parameters = card["parameters"]
     values = fitted.get(card["name"], {})
@@ -143,9 +144,13 @@ def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> S
     for name in names:
         last = without_effect(last, name) or last
     model = last.state.model
-    logs = [o for o in diagnosis.opened if o.floor and o.data is not None]
+    logs = [
+        (log.with_model(model), o.floor.rms)
+        for o in diagnosis.opened
+        if o.floor and o.data is not None and isinstance(log := o.modelled(), ModelledLog)
+    ]
     free = [p.at(model.get(p.name)) for p in [*base, *all_effect_parameters(model)]]
-    return State([o.modelled().with_model(model) for o in logs], free, [o.floor.rms for o in logs])
+    return State([log for log, _ in logs], free, [rms for _, rms in logs])
 
 
 def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:

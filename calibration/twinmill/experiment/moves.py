@@ -23,6 +23,8 @@ HOLD_S = 0.7  # six times its motor lag
 RANDOM_MOVES = 12
 RANDOM_HOLDS = 10
 
+Steps = list[tuple[float, np.ndarray]]  # seconds, and shares of full drive along each axis
+
 
 @dataclass(frozen=True)
 class Axis:
@@ -83,7 +85,7 @@ def family(axes: Sequence[Axis]) -> list[Move]:
     more than along one of them.
     """
     ways = dict(zip((a.name for a in axes), np.eye(len(axes)), strict=True))
-    moves: list[tuple[str, list]] = []
+    moves: list[tuple[str, Steps]] = []
     for axis in axes:
         way = ways[axis.name]
         for level in LEVELS:
@@ -102,7 +104,7 @@ def family(axes: Sequence[Axis]) -> list[Move]:
     return [_move(name, steps, axes) for name, steps in moves]
 
 
-def _move(name: str, steps: list[tuple[float, np.ndarray]], axes: Sequence[Axis]) -> Move:
+def _move(name: str, steps: Steps, axes: Sequence[Axis]) -> Move:
     """Move from shares of full drive along each axis, to whole percent or thousandths."""
     hold_s, shares = zip(*steps, (REST_S, np.zeros(len(axes))), strict=True)
     shares = np.array(shares) / np.maximum(1, np.abs(shares).sum(axis=1, keepdims=True))
@@ -110,7 +112,7 @@ def _move(name: str, steps: list[tuple[float, np.ndarray]], axes: Sequence[Axis]
     return Move(name, np.array(hold_s), np.round(command, 2 if axes[0].unit == "%" else 3))
 
 
-def _steps(name: str, size: str, out: np.ndarray) -> list[tuple[str, list]]:
+def _steps(name: str, size: str, out: np.ndarray) -> list[tuple[str, Steps]]:
     """Out and back, once with a stop between and once through zero."""
     rest = (REST_S, np.zeros(len(out)))
     return [
@@ -119,18 +121,18 @@ def _steps(name: str, size: str, out: np.ndarray) -> list[tuple[str, list]]:
     ]
 
 
-def _stairs(name: str, way: np.ndarray) -> tuple[str, list]:
+def _stairs(name: str, way: np.ndarray) -> tuple[str, Steps]:
     """Up and down all levels, then back."""
     levels = [*LEVELS, *LEVELS[-2::-1]]
     return f"{name}, stairs", [(0.25, s * level * way) for s in (1, -1) for level in levels]
 
 
-def _arc(name: str, forward: np.ndarray, spin: np.ndarray) -> tuple[str, list]:
+def _arc(name: str, forward: np.ndarray, spin: np.ndarray) -> tuple[str, Steps]:
     """An arc and back on it, then a piece of another."""
     return name, [(1.2, forward + spin), (1.2, -forward - spin), (0.6, forward - spin)]
 
 
-def _random(random: np.random.Generator, axes: int) -> tuple[str, list]:
+def _random(random: np.random.Generator, axes: int) -> tuple[str, Steps]:
     """Random levels on all axes at once, each once forward and once, in another order, back."""
     mixes = random.choice([-1, 0, 1], (RANDOM_HOLDS // 2, axes)) * random.choice(
         LEVELS, (RANDOM_HOLDS // 2, axes)

@@ -7,6 +7,7 @@ side do the same, and often have one motor: they are turned together.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -68,7 +69,7 @@ class Column:
         backward = " backward" if self.sign < 0 else ""
         return "right" if self.right else f"goes as {self.like}{backward}"
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         speeds = zip(("forward_mps", "left_mps", "turn_radps"), self.body, strict=True)
         return {
@@ -94,7 +95,7 @@ class WheelSigns:
         """Every column was driven alone and did what it should."""
         return all(c.right for c in self.columns) and not any(f.fatal for f in self.findings)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         return {
             "robot_id": self.robot_id,
@@ -105,8 +106,17 @@ class WheelSigns:
 
 
 def columns_that_act(model: native.Model, kind: CommandKind) -> dict[str, tuple[int, ...]]:
-    """Columns of commands that move this robot, by name; plain wheels as sides."""
+    """Columns of commands that move this robot, by name; plain wheels as sides.
+
+    Raises:
+        ValueError: the model is driven by another kind of command.
+    """
     body = body_by_command(model, kind)
+    if body is None:
+        raise ValueError(
+            f"commands: are of kind {kind}, and the model is driven by {model.drive}; take a model "
+            "of this robot."
+        )
     if model.wheel_kind == "differential" and kind != "twist":
         unit = COLUMNS[kind][0].partition("_")[2]
         return {f"{side}_{unit}": places for side, places in SIDES.items()}
@@ -126,7 +136,7 @@ def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
         raise ValueError(
             "wheels: this robot steers; drive a curve to the left and see that it goes there."
         )
-    kind = model.drive
+    kind = next(k for k in COLUMNS if k == model.drive)
     names = [name for name in COLUMNS[kind] if name]
     if kind == "twist":
         size = np.array([RIM_MPS, RIM_MPS, TURN_RADPS])

@@ -9,6 +9,7 @@ treats all runs alike, gives an exact test (Dwass 1957; Besag and Clifford 1989)
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -127,7 +128,9 @@ def first_motion(series: SwarmSeries) -> int:
     return int(max(moving[0] - 1, 0)) if len(moving) else 0
 
 
-def twin_values(cell: native.Cell, seed: int, ring: int, scale: tuple[float, float], *, count: int):
+def twin_values(
+    cell: native.Cell, seed: int, ring: int, scale: tuple[float, float], *, count: int
+) -> np.ndarray:
     """(T, METRICS) of one seed, measured like a log: `count` samples STEP_S apart.
 
     Args:
@@ -168,7 +171,7 @@ class SwarmComparison:
     test: RankTest
     robots: tuple[int, ...]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Verdict, tests and bands."""
         j, left = self.test, self.test.left
         low, middle, high = (plain(part, self.names) for part in (j.low, j.middle, j.high))

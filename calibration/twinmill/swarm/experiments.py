@@ -5,6 +5,7 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -103,7 +104,7 @@ def nearest_cell(point: tuple[float, ...], phase: Phase) -> int | None:
     return index
 
 
-def agreement(experiments: list[Experiment]) -> dict:
+def agreement(experiments: list[Experiment]) -> dict[str, Any]:
     """How many runs ended as the diagram says, with a 95 % interval (Clopper and Pearson 1934).
 
     `expected` is the agreement that the model itself would have with runs of its own: a real
@@ -146,7 +147,7 @@ def words(axes: list[Axis]) -> str:
     )
 
 
-def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict]:
+def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict[str, Any]]:
     """Where to run next: where two models disagree most, or else where this one is least sure.
 
     Raises:
@@ -163,7 +164,7 @@ def next_cells(phase: Phase, rival: Phase | None, done: set[int]) -> list[dict]:
                 "the same values, with what is to differ in its model or in an axis of one value."
             )
         worth = divergence_bits(phase.outcomes, rival.outcomes)
-    chosen = []
+    chosen: list[dict[str, Any]] = []
     for cell in np.argsort(-worth, kind="stable"):
         if worth[cell] <= 0 or len(chosen) == NEXT:
             break

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -57,10 +58,14 @@ class SwarmSnapshot:
     series: SwarmSeries | None
     note: str
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Means of the last 10 s as `metrics`, the newest values as `now`."""
-        data = {"channel_prefix": self.prefix, "source": self.source, "lost": self.lost}
-        data |= {"note": self.note or None}
+        data = {
+            "channel_prefix": self.prefix,
+            "source": self.source,
+            "lost": self.lost,
+            "note": self.note or None,
+        }
         if not (s := self.series):
             return {**data, "class": None, "metrics": None}
         first_us, last_us = (self.t0_utime_us + round(1e6 * s.t_s[k]) for k in (0, -1))
@@ -80,7 +85,9 @@ def look_around(
     url: str, duration_s: float, question: Question
 ) -> Iterator[tuple[int, list[SwarmSnapshot], str]]:
     """(now in us, swarms by prefix, sentence if there is none) about once a second."""
-    window, due_us, heard_us = Window(HEARD_S), None, None
+    window = Window(HEARD_S)
+    due_us: int | None = None
+    heard_us = 0
     for now_us, batch in from_bus(url, duration_s):
         window.add(now_us, batch)
         if due_us is None:

@@ -6,6 +6,7 @@ both say the same of a run.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -51,7 +52,7 @@ class SwarmSeries:
     bits: dict[int, list[float]]
     bodies: list[WorldBody]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Everything but the poses."""
         names = native.METRICS
         return {

@@ -26,8 +26,9 @@ def with_values(text: str, model: native.Model, values: Mapping[str, float]) -> 
         else:
             table = document.setdefault(section, tomlkit.table())
         if len(key) == 2:
-            table, key = table[key[0]], [int(key[1])]
-        table[key[0]] = float(value)
+            table[key[0]][int(key[1])] = float(value)
+        else:
+            table[key[0]] = float(value)
     return tomlkit.dumps(document)
 
 

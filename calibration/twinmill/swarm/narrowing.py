@@ -15,6 +15,7 @@ seen.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -27,8 +28,8 @@ from twinmill.experiment.design import CENTRE, Floor, Limits, check, choose, log
 from twinmill.experiment.moves import Move, duty_axes, family
 from twinmill.experiment.one_step_fit import System
 from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
-from twinmill.fitting.fit import base_names, fitted, judged
-from twinmill.fitting.opening import open_measurements
+from twinmill.fitting.fit import base_names, fitted
+from twinmill.fitting.opening import judged, open_measurements
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
@@ -173,7 +174,7 @@ class Narrowing:
         """Standard errors of the share, before the run and after it."""
         return self.spread.std(self.spread.covariance), self.spread.std(self.covariance)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Plain values."""
         before, after = self.stds
         return {
@@ -225,7 +226,7 @@ def narrow(
     spread = spread_of(swarm, goal, draws=draws, seed=1, tell=tell)
     logs = [o for o in open_measurements(measurements, file) if o.floor]
     excess = file.usual_score([o.measurement.log_sha256 for o in logs]) ** 2
-    modelled = log_of([o.modelled() for o in logs])
+    modelled = log_of([m for o in logs if isinstance(m := o.modelled(), ModelledLog)])
     return design_for(spread, goal, file=file, modelled=modelled, limits=limits, excess=excess)
 
 
@@ -310,7 +311,7 @@ def _left_by_fits(
     """(P, P) covariance that fits to the run leave, mean over REPLICAS of it with noise."""
     planned = driven(moves, modelled)
     prior, noisy = np.linalg.inv(spread.covariance), modelled.model.copy()
-    for name, value in modelled.noise.to_json().items():
+    for name, value in (modelled.noise.to_json() if modelled.noise else {}).items():
         noisy.set(f"noise.{name}", value)
     left = []
     for seed in range(1, REPLICAS + 1):

@@ -2,6 +2,7 @@
 """A sweep as a phase diagram: in each cell what becomes of the swarm, and how surely."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -82,7 +83,7 @@ class Phase:
             index = index[int(np.argmin(np.abs(np.array(axis.values) - wanted)))]
         return np.atleast_2d(index)
 
-    def to_json(self) -> list[dict]:
+    def to_json(self) -> list[dict[str, Any]]:
         """One object for each cell."""
         bounds = self.intervals()
         return [

@@ -4,6 +4,7 @@
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from twinmill.defaults import Question
 from twinmill.swarm.axes import Axis
@@ -57,7 +58,7 @@ class Curve:
         )
         return f"{self.axis.label}: {spans} gives {wanted}, {tell}{edge}."
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Plain numbers."""
         return {
             "axis": self.axis.name,

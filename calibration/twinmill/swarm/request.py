@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -203,7 +204,7 @@ def _read(text: str, name: str) -> native.Model:
     return native.Model.from_toml(text, name)
 
 
-def run_part(request: Request, worlds: range) -> dict[str, list]:
+def run_part(request: Request, worlds: range) -> dict[str, list[Any]]:
     """Simulates some worlds, numbered seed by seed within cell by cell.
 
     Returns:
@@ -222,7 +223,7 @@ def run_part(request: Request, worlds: range) -> dict[str, list]:
         request.full,
         request.plant,
     )
-    columns: dict[str, list] = {"cell": cell_of.tolist(), "seed": seeds.tolist()}
+    columns: dict[str, list[Any]] = {"cell": cell_of.tolist(), "seed": seeds.tolist()}
     for a, axis in enumerate(request.axes):
         kind = int if axis.whole else float
         columns[axis.name] = [kind(points[c][a]) for c in cell_of]

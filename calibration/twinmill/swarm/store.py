@@ -5,6 +5,7 @@ import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -52,7 +53,7 @@ class Store:
             fresh.write_text(json.dumps(manifest, indent=1, sort_keys=True))
         self._part(0).parent.mkdir(exist_ok=True)  # not before the folder says what it is for
 
-    def read_manifest(self) -> dict:
+    def read_manifest(self) -> dict[str, Any]:
         """Manifest of the folder: the `request` it was made for, and its `sha256`."""
         return json.loads(self._manifest.read_text())
 
@@ -60,7 +61,7 @@ class Store:
         """Numbers of the parts not yet kept."""
         return [number for number in range(count) if not self._part(number).exists()]
 
-    def keep(self, number: int, columns: dict[str, list]) -> None:
+    def keep(self, number: int, columns: dict[str, list[Any]]) -> None:
         """Writes one part of the table, so that a sweep that is cut off can go on."""
         self._write(self._part(number), pa.table(columns))
 

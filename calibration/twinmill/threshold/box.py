@@ -264,7 +264,8 @@ def _widen(limits: np.ndarray, rest: np.ndarray, allowed: float) -> Box:
             gap = gap[gap > 0]
             wall = gap[int(allowed)] if len(gap) > allowed else 2 * MARGINS[channel]
             limits[channel, side] += sign * min(MARGINS[channel], (wall - 1) // 2)
-    return tuple(int(number) for number in np.clip(limits, 0, 255).ravel())
+    a, b, c, d, e, f = (int(number) for number in np.clip(limits, 0, 255).ravel())
+    return a, b, c, d, e, f
 
 
 def _problem(pictures: list[Picture], results: list[PictureResult], min_blob_px: int) -> str:

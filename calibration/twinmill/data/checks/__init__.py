@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import twinmill_native as native
 
+from twinmill.data.checks.alternatives import Explained, Search
 from twinmill.data.checks.apart import apart
 from twinmill.data.checks.clocks import check_lateness, check_one_clock
 from twinmill.data.checks.commands import (
@@ -85,7 +86,7 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
     Without a model also how late a robot is on one clock: nothing else tells it then.
     """
     found: list[InputFinding] = []
-    by_log: dict[str, list] = {}
+    by_log: dict[str, list[tuple[CheckedTrack, Search, Explained, list[InputFinding]]]] = {}
     robots = Counter(label for label, _ in tracks)
     for label, track in tracks:
         body = body_by_command(model, track.command_kind)
@@ -96,7 +97,7 @@ def check_driven(tracks: Tracks, model: native.Model | None) -> list[InputFindin
             track = apart(track, others, model.get("robot.body_radius_m"))
         checked = CheckedTrack(label, track, body, own_option(track.robot_id, robots[label]))
         wrong, search, explained = check_commands(checked)
-        if explained is None:
+        if search is None or explained is None:
             found += wrong
         else:
             by_log.setdefault(label, []).append((checked, search, explained, wrong))

@@ -263,7 +263,7 @@ class Search:
         """
         speeds = [self.speeds(self.motion.body_mps(*signs), signs[0]) for signs in POSE_SIGNS]
         beside = np.hstack(speeds)  # (K, 3 of each)
-        explained: list[dict] = [{} for _ in POSE_SIGNS]
+        explained: list[dict[tuple[float, float], float]] = [{} for _ in POSE_SIGNS]
         for lag_s in self.lags_s:
             begin_s, shapes = self.felt(lag_s)
             for late_s in self.lates_s:
@@ -274,7 +274,7 @@ class Search:
                 for of_signs, sums in zip(explained, by_column.reshape(-1, 3), strict=True):
                     of_signs[lag_s, late_s] = sums.sum()
         return {
-            signs: sorted(of_signs, key=of_signs.get, reverse=True)[:TRIED]
+            signs: sorted(of_signs, key=lambda at: of_signs[at], reverse=True)[:TRIED]
             for signs, of_signs in zip(POSE_SIGNS, explained, strict=True)
         }
 

@@ -15,6 +15,7 @@ from twinmill.data.cuts import USUAL_MPS, USUAL_RADPS, Limits, longest_gap_s
 from twinmill.data.log import RobotLog
 
 OF_POSES = ("pose_t_s", "pose", "z_m", "valid")
+Stretch = tuple[int, int, float, float]  # name, body, capture's clock from and to
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,8 @@ def give_back(
     if not exchanges:
         return dict(robots), []
     starts_s = dict.fromkeys(robots, -np.inf)
-    shown, stretches = {name: name for name in robots}, []  # body by name; (name, body, from, to)
+    shown = {name: name for name in robots}  # body by name
+    stretches: list[Stretch] = []
     for exchange in exchanges:
         for name in exchange.was:
             stretches.append((name, shown[name], starts_s[name], exchange.at_s))
@@ -93,7 +95,7 @@ def _exchange(group: Mapping[int, _Jump]) -> _Exchange | None:
     was, apart_m = {}, []
     for name, jump in group.items():
         others = {n: jump.apart_m(j) for n, j in group.items() if n != name}
-        nearest = min(others, key=others.get, default=None)
+        nearest = min(others, key=lambda n: others[n], default=None)
         if nearest is not None and np.isfinite(others[nearest]):
             was[name] = nearest
             apart_m.append(others[nearest])
@@ -116,7 +118,7 @@ def _jumps(robot: RobotLog) -> list[_Jump]:
     ]
 
 
-def _owners(robots: Mapping[int, RobotLog], stretches: list[tuple]) -> dict[int, int]:
+def _owners(robots: Mapping[int, RobotLog], stretches: list[Stretch]) -> dict[int, int]:
     """Name of each body: that which it has in most of its poses, by the body's first name."""
     from scipy.optimize import linear_sum_assignment  # few logs get here
 
@@ -137,18 +139,20 @@ def _part(robot: RobotLog, begin_s: float, end_s: float) -> dict[str, np.ndarray
 
 def _joined(robot: RobotLog, parts: list[dict[str, np.ndarray]]) -> RobotLog:
     """The robot with these poses."""
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in OF_POSES}
-    order = np.argsort(columns["pose_t_s"], kind="stable")
-    return replace(robot, **{name: values[order] for name, values in columns.items()})
+    order = np.argsort(np.concatenate([part["pose_t_s"] for part in parts]), kind="stable")
+    pose_t_s, pose, z_m, valid = (
+        np.concatenate([part[name] for part in parts])[order] for name in OF_POSES
+    )
+    return replace(robot, pose_t_s=pose_t_s, pose=pose, z_m=z_m, valid=valid)
 
 
 def _told(
-    robots: Mapping[int, RobotLog], wrong: list[tuple], within_m: float, label: str
+    robots: Mapping[int, RobotLog], wrong: list[Stretch], within_m: float, label: str
 ) -> list[InputFinding]:
     """One finding on each two or more robots and each time."""
     first_s = min(robot.pose_t_s[0] for robot in robots.values())
     last_s = max(robot.pose_t_s[-1] for robot in robots.values())
-    by_time: dict[tuple[float, float], list[tuple]] = {}
+    by_time: dict[tuple[float, float], list[Stretch]] = {}
     for row in wrong:
         by_time.setdefault(row[2:], []).append(row)
     found = []

@@ -36,11 +36,13 @@ DRIVEN_BY = {
     "twist": "velocities of the body",
     "steering": "steering angles",
 }
-POSES_IN = (  # measured over commanded speed, what it says, and columns under their right names
+# Measured over commanded speed, what it says, and columns under their right names.
+Units = tuple[tuple[tuple[float, float], str, dict[str, str]], ...]
+POSES_IN = (
     ((300.0, 3000.0), "the positions are in millimetres", {"x_m": "x_mm", "y_m": "y_mm"}),
     ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
 )
-SMALL_POSES_IN = (  # a unit in a name is taken at its word: the name is to change
+SMALL_POSES_IN: Units = (  # a unit in a name is taken at its word: the name is to change
     (
         (1 / 300, 1 / 30),
         "the positions are 100 times too small, as if metres were taken for centimetres",
@@ -324,7 +326,7 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     return found or _no_gain(checked, speed)
 
 
-def _ratios(kind: CommandKind, speed: float, turn: float) -> list[tuple[float, tuple]]:
+def _ratios(kind: CommandKind, speed: float, turn: float) -> list[tuple[float, Units]]:
     """Measured over commanded, with the units that may make it so.
 
     Wheels that are told too much drive and turn too much; of positions only the drive is off.

@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ class InputFinding:
     lever_m: tuple[float, float] | None = None
     remedy_of_all: str = ""
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return {name: value for name, value in asdict(self).items() if name != "remedy_of_all"}
 

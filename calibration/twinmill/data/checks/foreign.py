@@ -77,7 +77,7 @@ def foreign_stretches(track: Track, search: Search, own: Explained) -> list[tupl
             break
         free[part] = False
         begin_s, end_s = t_s[part.start], t_s[part.stop - 1]
-        within = np.count_nonzero((changes_s > begin_s) & (changes_s < end_s))
+        within = int(np.count_nonzero((changes_s > begin_s) & (changes_s < end_s)))
         if _is_foreign(compared, part, within):
             found.append(_between_commands(changes_s, begin_s, end_s))
     follows = np.ones(len(t_s), bool)

@@ -137,8 +137,8 @@ def lateness_of(whole: Search) -> Lateness | None:
         found = _best(by_shift)
         if found is None:
             return None
+        path, shape = found
     by_lag = left[:, left.min(axis=0).sum(axis=1).argmin()]
-    path, shape = found
     logs = np.log(LAGS_S)
     of_lags = _stepwise(by_lag, logs)
     rival = _drift(by_lag, logs, 1.0) if path.straight else of_lags[path.pieces - 1]
@@ -267,7 +267,7 @@ def _drift(left: np.ndarray, places: np.ndarray, reach: float) -> _Path:
 def _drifts_surely(drift: _Path, left: np.ndarray) -> bool:
     """True if shifts of stretches scatter far less about a line than it rises."""
     shift_s, weight = _timing(left, SHIFTS_S)
-    line = np.linspace(*drift.at_s, len(shift_s))
+    line = np.linspace(drift.at_s[0], drift.at_s[-1], len(shift_s))
     weight = weight / max(weight.sum(), 1e-12)
     in_effect = 1 / np.sum(weight**2)
     off = np.clip(shift_s - line, -CHECKS.reach_s, CHECKS.reach_s)

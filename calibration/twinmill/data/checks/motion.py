@@ -165,11 +165,11 @@ class Motion:
 
     def at(self, felt: Felt, late_s: float) -> np.ndarray:
         """(K, ...) of what was felt `late_s` before each pose."""
-        begin_s, felt = felt
-        place = np.clip(self.places(begin_s) - late_s / GRID_S, 0, len(felt) - 1.001)
+        begin_s, values = felt
+        place = np.clip(self.places(begin_s) - late_s / GRID_S, 0, len(values) - 1.001)
         k = place.astype(int)
-        part = (place - k).reshape(-1, *[1] * (felt.ndim - 1))
-        return felt[k] * (1 - part) + felt[k + 1] * part
+        part = (place - k).reshape(-1, *[1] * (values.ndim - 1))
+        return values[k] * (1 - part) + values[k + 1] * part
 
     def places(self, begin_s: float, rate: float = 0.0) -> np.ndarray:
         """(K,) steps from the begin of a grid to each pose; `rate` of the clocks, s/s."""

@@ -24,8 +24,8 @@ def of_places(pose: np.ndarray) -> list[Family]:
     for axis, humps in enumerate(along):
         if humps:
             found += _at("xy"[axis], humps.texts("xy"[axis]), partial(_strips, axis, humps))
-    sides = [_over(axis, pose[:, axis], SQUARES) for axis in range(2)]
-    if all(sides):
+    sides = [humps for axis in range(2) if (humps := _over(axis, pose[:, axis], SQUARES))]
+    if len(sides) == 2:
         across = product(*(humps.texts(name) for humps, name in zip(sides, "xy", strict=True)))
         found += _at("squares", ["*".join(pair) for pair in across], partial(_squares, sides))
     return found

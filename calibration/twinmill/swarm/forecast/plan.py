@@ -187,7 +187,7 @@ def read_outcomes(path: Path, plan: Plan) -> tuple[np.ndarray, np.ndarray, list[
     return cells, np.array([seen[k] for k in numbers]), missing
 
 
-def _rows(path: Path) -> list[tuple[int, dict]]:
+def _rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     """Rows of a filled form, each with its line."""
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
@@ -214,7 +214,7 @@ def _run_number(text: str | None, plan: Plan, seen: dict[int, int]) -> int:
     return int(text or "")
 
 
-def _check_cell(row: dict, plan: Plan, cell: int) -> None:
+def _check_cell(row: dict[str, str], plan: Plan, cell: int) -> None:
     """Axis values that stand in the row are the plan's, to the digits of the form."""
     for name, value in zip(plan.names, plan.expected.points[cell], strict=True):
         text = (row.get(name) or "").strip()
@@ -229,7 +229,7 @@ def _check_cell(row: dict, plan: Plan, cell: int) -> None:
             )
 
 
-def _check_log_is_new(row: dict, path: Path, number: int, logs: dict[Path, int]) -> None:
+def _check_log_is_new(row: dict[str, str], path: Path, number: int, logs: dict[Path, int]) -> None:
     """Each run has a log of its own."""
     log = (row.get("log") or "").strip()
     if not log:
@@ -239,7 +239,7 @@ def _check_log_is_new(row: dict, path: Path, number: int, logs: dict[Path, int])
         raise ValueError(f"log '{log}' is that of run {first} already; give run {number}'s own.")
 
 
-def _outcome(row: dict, path: Path, plan: Plan, cell: int) -> int | None:
+def _outcome(row: dict[str, str], path: Path, plan: Plan, cell: int) -> int | None:
     name, log = (row.get("class") or "").strip(), (row.get("log") or "").strip()
     if log:
         place = path.parent / log

@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import bootstrap, fisher_exact, mannwhitneyu, t
@@ -22,7 +23,7 @@ class Mean:
     low: float
     high: float
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Its fields."""
         return vars(self)
 
@@ -41,7 +42,7 @@ class Rival:
     brier: Mean
     gain: Mean
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Its fields."""
         parts = {k: getattr(self, k).to_json() for k in ("log_score", "brier", "gain")}
         return {"name": self.name, **parts}

@@ -4,6 +4,7 @@
 import difflib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -216,7 +217,7 @@ def _hidden(file: ModelFile, hidden: Hidden) -> list[Factor]:
     ]
 
 
-def _at(card: Mapping, times: float) -> dict[str, float]:
+def _at(card: Mapping[str, Any], times: float) -> dict[str, float]:
     """Parameters at so many times the usual strength; the other way if negative."""
     left = [p["name"] for p in card["parameters"] if p["name"].partition("_")[0] in LEFT]
     moved = left or [p["name"] for p in card["parameters"]]
@@ -230,7 +231,7 @@ def _at(card: Mapping, times: float) -> dict[str, float]:
     return values
 
 
-def _acts(card: Mapping, values: Mapping[str, float]) -> bool:
+def _acts(card: Mapping[str, Any], values: Mapping[str, float]) -> bool:
     strong = (p for p in card["parameters"] if p["role"] not in NO_SIZE)
     return any(values[p["name"]] != p["neutral"] for p in strong)
 
@@ -254,7 +255,7 @@ def _named(instance: str, values: Mapping[str, float]) -> dict[str, float]:
     return {f"{instance}.{key}": value for key, value in values.items()}
 
 
-def _words(card: Mapping, values: Mapping[str, float]) -> str:
+def _words(card: Mapping[str, Any], values: Mapping[str, float]) -> str:
     """`view_range (factor 0.8)`: what is not neutral, places left out."""
     told = [
         f"{p['name']} {_short(values[p['name']])}{_unit(p['unit'])}"

@@ -2,6 +2,7 @@
 """Differences between runs of two models with the same seeds."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, bootstrap
@@ -28,7 +29,7 @@ class Difference:
         """Value after the change less the value before, in the unit of both."""
         return self.after - self.before
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Its fields and the change."""
         return {**vars(self), "change": self.change}
 

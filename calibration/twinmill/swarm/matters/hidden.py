@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -28,11 +29,11 @@ class Hidden:
     why: str
 
     @classmethod
-    def from_json(cls, data: Mapping) -> "Hidden":
+    def from_json(cls, data: Mapping[str, Any]) -> "Hidden":
         """The inverse of to_json."""
         return cls(**data)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Its fields."""
         return vars(self)
 

@@ -4,6 +4,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -42,7 +43,7 @@ class Outcome:
     seeds: int
     turned: int | None
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Plain values, without the model's text."""
         return {
             "what": self.change.what,
@@ -191,8 +192,8 @@ class _Bench:
     def _part(self, text: str, look: int) -> Request:
         """The seeds that a look adds."""
         first, last = (int(share * self.request.seeds) for share in (0, *LOOKS)[look : look + 2])
-        seeds = {"first_seed": self.request.first_seed + first, "seeds": last - first}
-        return replace(self.request, model_text=text, **seeds)
+        first_seed = self.request.first_seed + first
+        return replace(self.request, model_text=text, first_seed=first_seed, seeds=last - first)
 
     def plan(self, look: int, factors: Sequence[Factor]) -> None:
         """Says how many runs a look adds."""

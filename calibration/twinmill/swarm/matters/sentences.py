@@ -2,6 +2,7 @@
 """Sentences on the parts of a model that matter."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from twinmill.arguments import option
 from twinmill.counted import counted
@@ -149,7 +150,7 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def to_json(found: Sensitivity) -> dict:
+def to_json(found: Sensitivity) -> dict[str, Any]:
     """The interface's object."""
     share, low, high = found.before
     request = found.request
@@ -172,7 +173,7 @@ def to_json(found: Sensitivity) -> dict:
     }
 
 
-def _result_json(result: FactorResult) -> dict:
+def _result_json(result: FactorResult) -> dict[str, Any]:
     factor = result.factor
     return {
         "name": factor.name,
