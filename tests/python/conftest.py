@@ -191,10 +191,22 @@ def brief_coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
     return _coasting(tmp_path_factory.mktemp("brief"), model_text, 45, 0.025)
 
 
+@pytest.fixture(scope="session")
+def brief_log_without_coasting(tmp_path_factory, model_text) -> Path:
+    """Log of the brief robot before it rolled on: its model's own."""
+    return _coasting(tmp_path_factory.mktemp("own"), model_text, 45, 0.025, effect="").log
+
+
+COASTING = '[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\n'
+
+
 def _coasting(
-    folder: Path, model_text: Callable[..., str], duration_s: float, period_s: float
+    folder: Path,
+    model_text: Callable[..., str],
+    duration_s: float,
+    period_s: float,
+    effect: str = COASTING,
 ) -> CoastingRobot:
-    effect = '[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\n'
     known = model_text("coaster") + NOISE
     (folder / "model.toml").write_text(known)
     (folder / "true.toml").write_text(known + effect)

@@ -41,16 +41,18 @@ if working():  # not for --help
         open_model,
         option,
         provenance,
-        refuse_own,
+        refuse_report,
         told,
     )
 if TYPE_CHECKING:
     from twinmill.diagnosis.explain import Explanation
+    from twinmill.inference.infer import Inference
     from twinmill.joints.diagnose import JointDiagnosis
     from twinmill.joints.explain import JointExplanation
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
+WITH_OWN = "probabilities that --own gives"
 
 
 def register(app: typer.Typer) -> None:
@@ -66,7 +68,7 @@ def _diagnose(
     own: Own = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> Diagnosis | JointDiagnosis:
+) -> Diagnosis | JointDiagnosis | list[Inference]:
     """Name the physical effect that a model lacks, or say that none is missing or identifiable.
 
     Works best with a model whose base was fitted to another log of the same robot
@@ -74,14 +76,21 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
 
-    Of a robot that MuJoCo can load, which alone takes --own:
+    With the log that the model was fitted to, each effect has a probability:
+    twinmill diagnose run.lcmlog --model fitted.toml --own calibration.lcmlog
+
+    Of a robot that MuJoCo can load:
     twinmill diagnose run.csv --model arm.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import diagnosed  # MuJoCo's Python is slow to import
 
         return diagnosed(logs, model, own=own or [], as_json=as_json, out=out)
-    refuse_own("diagnose", own)
+    if own:
+        from twinmill_cli.infer import inferred  # slow to import, as what follows is
+
+        refuse_report("diagnose", WITH_OWN, out)
+        return inferred("diagnose", logs, model, own=own, as_json=as_json)
     native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
@@ -256,7 +265,7 @@ def _explain(
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
-) -> Explanation | JointExplanation:
+) -> Explanation | JointExplanation | list[Inference]:
     """Diagnose, add the effects found, and write the new model; cross-validated at each step.
 
     If an error remains that no effect explains, and a formula for it was
@@ -265,7 +274,7 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 
-    Of an MJCF, which alone takes --own:
+    With --own the likeliest effects are written, without a formula. Of an MJCF:
     twinmill explain run.csv --model arm.xml -o better.xml
     """
     if is_mjcf(model):
@@ -274,7 +283,13 @@ def _explain(
         return of_joints(
             *(logs, model, output), own=own or [], force=force, as_json=as_json, out=out
         )
-    refuse_own("explain", own)
+    if own:
+        from twinmill_cli.infer import inferred  # as in diagnose
+
+        refuse_report("explain", WITH_OWN, out)
+        return inferred(
+            "explain", logs, model, own=own, output=output, force=force, as_json=as_json
+        )
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
     verb = "explain" if formula else "explain --no-formula"

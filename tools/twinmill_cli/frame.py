@@ -55,13 +55,10 @@ def is_mjcf(model: str) -> bool:
     return Path(model).suffix.lower() in (".xml", ".mjcf")
 
 
-def refuse_own(verb: str, own: list[Path] | None) -> None:
-    """Raises ValueError if a robot on wheels is given logs that its model was made with."""
-    if own:
-        raise ValueError(
-            f"{verb}: --own is for models in MJCF; of a robot on wheels `twinmill lab infer` "
-            "takes it."
-        )
+def refuse_report(verb: str, robots: str, out: Path | None) -> None:
+    """Raises ValueError if a report is wanted where there is none: of these robots."""
+    if out is not None:
+        raise ValueError(f"{verb}: there is no report of {robots}; leave --out away.")
 
 
 def provenance(command: str, model: ModelFile) -> Provenance:

@@ -80,25 +80,62 @@ def _infer(
     `twinmill lab infer other.lcmlog --model better.toml` is enough. With
     --keep known.toml the model as given is written with what it misses in --own.
     """
+    return inferred(
+        "lab infer",
+        logs,
+        model,
+        own=own or [],
+        keep=keep,
+        output=output,
+        force=force,
+        as_json=as_json,
+    )
+
+
+def inferred(
+    verb: str,
+    logs: list[Path],
+    model: str,
+    *,
+    own: list[Path],
+    keep: Path | None = None,
+    output: Path | None = None,
+    force: bool = False,
+    as_json: bool,
+) -> list[Inference]:
+    """Tells what is missing with its probability, and writes the models that are asked for.
+
+    Args:
+        verb: of the command that was typed.
+        logs: of one robot or several.
+        model: file or name.
+        own: logs that the model was fitted to.
+        keep: where the model is written with what it misses in these.
+        output: where the model is written with what is missing.
+        force: replaces what is there.
+        as_json: one JSON object in the place of tables.
+
+    Raises:
+        ValueError: files or options do not fit together.
+    """
     native.keep_memory()  # what the work frees it wants again
-    words = ["lab", "infer", *repeated("--own", own or ())]
-    if keep is not None:
-        words += ["--keep", str(keep)]
-    verb = shlex.join(words)
-    typed = command_line(verb, logs, model, output)
-    source = provenance(typed, model_file := open_model(model, None))
+    name, beside = verb.split()[-1], shlex.join(repeated("--own", own))
+    typed = f"{verb} {beside}".rstrip() + (f" --keep {shlex.quote(str(keep))}" if keep else "")
+    source = provenance(
+        command_line(typed, logs, model, output), model_file := open_model(model, None)
+    )
     if keep is not None and not own:
-        raise ValueError("infer: --keep stores what --own shows; give the model's own log, too.")
+        raise ValueError(f"{name}: --keep stores what --own shows; give the model's own log, too.")
     for path in filter(None, (keep, output)):
-        check_new_file(path, force, [model_file.path, *logs, *(own or ())])
+        check_new_file(path, force, [model_file.path, *logs, *own])
     if keep is not None and keep == output:
-        raise ValueError(f"infer: --keep and -o are both {keep}; give each a file of its own.")
+        raise ValueError(f"{name}: --keep and -o are both {keep}; give each a file of its own.")
     with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
         measurements = load(logs, model_file)
         robots = {track.robot_id for _, track in measurements.tracks}
         if (keep or output) and len(robots) > 1:
             raise ValueError(
-                f"infer: {'--keep' if keep else '-o'} writes what one robot's log tells, and "
+                f"{name}: {'--keep' if keep else '-o'} writes what one robot's log tells, and "
                 f"these are {len(robots)} robots; give logs of one robot."
             )
         before = load(own, model_file) if own else ()
@@ -115,7 +152,10 @@ def _infer(
         written.file.write(force)
     each = [result.to_json() for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
-    commands = [] if written or len(results) > 1 else _mending(results[0].answer, verb, logs, model)
+    writes = f"{'explain' if verb == 'diagnose' else verb} {beside}".rstrip()
+    commands = (
+        [] if written or len(results) > 1 else _mending(results[0].answer, writes, logs, model)
+    )
     data = {**data, **(written.to_json() if written else {})}
     data |= {"commands": [command for _, command in commands]}
     data |= {**told(measurements), **source.to_json()}

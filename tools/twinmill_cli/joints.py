@@ -17,16 +17,18 @@ from twinmill.joints.hook import hook_beside
 from twinmill.joints.next import Excitation, next_joints
 from twinmill.report import joints as shown
 from twinmill.version import __version__
-from twinmill_cli.frame import command_line
+from twinmill_cli.frame import command_line, refuse_report
 from twinmill_cli.options import repeated
 from twinmill_cli.output import deliver, say, telling
+
+JOINTED = "jointed robots"
 
 
 def diagnosed(
     logs: list[Path], model: str, *, own: list[Path], as_json: bool, out: Path | None
 ) -> JointDiagnosis:
     """Names what an MJCF lacks."""
-    _no_report("diagnose", out)
+    refuse_report("diagnose", JOINTED, out)
     with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
         found = diagnose_joints(logs, model, progress, own=own)
     _warn(found.warnings)
@@ -46,7 +48,7 @@ def explained(
     out: Path | None,
 ) -> JointExplanation:
     """Writes an MJCF with what was found, and a hook for what it cannot hold."""
-    _no_report("explain", out)
+    refuse_report("explain", JOINTED, out)
     hook = hook_beside(output)
     for path in (output, hook):
         check_new_file(path, force, [Path(model), *logs, *own])
@@ -69,7 +71,7 @@ def explained(
 
 def compared(logs: list[Path], model: str, as_json: bool, out: Path | None) -> JointComparison:
     """Errors of an MJCF on a log; a hook that `explain` wrote beside it acts as well."""
-    _no_report("compare", out)
+    refuse_report("compare", JOINTED, out)
     hook = beside if (beside := hook_beside(model)).is_file() else None
     found = compare_joints(logs, model, hook)
     _warn(found.warnings)
@@ -92,7 +94,7 @@ def designed(
     out: Path | None,
 ) -> Excitation:
     """Writes the motion that parts what logs leave open."""
-    _no_report("next", out)
+    refuse_report("next", JOINTED, out)
     check_new_file(output, force, [Path(model), *logs, *own])
     with telling(f"designing a run with {model}") as progress, threadpool_limits(1, "blas"):
         found = next_joints(
@@ -116,12 +118,6 @@ def designed(
 def _command(verb: str, own: list[Path], *rest: Any) -> str:
     """A command of these, with the logs that the model was made with."""
     return command_line(shlex.join([*shlex.split(verb), *repeated("--own", own)]), *rest)
-
-
-def _no_report(verb: str, out: Path | None) -> None:
-    """Raises ValueError if a report is wanted: there is none for joints."""
-    if out is not None:
-        raise ValueError(f"{verb}: there is no report of jointed robots; leave --out away.")
 
 
 def _warn(warnings: tuple[str, ...]) -> None:

@@ -34,7 +34,6 @@ if working():  # not for --help
         load,
         open_model,
         provenance,
-        refuse_own,
         told,
     )
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
@@ -126,7 +125,10 @@ def _next(
         how_long = {"duration_s": duration_s, "times_speed": times_speed}
         told_too = {"own": own or [], "force": force, "as_json": as_json, "out": out}
         return designed(logs, model, output, **how_long, **told_too)
-    refuse_own("next", own)
+    if own:
+        raise ValueError(
+            "next: --own is for models in MJCF; a run for a robot on wheels is designed without it."
+        )
     limits = Limits(duration_s, _sides(floor_m), max_duty_pct / 100)
     verb = f"next --duration-s {duration_s:g} --floor-m {floor_m} --max-duty-pct {max_duty_pct}"
     verb += f" --script-as {script_as}" if script_as else ""
