@@ -183,6 +183,23 @@ FAULTS = {
         1,
         is_brief=True,
     ),
+    "another_starts_while_it_sleeps": Fault(
+        "the same while the first's laptop sleeps; then Ctrl-C of the second",
+        (
+            "Called off: R01, R02 were taken over by another operator",
+            "R01, R02: left to that operator.",
+        ),
+        1,
+        is_brief=True,
+    ),
+    "another_starts_while_it_sleeps_through_its_instant": Fault(
+        "the same, and the first wakes after its instant",
+        (
+            "Called off: R01, R02 were taken over by another operator",
+            "R01, R02: left to that operator.",
+        ),
+        1,
+    ),
     "ctrl_c_in_the_countdown": Fault(
         "Ctrl-C in the countdown",
         ("All stand; the start was ended before", "all had confirmed it."),
@@ -500,6 +517,13 @@ def test_of_two_countdowns_the_last_is_the_one_that_starts(session):
     code, said = row["second"]
     assert row["stood"] and row["drove"] and code == 130 and "All stand." in said
     assert said.index("held by another operator who may be counting") < said.index("Started at")
+
+
+@pytest.mark.parametrize("name", [name for name in RUN if "while_it_sleeps" in name])
+def test_who_wakes_leaves_robots_to_who_started_them_meanwhile(session, name):
+    """The first stopped the second's robots: they had been without its word for long."""
+    code, said = session[name]["second"]
+    assert session[name]["drove"] and code == 130 and "All stand." in said
 
 
 @pytest.mark.skipif(not ALL, reason="part of make check-long")

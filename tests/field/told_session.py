@@ -774,6 +774,32 @@ class Field:
         row = self.row(fault_s, code) | {"stood": stood, "drove": drove}
         return row | {"second": [second_code, second.plain]}
 
+    def another_starts_while_it_sleeps(self) -> dict:
+        """Robots have lost the first by then, which wakes before its instant."""
+        return self._slept_through_another("--in-s", "14", before_s=LINK_TIMEOUT_S + 0.5)
+
+    def another_starts_while_it_sleeps_through_its_instant(self) -> dict:
+        """Robots drive when the first wakes, and not by its start."""
+        return self._slept_through_another("--in-s", "5")
+
+    def _slept_through_another(self, *words: str, before_s: float = 0.0) -> dict:
+        first = self._counting(*words)
+        first.process.send_signal(signal.SIGSTOP)
+        time.sleep(before_s)
+        second = Operator(self.key_file, *START, terminal=False)
+        wait_until(lambda: second.has_ended or HELD in second.plain, 20)
+        time.sleep(LINK_TIMEOUT_S + 1)
+        first.process.send_signal(signal.SIGCONT)
+        code = first.end()
+        time.sleep(STAYS_S)
+        drove = all(robot.duties() != ZERO for robot in self.robots.values())
+        fault_s = time.monotonic()
+        second.process.send_signal(signal.SIGINT)
+        second_code = second.end()
+        self.operator = first
+        row = self.row(fault_s, code) | {"drove": drove}
+        return row | {"second": [second_code, second.plain]}
+
     def ctrl_c_in_the_countdown(self) -> dict:
         begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
         time.sleep(0.5)

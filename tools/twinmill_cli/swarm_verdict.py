@@ -369,6 +369,7 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
         f"{_names(idle)} did not{_because(idle)}" if idle else "",
         f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
+        _why_dropped_out(begun),
         f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
         _dry_run(given),
         *_odd_links(begun),
@@ -518,14 +519,18 @@ def _names(given: list[Answer]) -> str:
 
 
 def _why_called_off(begun: Start) -> str:
+    return _why_dropped_out(begun) or _why(begun.answers)
+
+
+def _why_dropped_out(begun: Start) -> str:
+    """Words on robots that another operator or a fault kept from it; empty where none was."""
     by: dict[str, list[str]] = {}
     for robot_id, words in sorted(begun.dropouts.words.items()):
         by.setdefault(words, []).append(f"R{robot_id:02d}")
-    told = [
+    return "; ".join(
         f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {words}"
         for words, names in by.items()
-    ]
-    return "; ".join(told) or _why(begun.answers)
+    )
 
 
 def _why(given: list[Answer]) -> str:

@@ -418,7 +418,8 @@ class Start:
         stopped: what they answered to the stop where it was called off.
         late: what those answered to a stop that had accepted, were to drive on by themselves, and
             had not begun.
-        dropouts: robots that had accepted, and for which it was called off.
+        dropouts: robots for which it was called off; of a partial start that was not, those that
+            drive by another's.
         link_timeout_ms: that was sent with it; 0: they drive on without their operator.
         stop_heard: from where a stop came that was not said here, and when; empty: none was heard.
     """
@@ -492,20 +493,25 @@ def start(
         fleet.listen(instant_s - time.monotonic(), dropouts)
     if dropouts().taken:  # that operator may be about to tell more of them
         fleet.listen(min(OTHERS_S, instant_s - CALL_OFF_S - time.monotonic()))
-    out, stopped, late = dropouts(), [], []
+    out, others, stopped, late = dropouts(), Dropouts(), [], []
     if agreed and not out:
         patience_s = LATE_S if partial and not link_timeout_ms else BEGUN_S
         waiting = _not_begun(fleet, given, patience_s)
-        waiting -= find_dropouts(fleet, robots, command.seq, only_stopped=False).taken
-        if waiting and not partial:
+        # Those that drive may do so by another's start: their own word tells.
+        others = find_dropouts(fleet, robots, command.seq, only_stopped=False).theirs
+        waiting -= others.taken
+        is_nobodys = others.taken >= {a.robot_id for a in given if a.accepted}
+        if others and (is_nobodys or not partial):
+            out = others
+        elif waiting and not partial:
             why = NOT_BEGUN if len(waiting) < len(given) else NONE_BEGUN
             words = {i: _not_driving(fleet.robots[i], why) for i in waiting}
             out = dropouts().beside(words)
         elif waiting and not link_timeout_ms:
             late = stop(fleet, waiting)
     called_off = bool(out) or not agreed
+    fleet.held -= out.taken | others.taken
     if called_off:
-        fleet.held -= out.taken
         stopped = stop(fleet, robots - out.taken) if robots - out.taken else []
         out = out.beside(stopped_by_another(fleet, robots - out.taken, command.seq))
     sessions = {
@@ -521,7 +527,7 @@ def start(
             replace(now, accepted=a.accepted, signed=a.signed, reason=a.reason)
             for now, a in zip(final, given, strict=True)
         ]
-    begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out)
+    begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out or others)
     return Start(*begun, link_timeout_ms, fleet.stop_heard(robots))
 
 
