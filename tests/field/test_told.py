@@ -49,6 +49,15 @@ FAULTS = {
         130,
         is_brief=True,
     ),
+    "ctrl_c_and_one_is_gone": Fault(
+        "R02's program is killed, and Ctrl-C, and again while it waits for R02 (R01)",
+        (
+            "stop is said all the time; waiting up to 10 s for R02 to sign",
+            "NOT ALL STAND: R02: no stop was confirmed.",
+            "Ended by a signal after",
+        ),
+        1,
+    ),
     "ctrl_c_five_times": Fault("Ctrl-C, five times", ("All stand.",), 130),
     "terminal_halted_and_ctrl_c": Fault("Ctrl-S for 2.5 s, then Ctrl-C", ("All stand.",), 130),
     "terminal_halted_and_killed": Fault(

@@ -219,6 +219,19 @@ class Field:
         operator.type(CTRL_C)
         return self.row(fault_s, operator.end())
 
+    def ctrl_c_and_one_is_gone(self) -> dict:
+        """What it waits for is said; who does not want to wait on presses the key again."""
+        operator = self.held(terminal=False)
+        self.robots[2].process.kill()
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        wait_until(lambda: "waiting up to" in operator.plain, 5)
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end(), [1]) | {"ended_s": time.monotonic() - fault_s}
+        self.robots[2] = self.robot(2, "2 after Ctrl-C")
+        time.sleep(1)
+        return row
+
     def ctrl_c_five_times(self) -> dict:
         operator = self.held()
         fault_s = time.monotonic()

@@ -39,6 +39,7 @@ LATE_S = 2.0  # the same where nobody goes on watching; as late a start robots s
 ARM_S = 5.0  # in which a robot that is there has answered, whatever is lost
 AHEAD_S = 600.0  # robots obey no start that is further ahead by their clocks
 TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
+STOP_S = 10.0  # a stop that is not confirmed is said for so long
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
@@ -249,7 +250,7 @@ def arm(fleet: Fleet, robots: set[int], timeout_s: float = ARM_S) -> list[Answer
 def stop(
     fleet: Fleet,
     robots: set[int],
-    timeout_s: float = 10.0,
+    timeout_s: float = STOP_S,
     *,
     hosts: "Hosts | None" = None,
     waiting: Callable[[set[int]], None] = lambda _: None,
@@ -450,6 +451,7 @@ def start(
     partial: bool,
     verb: int = VERBS.VERB_START,
     link_timeout_ms: int = LINK_TIMEOUT_MS,
+    stopping: Callable[[Fleet, set[int]], list[Answer]] | None = None,
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
@@ -471,8 +473,9 @@ def start(
         partial: start though some do not answer, refuse, or drop out; not if one is stopped.
         verb: start, or play script.
         link_timeout_ms: as of tell().
+        stopping: says stop to robots that are not to start; else stop() does.
     """
-    command = make_command(verb, behavior)
+    command, stopping = make_command(verb, behavior), stopping or stop
     command.start_utime_us = command.utime_us + int(ahead_s * 1e6)
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
@@ -508,11 +511,11 @@ def start(
             words = {i: _not_driving(fleet.robots[i], why) for i in waiting}
             out = dropouts().beside(words)
         elif waiting and not link_timeout_ms:
-            late = stop(fleet, waiting)
+            late = stopping(fleet, waiting)
     called_off = bool(out) or not agreed
     fleet.held -= out.taken | others.taken
     if called_off:
-        stopped = stop(fleet, robots - out.taken) if robots - out.taken else []
+        stopped = stopping(fleet, robots - out.taken) if robots - out.taken else []
         out = out.beside(stopped_by_another(fleet, robots - out.taken, command.seq))
     sessions = {
         i: robot.signed_acks[command.seq].session
