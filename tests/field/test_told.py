@@ -93,7 +93,9 @@ FAULTS = {
         NEVER,
         is_brief=True,
     ),
-    "signalled_in_real_time": Fault("SIGRTMIN", ("Started at", "All stand."), 0),
+    "signalled_in_real_time": Fault(
+        "SIGRTMIN", ("Started at", "All stand. Stopped by SIGRTMIN"), 0
+    ),
     "signalled_as_by_a_fault": Fault("`kill -SEGV`", ("Started at", "All stand."), 0),
     "run_dir_lost": Fault(
         "the robots' run_dir is gone while they are held; then Ctrl-C",

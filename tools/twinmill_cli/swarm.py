@@ -31,7 +31,7 @@ from twinmill_cli.swarm_door import (
     refuse_stopped,
     refuse_unheard,
 )
-from twinmill_cli.swarm_signals import commanding, ended_by_signals, what_ends
+from twinmill_cli.swarm_signals import commanding, ended_by_signals, told_of_signals, what_ends
 from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
 
 if working():  # not for --help
@@ -216,7 +216,8 @@ def _drive(
         stopped = of_stop(given, halt.how)
         ended = of_end(begun, states, stopped, was_confirmed=known)
         ended = (
-            ended.more(of_remarks(given) if stopped.ok else "")
+            ended.more(told_of_signals(signals))
+            .more(of_remarks(given) if stopped.ok else "")
             .more(heard)
             .beside(driving(fleet, asked))
             .more("" if odd else clocks(fleet, asked))

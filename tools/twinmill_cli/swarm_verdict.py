@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -26,10 +25,9 @@ from twinmill.robots.tell import (
     Start,
 )
 from twinmill_cli import exit_now
-from twinmill_cli.swarm_signals import BY_KEY
+from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
 BY_HAND = "SWITCH OFF BY HAND what still drives."
-KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 
 
 @dataclass(frozen=True)
