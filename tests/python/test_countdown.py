@@ -302,3 +302,40 @@ def test_a_start_that_others_drive_by_is_not_said_to_be_begun(monkeypatch):
     assert begun.called_off and begun.dropouts.taken == {1, 2} and not said
     words = "Called off: R01, R02 were taken over by another operator (start at 12:00:01)."
     assert of_start(begun).sentence.startswith(words) and not fleet.held
+
+
+class Late(SetBack):
+    """R02's signed answers are slower than what it says unsigned, and than a start can wait."""
+
+    def __init__(self, *robots: int):
+        super().__init__(*robots)
+        self.late_s, self.due = 0.5, []
+
+    def _say(self, robot_id, kind, message, **fields):
+        super()._say(robot_id, kind, message, **fields)
+        if (robot_id, kind) == (2, "SIGNED_ACK"):
+            self.due.append((time.monotonic() + self.late_s, self.waiting.pop()))
+            unsigned = turbopi.ack_t()
+            unsigned.seq, unsigned.accepted = message.seq, True
+            self.waiting.append(("R02_ACK", unsigned.encode()))
+
+    def handle_timeout(self, timeout_ms):
+        while self.due and self.due[0][0] < time.monotonic():
+            self.waiting.append(self.due.pop(0)[1])
+        return super().handle_timeout(timeout_ms)
+
+
+@pytest.mark.parametrize(
+    ("is_lost", "words"),
+    [(False, "(answered too late, after 0.5"), (True, "(answered, and its signed answer has not")],
+)
+def test_a_robot_that_signs_late_has_no_other_key(is_lost, words):
+    """It was told to be flashed, in the sentence by which it had signed that it stands."""
+    fleet = Fleet("", connect=lambda _: Late(1, 2), key=KEY)
+    fleet.listen(0.2)
+    fleet.bus.late_s = 60.0 if is_lost else 0.5
+    stopping = tell.stop if not is_lost else lambda *_: []
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=0.6, partial=False, stopping=stopping)
+    sentence = of_start(begun).sentence
+    assert begun.called_off and f"R02 did not acknowledge in time {words}" in sentence
+    assert "key" not in sentence and ("--in-s 2 leaves time for it" in sentence) != is_lost

@@ -141,6 +141,7 @@ class Robot:
         acks, signed_acks: by number of the command; the latter with the robot's signature.
         link, link_s: its newest link_t with its signature, and when that was heard.
         answered: its quickest answer.
+        took_s: from a command's first word to its first signed answer here, by its number.
         hold_s: when an operator was heard last, or said from here, that somebody is there.
         other_hold_s: when another operator was.
         commands: that operators were heard to sign for it, by their counters.
@@ -158,6 +159,7 @@ class Robot:
     link: Any = None
     link_s: float = 0.0
     answered: Answered | None = None
+    took_s: dict[int, float] = field(default_factory=dict)
     hold_s: float = 0.0
     other_hold_s: float = -math.inf
     commands: dict[int, Heard] = field(default_factory=dict)
@@ -519,7 +521,9 @@ class Fleet:
         """Keeps the quickest."""
         if ack.seq not in self.said:
             return
-        found = Answered(ack.session, ack.session_us / 1e6 - self.said[ack.seq], time.monotonic())
+        said_s, now_s = self.said[ack.seq], time.monotonic()
+        robot.took_s.setdefault(ack.seq, now_s - said_s)
+        found = Answered(ack.session, ack.session_us / 1e6 - said_s, now_s)
         known = robot.answered
         if not known or known.session != ack.session or found.most_s <= known.most_now_s:
             robot.answered = found

@@ -5,6 +5,7 @@ A stop is said unsigned, so that anybody can, and holds until robots are armed. 
 operator's signature for each robot and its session. Who is believed what: firmware/RADIO.md.
 """
 
+import math
 import secrets
 import socket
 import threading
@@ -48,6 +49,8 @@ STANDING = ("stopped", "fault")
 # Of looking a name up: nobody knows whether there is a machine of it.
 UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
 NEVER_HEARD = "was never heard"
+# It signs, and by its key: the packet with the signature was lost, or is late.
+UNSEALED = "answered, and its signed answer has not come"
 NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
     "signs nothing with this operator's key: `twinmill robot flash` brings robots theirs; has it "
@@ -525,13 +528,34 @@ def start(
     if not called_off:
         fleet.listen(OTHERS_S, lambda: _all_say_how_long(fleet, command, robots))
     final = answers(fleet, command, robots)
-    if called_off:  # an answer that came after that does not tell why it was
+    if called_off:
         final = [
-            replace(now, accepted=a.accepted, signed=a.signed, reason=a.reason)
+            _at_call_off(a, now, fleet.robots.get(a.robot_id), command.seq)
             for now, a in zip(final, given, strict=True)
         ]
     begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out or others)
     return Start(*begun, link_timeout_ms, fleet.stop_heard(robots))
+
+
+def _at_call_off(then: Answer, now: Answer, robot: Robot | None, seq: int) -> Answer:
+    """What a robot had answered when a start was called off, with why by all that came since."""
+    reason = then.reason if then.signed else now.reason
+    if now.signed and not then.signed and robot and seq in robot.took_s:
+        reason = late_words(robot.took_s[seq])
+    return replace(now, accepted=then.accepted, signed=then.signed, reason=reason)
+
+
+def late_words(took_s: float) -> str:
+    """Words on an answer to a start that came so long after that was said, and what to do."""
+    return (
+        f"answered too late, after {took_s:.2f} s: the network is late; {in_s_option(took_s)} "
+        "leaves time for it"
+    )
+
+
+def in_s_option(took_s: float) -> str:
+    """How far ahead a start must be where answers take so long; with room for slower ones."""
+    return f"--in-s {math.ceil(2 * (CALL_OFF_S + took_s))}"
 
 
 def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
@@ -571,7 +595,7 @@ def _answer(robot: Robot, command, unsigned: str) -> Answer:
     ack = signed or robot.acks.get(command.seq)
     reason = ack.reason if ack else _why_silent(robot, unsigned)
     if ack and not signed:
-        reason = reason or unsigned
+        reason = reason or (UNSEALED if robot.link or robot.signed_acks else unsigned)
     return Answer(
         robot_id=robot.robot_id,
         accepted=bool(ack.accepted) if ack else None,
@@ -612,7 +636,7 @@ def _stands(robot: Robot, command) -> bool:
 def _why_silent(robot: Robot, unsigned: str) -> str:
     if not robot.heard_s:
         return NEVER_HEARD
-    return "no answer" if robot.link else unsigned
+    return "no answer" if robot.link or robot.signed_acks else unsigned
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:
