@@ -202,6 +202,7 @@ SENTENCES = [
     ),
     (of_stop([STANDS, LOST]), "All stand. R08 stood before: it had lost its operator.", 0),
     (of_end(WELL, {"R01": TAKEN, "R02": DRIVES}, WELL), "All stand; R01 was taken over by", 1),
+    (of_end(WELL, {"R01": TAKEN, "R02": TAKEN}, WELL), "All stand; R01, R02 were taken over by", 1),
     (of_end(WELL, {"R01": TAKEN_AND_LOST}, None), "All stand: R01: taken over by another", 1),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),

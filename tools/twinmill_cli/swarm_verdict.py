@@ -27,6 +27,7 @@ from twinmill.robots.tell import (
 from twinmill_cli import exit_now
 from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
+SEVERAL = {"was": "were", "is": "are", "has": "have"}  # verbs of one, as of several
 BY_HAND = "SWITCH OFF BY HAND what still drives."
 
 
@@ -409,7 +410,8 @@ def _going_on(begun: Start, ends: str) -> str:
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
     taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
     waiting = [a for a in taken if a.link_timeout_s is None]
-    return f"{words}{f', which {_names(waiting)} has not signed yet' if waiting else ''}."
+    verb = "has" if len(waiting) == 1 else "have"
+    return f"{words}{f', which {_names(waiting)} {verb} not signed yet' if waiting else ''}."
 
 
 def _odd_links(begun: Start) -> list[str]:
@@ -504,8 +506,14 @@ def of_end(
 def _told_early(names: list[str], state: State, is_stopped: bool) -> str:
     """Sentence on robots that had ended before they were stopped."""
     if not state.stands:
-        return f"{', '.join(names)} {state.before}"
+        return f"{', '.join(names)} {_of_several(state.before) if names[1:] else state.before}"
     return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {state.words}"
+
+
+def _of_several(words: str) -> str:
+    """Words to go on behind one robot's name, behind several."""
+    verb, _, rest = words.partition(" ")
+    return f"{SEVERAL.get(verb, verb)} {rest}"
 
 
 def _disobeyed(given: list[Answer]) -> list[Answer]:
