@@ -49,6 +49,15 @@ FAULTS = {
         130,
         is_brief=True,
     ),
+    "ctrl_c_and_one_is_gone": Fault(
+        "R02's program is killed, and Ctrl-C, and again while it waits for R02 (R01)",
+        (
+            "stop is said all the time; waiting up to 10 s for R02 to sign",
+            "NOT ALL STAND: R02: no stop was confirmed.",
+            "Ended by a signal after",
+        ),
+        1,
+    ),
     "ctrl_c_five_times": Fault("Ctrl-C, five times", ("All stand.",), 130),
     "terminal_halted_and_ctrl_c": Fault("Ctrl-S for 2.5 s, then Ctrl-C", ("All stand.",), 130),
     "terminal_halted_and_killed": Fault(
@@ -84,7 +93,9 @@ FAULTS = {
         NEVER,
         is_brief=True,
     ),
-    "signalled_in_real_time": Fault("SIGRTMIN", ("Started at", "All stand."), 0),
+    "signalled_in_real_time": Fault(
+        "SIGRTMIN", ("Started at", "All stand. Stopped by SIGRTMIN"), 0
+    ),
     "signalled_as_by_a_fault": Fault("`kill -SEGV`", ("Started at", "All stand."), 0),
     "run_dir_lost": Fault(
         "the robots' run_dir is gone while they are held; then Ctrl-C",
@@ -182,6 +193,23 @@ FAULTS = {
         ),
         1,
         is_brief=True,
+    ),
+    "another_starts_while_it_sleeps": Fault(
+        "the same while the first's laptop sleeps; then Ctrl-C of the second",
+        (
+            "Called off: R01, R02 were taken over by another operator",
+            "R01, R02: left to that operator.",
+        ),
+        1,
+        is_brief=True,
+    ),
+    "another_starts_while_it_sleeps_through_its_instant": Fault(
+        "the same, and the first wakes after its instant",
+        (
+            "Called off: R01, R02 were taken over by another operator",
+            "R01, R02: left to that operator.",
+        ),
+        1,
     ),
     "ctrl_c_in_the_countdown": Fault(
         "Ctrl-C in the countdown",
@@ -500,6 +528,13 @@ def test_of_two_countdowns_the_last_is_the_one_that_starts(session):
     code, said = row["second"]
     assert row["stood"] and row["drove"] and code == 130 and "All stand." in said
     assert said.index("held by another operator who may be counting") < said.index("Started at")
+
+
+@pytest.mark.parametrize("name", [name for name in RUN if "while_it_sleeps" in name])
+def test_who_wakes_leaves_robots_to_who_started_them_meanwhile(session, name):
+    """The first stopped the second's robots: they had been without its word for long."""
+    code, said = session[name]["second"]
+    assert session[name]["drove"] and code == 130 and "All stand." in said
 
 
 @pytest.mark.skipif(not ALL, reason="part of make check-long")

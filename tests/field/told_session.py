@@ -219,6 +219,19 @@ class Field:
         operator.type(CTRL_C)
         return self.row(fault_s, operator.end())
 
+    def ctrl_c_and_one_is_gone(self) -> dict:
+        """What it waits for is said; who does not want to wait on presses the key again."""
+        operator = self.held(terminal=False)
+        self.robots[2].process.kill()
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        wait_until(lambda: "waiting up to" in operator.plain, 5)
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end(), [1]) | {"ended_s": time.monotonic() - fault_s}
+        self.robots[2] = self.robot(2, "2 after Ctrl-C")
+        time.sleep(1)
+        return row
+
     def ctrl_c_five_times(self) -> dict:
         operator = self.held()
         fault_s = time.monotonic()
@@ -772,6 +785,32 @@ class Field:
         second_code = second.end()
         self.operator = first
         row = self.row(fault_s, code) | {"stood": stood, "drove": drove}
+        return row | {"second": [second_code, second.plain]}
+
+    def another_starts_while_it_sleeps(self) -> dict:
+        """Robots have lost the first by then, which wakes before its instant."""
+        return self._slept_through_another("--in-s", "14", before_s=LINK_TIMEOUT_S + 0.5)
+
+    def another_starts_while_it_sleeps_through_its_instant(self) -> dict:
+        """Robots drive when the first wakes, and not by its start."""
+        return self._slept_through_another("--in-s", "5")
+
+    def _slept_through_another(self, *words: str, before_s: float = 0.0) -> dict:
+        first = self._counting(*words)
+        first.process.send_signal(signal.SIGSTOP)
+        time.sleep(before_s)
+        second = Operator(self.key_file, *START, terminal=False)
+        wait_until(lambda: second.has_ended or HELD in second.plain, 20)
+        time.sleep(LINK_TIMEOUT_S + 1)
+        first.process.send_signal(signal.SIGCONT)
+        code = first.end()
+        time.sleep(STAYS_S)
+        drove = all(robot.duties() != ZERO for robot in self.robots.values())
+        fault_s = time.monotonic()
+        second.process.send_signal(signal.SIGINT)
+        second_code = second.end()
+        self.operator = first
+        row = self.row(fault_s, code) | {"drove": drove}
         return row | {"second": [second_code, second.plain]}
 
     def ctrl_c_in_the_countdown(self) -> dict:

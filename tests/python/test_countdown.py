@@ -229,3 +229,113 @@ def test_a_start_whose_instant_is_past_says_whether_others_had_begun(drive, word
     assert verdict.sentence.startswith(f"Called off: {words}. All were told to stop: ")
     assert verdict.sentence.endswith(remedy) and verdict.code == 1
     assert begun.begun_utime_us is None and not fleet.held
+
+
+def heard_start(**fields):
+    return Heard(6, VERBS.VERB_START, SESSION, OWN + 9, "start milling at 12:00:01", **fields)
+
+
+@pytest.mark.parametrize("answers", [True, False])
+def test_a_robot_of_another_operator_is_his_though_it_never_answered_here(accepted, answers):
+    fleet, robot = accepted
+    robot.link, robot.commands = link(counter=OWN + 9), {OWN + 9: heard_start()}
+    if not answers:
+        robot.signed_acks = {}
+    assert dropouts(fleet).taken == {1}
+
+
+@pytest.mark.parametrize(("stop_us", "is_taken"), [(1_500_000, True), (2_500_000, False)])
+def test_the_last_of_a_stop_and_a_start_of_another_counts(accepted, stop_us, is_taken):
+    """He stopped it, armed it, and started it: what he said first did not make it nobody's."""
+    fleet, robot = accepted
+    robot.link = link(counter=OWN + 9, session_us=3_000_000, armed=is_taken)
+    robot.commands = {OWN + 9: heard_start()}
+    robot.signed_acks[6] = signed(VERBS.VERB_START, 2_000_000)
+    robot.signed_acks[77] = signed(VERBS.VERB_STOP, stop_us)
+    out = dropouts(fleet)
+    assert bool(out.taken) == is_taken and (out.words[1] == STOPPED) != is_taken
+
+
+def test_a_robot_that_another_holds_is_his_though_his_start_was_not_heard(accepted):
+    """What was said to a program that sleeps for long is dropped where its buffer is full."""
+    fleet, robot = accepted
+    robot.link = link(counter=OWN + 9)
+    assert not dropouts(fleet).taken
+    robot.other_hold_s = time.monotonic()
+    assert dropouts(fleet).taken == {1}
+
+
+def test_nothing_is_judged_before_all_is_heard_that_was_said_in_a_sleep(monkeypatch):
+    """Half of it told of robots that had lost this operator, and not of who has them since."""
+    fleet = Fleet("", connect=lambda _: Bus(), key=KEY)
+    waiting, judged = list(range(500)), []
+
+    def handle_timeout(timeout_ms):
+        time.sleep(1e-4 if waiting else timeout_ms / 1e3)  # a signature is checked
+        return bool(waiting and waiting.pop())
+
+    monkeypatch.setattr(fleet.bus, "handle_timeout", handle_timeout, raising=False)
+    passed_s = time.clock_gettime(time.CLOCK_BOOTTIME)
+    fleet._looked_s = passed_s - GONE_S - 1
+    fleet.listen(-1.0, lambda: judged.append(len(waiting)))
+    fleet.listen(0.01, lambda: judged.append(len(waiting)))
+    assert judged and not any(judged)
+
+
+def test_a_start_that_others_drive_by_is_not_said_to_be_begun(monkeypatch):
+    """They drove, and by the start of another operator who came while this one slept."""
+    fleet = Fleet("", connect=lambda _: SetBack(1, 2, drive=(1, 2)), key=KEY)
+    fleet.listen(0.2)
+    wait, said = tell._not_begun, []
+
+    def take_over(*given):
+        for robot in fleet.robots.values():
+            robot.commands[fleet.counter + 1] = Heard(
+                6, VERBS.VERB_START, SESSION, fleet.counter + 1, "start at 12:00:01"
+            )
+            robot.signed_acks[6] = signed(VERBS.VERB_START, robot.link.session_us)
+        return wait(*given)
+
+    monkeypatch.setattr(tell, "_not_begun", take_over)
+    monkeypatch.setattr(tell, "stop", lambda *given: said.append(given))
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=0.6, partial=False)
+    assert begun.called_off and begun.dropouts.taken == {1, 2} and not said
+    words = "Called off: R01, R02 were taken over by another operator (start at 12:00:01)."
+    assert of_start(begun).sentence.startswith(words) and not fleet.held
+
+
+class Late(SetBack):
+    """R02's signed answers are slower than what it says unsigned, and than a start can wait."""
+
+    def __init__(self, *robots: int):
+        super().__init__(*robots)
+        self.late_s, self.due = 0.5, []
+
+    def _say(self, robot_id, kind, message, **fields):
+        super()._say(robot_id, kind, message, **fields)
+        if (robot_id, kind) == (2, "SIGNED_ACK"):
+            self.due.append((time.monotonic() + self.late_s, self.waiting.pop()))
+            unsigned = turbopi.ack_t()
+            unsigned.seq, unsigned.accepted = message.seq, True
+            self.waiting.append(("R02_ACK", unsigned.encode()))
+
+    def handle_timeout(self, timeout_ms):
+        while self.due and self.due[0][0] < time.monotonic():
+            self.waiting.append(self.due.pop(0)[1])
+        return super().handle_timeout(timeout_ms)
+
+
+@pytest.mark.parametrize(
+    ("is_lost", "words"),
+    [(False, "(answered too late, after 0.5"), (True, "(answered, and its signed answer has not")],
+)
+def test_a_robot_that_signs_late_has_no_other_key(is_lost, words):
+    """It was told to be flashed, in the sentence by which it had signed that it stands."""
+    fleet = Fleet("", connect=lambda _: Late(1, 2), key=KEY)
+    fleet.listen(0.2)
+    fleet.bus.late_s = 60.0 if is_lost else 0.5
+    stopping = tell.stop if not is_lost else lambda *_: []
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=0.6, partial=False, stopping=stopping)
+    sentence = of_start(begun).sentence
+    assert begun.called_off and f"R02 did not acknowledge in time {words}" in sentence
+    assert "key" not in sentence and ("--in-s 2 leaves time for it" in sentence) != is_lost

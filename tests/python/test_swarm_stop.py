@@ -454,6 +454,42 @@ class LostBus:
         raise OSError("the bus cannot be reached")
 
 
+class Listener:
+    """One who is told sentences, and then gives a signal or does not."""
+
+    def __init__(self, signals, *numbers):
+        self.said, self.numbers, self._signals = [], numbers, signals
+
+    def say(self, sentence):
+        self.said.append((time.monotonic(), sentence))
+        self._signals += self.numbers
+
+
+@pytest.mark.parametrize(
+    ("numbers", "least_s", "most_s"), [((signal.SIGINT,), 0.3, 1.5), ((signal.SIGHUP,), 2.0, 4.0)]
+)
+def test_the_end_of_a_start_says_at_once_what_it_waits_for(monkeypatch, numbers, least_s, most_s):
+    """Ten silent seconds after Ctrl-C; another one there ends it, as it ends `swarm stop`."""
+    monkeypatch.setattr(swarm_stop.tell, "STOP_S", 2.0)
+    said_s, signals = [], [signal.SIGINT] * 5
+    bus, listener = LostBus(fails=1000), Listener(signals, *numbers)
+    publish, fleet = bus.publish, Fleet("", connect=lambda _: bus)
+
+    def timed(*words):
+        said_s.append(time.monotonic())
+        publish(*words)
+
+    bus.publish = timed
+    halt, begin_s = swarm_stop.LastStop(listener, signals), time.monotonic()
+    verdict = of_stop(halt(fleet, {2}), halt.how)
+    assert least_s < time.monotonic() - begin_s < most_s
+    ((told_s, words),) = listener.said
+    assert said_s[0] < told_s < begin_s + 1.5
+    assert words.startswith("nothing leaves this computer (eth0: Network is unreachable)")
+    assert verdict.code == 1 and verdict.sentence.startswith("NOT ALL STAND: R02")
+    assert ("Ended by a signal after" in verdict.sentence) == (numbers == (signal.SIGINT,))
+
+
 TELLS_IN_BACKGROUND = """
 set -m; stty tostop
 {python} -c 'from twinmill_cli.swarm_signals import counting_signals as counting

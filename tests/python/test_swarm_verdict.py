@@ -24,6 +24,7 @@ from twinmill.robots.hold import (
 )
 from twinmill.robots.tell import NEVER_HEARD, NO_SIGNATURE, Answer, Start
 from twinmill_cli.swarm_end import finish
+from twinmill_cli.swarm_signals import ENDING, KEYS, told_of_signals
 from twinmill_cli.swarm_verdict import (
     Saying,
     Verdict,
@@ -201,6 +202,7 @@ SENTENCES = [
     ),
     (of_stop([STANDS, LOST]), "All stand. R08 stood before: it had lost its operator.", 0),
     (of_end(WELL, {"R01": TAKEN, "R02": DRIVES}, WELL), "All stand; R01 was taken over by", 1),
+    (of_end(WELL, {"R01": TAKEN, "R02": TAKEN}, WELL), "All stand; R01, R02 were taken over by", 1),
     (of_end(WELL, {"R01": TAKEN_AND_LOST}, None), "All stand: R01: taken over by another", 1),
     (of_end(WELL, {"R01": DRIVES}, WELL), "All stand.", 0),
     (of_end(WELL, {"R01": DRIVES}, ILL), "NOT ALL STAND", 1),
@@ -437,3 +439,23 @@ def test_a_stop_says_that_a_robot_has_another_key():
 def test_a_key_ends_a_shells_loop_and_hides_nothing_that_is_wrong(ended, signals, code):
     """130 means that all stand: who drives on without an operator was not stopped by a late key."""
     assert ended.more("R01's clock is odd.").beside(["R05"]).code_after(signals) == code
+
+
+@pytest.mark.parametrize(
+    ("signals", "says"),
+    [
+        ([signal.SIGXCPU], "Stopped by SIGXCPU: CPU time limit exceeded."),
+        ([signal.SIGHUP, signal.SIGINT], "Stopped by SIGHUP: "),
+        ([signal.SIGRTMIN + 2], "Stopped by SIGRTMIN+2: "),
+        ([signal.SIGINT, signal.SIGTERM], ""),
+        ([], ""),
+    ],
+)
+def test_what_stopped_a_start_is_named_unless_a_key_did(signals, says):
+    """`ulimit -t` stopped robots after a minute, and "All stand." was all that was said."""
+    told = told_of_signals(signals)
+    assert told.startswith(says) and bool(told) == bool(says)
+
+
+def test_each_signal_that_ends_a_start_has_a_name():
+    assert all(told_of_signals([n]).count("SIG") == 1 for n in set(ENDING) - KEYS)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Annotated
 
@@ -31,8 +31,8 @@ from twinmill_cli.swarm_door import (
     refuse_stopped,
     refuse_unheard,
 )
-from twinmill_cli.swarm_signals import commanding, ended_by_signals, what_ends
-from twinmill_cli.swarm_stop import StopCommand, stop
+from twinmill_cli.swarm_signals import commanding, ended_by_signals, told_of_signals, what_ends
+from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
 
 if working():  # not for --help
     from rich.live import Live
@@ -45,7 +45,6 @@ if working():  # not for --help
     from twinmill_cli.swarm_end import clocks, driving, finish
     from twinmill_cli.swarm_screen import status_table
     from twinmill_cli.swarm_verdict import (
-        Saying,
         Verdict,
         of_arm,
         of_busy,
@@ -153,6 +152,7 @@ def _start(
                     as_json=as_json,
                     heard=heard,
                     ends=ends,
+                    signals=asked_to_end,
                     **options,
                 )
                 code = verdict.code_after(asked_to_end)
@@ -174,6 +174,7 @@ def _drive(
     as_json: bool,
     heard: str,
     ends: Callable[[], str],
+    signals: Sequence[int],
     **options,
 ) -> Verdict:
     """Starts robots and holds them. Whatever ends that stops them before a word is said of it.
@@ -187,11 +188,12 @@ def _drive(
         as_json: how it is printed.
         heard: words on who is there, where nobody said who is meant.
         ends: gives words on what stops robots that are held.
+        signals: that came, and come.
         options: of tell.start().
     """
-    begun, held, odd = None, None, ""
+    begun, held, odd, halt = None, None, "", LastStop(voice, signals)
     try:
-        started = tell.start(fleet, asked, behavior, **options)
+        started = tell.start(fleet, asked, behavior, stopping=halt, **options)
         odd = clocks(fleet, asked)
         begun, held = of_start(started, ends()).more(heard).more(odd), Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
@@ -209,12 +211,13 @@ def _drive(
     except BaseException as error:
         if held:
             held.settle()
-        given = tell.stop(fleet, asked)
+        given = halt(fleet, asked)
         states, known = held.ends() if held else {}, tell.have_confirmed(fleet, asked)
-        stopped = of_stop(given, Saying(reach=fleet.reach))
+        stopped = of_stop(given, halt.how)
         ended = of_end(begun, states, stopped, was_confirmed=known)
         ended = (
-            ended.more(of_remarks(given) if stopped.ok else "")
+            ended.more(told_of_signals(signals))
+            .more(of_remarks(given) if stopped.ok else "")
             .more(heard)
             .beside(driving(fleet, asked))
             .more("" if odd else clocks(fleet, asked))

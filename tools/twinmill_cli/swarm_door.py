@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import errno
-import math
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -219,11 +218,11 @@ def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: 
     if any(abs(s) > tell.BEGUN_S for s in clocks_s.values()) and not may_differ:
         raise ValueError(f"nothing was started: {told}; --partial starts those that do not refuse.")
     late = of_late(known)
-    needs_s = tell.CALL_OFF_S + max((r.round_trip_s for r in known if r.has_answered), default=0.0)
-    if late and needs_s > ahead_s and not may_differ:
+    takes_s = max((r.round_trip_s for r in known if r.has_answered), default=0.0)
+    if late and tell.CALL_OFF_S + takes_s > ahead_s and not may_differ:
         raise ValueError(
             f"nothing was started: {late} So long an answer to a start takes: "
-            f"--in-s {math.ceil(2 * needs_s)} leaves time for it."
+            f"{tell.in_s_option(takes_s)} leaves time for it."
         )
     if any(r.late_s > tell.BEGUN_S for r in known) and not may_differ:
         raise ValueError(

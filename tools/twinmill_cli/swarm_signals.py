@@ -46,6 +46,7 @@ BECAME = {
 
 
 BY_KEY = "Ctrl-C stops them"
+KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
 
 
@@ -85,6 +86,21 @@ def what_ends(lcm_url: str, channel_prefix: str | None) -> str:
     bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
     stop = shlex.join(["twinmill", "swarm", "stop", *bus])
     return f"No Ctrl-C reaches this command: `{stop}`, or here `kill {os.getpid()}`, stops them"
+
+
+def told_of_signals(signals: Sequence[int]) -> str:
+    """Sentence on the signal that ended a command first; empty where a key did, as who pressed it
+    knows, or none."""
+    if not signals or signals[0] in KEYS:
+        return ""
+    return f"Stopped by {_name(signals[0])}: {signal.strsignal(signals[0])}."
+
+
+def _name(number: int) -> str:
+    try:
+        return signal.Signals(number).name
+    except ValueError:  # of those in real time the first and the last alone have names
+        return f"SIGRTMIN+{number - signal.SIGRTMIN}"
 
 
 @contextmanager

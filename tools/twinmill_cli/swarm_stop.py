@@ -253,3 +253,42 @@ def waiting_words(fleet: Fleet, left: set[int], hosts: tell.Hosts, timeout_s: fl
             f"{timeout_s:g} s."
         )
     return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
+
+
+class LastStop:
+    """The stop of a command that ends: as `swarm stop`, it says what it waits for, and can be ended.
+
+    Signals that come before that is said ask for the stop itself, be they many.
+
+    Args:
+        voice: what tells it.
+        signals: that came, and come.
+
+    Attributes:
+        how: the last was said.
+    """
+
+    def __init__(self, voice: Voice, signals: Sequence[int]):
+        self.how = Saying()
+        self._voice, self._signals = voice, signals
+
+    def __call__(self, fleet: Fleet, robots: set[int]) -> list[tell.Answer]:
+        """Says stop until all robots have signed that they stand. Returns what each answered."""
+        begin_s, came = time.monotonic(), None
+
+        def wait(left: set[int]) -> None:
+            nonlocal came
+            came = len(self._signals)
+            self._voice.say(waiting_words(fleet, left, tell.Hosts(()), tell.STOP_S))
+
+        def ends() -> bool:
+            return came is not None and _ends_a_stop(self._signals[came:])
+
+        given = tell.stop(fleet, robots, tell.STOP_S, waiting=wait, enough=ends)
+        passed_s = time.monotonic() - begin_s
+        self.how = Saying(
+            passed_s=passed_s,
+            is_cut_short=ends() and passed_s < tell.STOP_S,
+            reach=fleet.reach,
+        )
+        return given

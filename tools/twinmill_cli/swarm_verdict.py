@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -26,10 +25,10 @@ from twinmill.robots.tell import (
     Start,
 )
 from twinmill_cli import exit_now
-from twinmill_cli.swarm_signals import BY_KEY
+from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
+SEVERAL = {"was": "were", "is": "are", "has": "have"}  # verbs of one, as of several
 BY_HAND = "SWITCH OFF BY HAND what still drives."
-KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 
 
 @dataclass(frozen=True)
@@ -369,6 +368,7 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
         f"{_names(idle)} did not{_because(idle)}" if idle else "",
         f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
+        _why_dropped_out(begun),
         f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
         _dry_run(given),
         *_odd_links(begun),
@@ -410,7 +410,8 @@ def _going_on(begun: Start, ends: str) -> str:
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
     taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
     waiting = [a for a in taken if a.link_timeout_s is None]
-    return f"{words}{f', which {_names(waiting)} has not signed yet' if waiting else ''}."
+    verb = "has" if len(waiting) == 1 else "have"
+    return f"{words}{f', which {_names(waiting)} {verb} not signed yet' if waiting else ''}."
 
 
 def _odd_links(begun: Start) -> list[str]:
@@ -505,8 +506,14 @@ def of_end(
 def _told_early(names: list[str], state: State, is_stopped: bool) -> str:
     """Sentence on robots that had ended before they were stopped."""
     if not state.stands:
-        return f"{', '.join(names)} {state.before}"
+        return f"{', '.join(names)} {_of_several(state.before) if names[1:] else state.before}"
     return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {state.words}"
+
+
+def _of_several(words: str) -> str:
+    """Words to go on behind one robot's name, behind several."""
+    verb, _, rest = words.partition(" ")
+    return f"{SEVERAL.get(verb, verb)} {rest}"
 
 
 def _disobeyed(given: list[Answer]) -> list[Answer]:
@@ -518,14 +525,18 @@ def _names(given: list[Answer]) -> str:
 
 
 def _why_called_off(begun: Start) -> str:
+    return _why_dropped_out(begun) or _why(begun.answers)
+
+
+def _why_dropped_out(begun: Start) -> str:
+    """Words on robots that another operator or a fault kept from it; empty where none was."""
     by: dict[str, list[str]] = {}
     for robot_id, words in sorted(begun.dropouts.words.items()):
         by.setdefault(words, []).append(f"R{robot_id:02d}")
-    told = [
+    return "; ".join(
         f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {words}"
         for words, names in by.items()
-    ]
-    return "; ".join(told) or _why(begun.answers)
+    )
 
 
 def _why(given: list[Answer]) -> str:

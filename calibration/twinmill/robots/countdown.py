@@ -8,22 +8,23 @@ from typing import Any
 
 import turbopi
 
-from twinmill.robots.fleet import GONE_S, SIGNED_S, TELEMETRY, Fleet, Robot
+from twinmill.robots.fleet import GONE_S, SIGNED_S, TELEMETRY, Fleet, Heard, Robot
 
 ARM = turbopi.signed_command_t.VERB_ARM
 STOPPED = "stopped by another command"
 NOT_BEGUN = "not driving when the others had begun"
 NONE_BEGUN = "not driving when the instant of the start was past"  # clocks may have been set
 UNHEARD = "told something by another operator who was not heard here"
+HELD_BY_ANOTHER = "taken over by another operator, whose command was not heard here"
 
 
 @dataclass(frozen=True)
 class Dropouts:
-    """Robots that will not begin a start: they accepted it, or another's stop came before that.
+    """Robots that will not begin a start: they accepted it, or another's word came before that.
 
     Attributes:
         words: why, by number, to go on behind "was" or "were".
-        taken: those of them that another operator is to start, by a command that came later.
+        taken: those of them that another operator starts, by a command that came later.
     """
 
     words: dict[int, str] = field(default_factory=dict)
@@ -31,6 +32,11 @@ class Dropouts:
 
     def __bool__(self) -> bool:
         return bool(self.words)
+
+    @property
+    def theirs(self) -> "Dropouts":
+        """Those that another operator starts."""
+        return Dropouts({i: self.words[i] for i in self.taken}, self.taken)
 
     def beside(self, more: dict[int, str]) -> "Dropouts":
         """These and others; what was known before stays."""
@@ -49,13 +55,13 @@ def find_dropouts(fleet: Fleet, robots: set[int], seq: int, *, only_stopped: boo
         only_stopped: who does not begin is left behind; but a stop is meant for all.
     """
     words, taken = {}, set()
-    for robot, ack in _answered(fleet, robots, seq):
-        why, is_taken = (
-            _why(fleet, robot, ack) if ack.accepted else (_why_not(fleet, robot, ack), False)
-        )
+    for robot in _linked(fleet, robots):
+        ack = robot.signed_acks.get(seq)
+        whose = _whose(fleet, robot, ack) if seq in fleet.said else ""
+        why = whose or (_why(fleet, robot, ack) if ack else "")
         if why and (why == STOPPED or not only_stopped):
             words[robot.robot_id] = why
-            taken |= {robot.robot_id} if is_taken else set()
+            taken |= {robot.robot_id} if whose else set()
     return Dropouts(words, frozenset(taken))
 
 
@@ -68,9 +74,41 @@ def stopped_by_another(fleet: Fleet, robots: set[int], seq: int) -> dict[int, st
     }
 
 
+def _linked(fleet: Fleet, robots: set[int]) -> list[Robot]:
+    return [r for i in sorted(robots) if (r := fleet.robots.get(i)) and r.link]
+
+
 def _answered(fleet: Fleet, robots: set[int], seq: int) -> list[tuple[Robot, Any]]:
-    known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
-    return [(r, ack) for r in known if (ack := r.signed_acks.get(seq))]
+    return [(r, ack) for r in _linked(fleet, robots) if (ack := r.signed_acks.get(seq))]
+
+
+def _whose(fleet: Fleet, robot: Robot, ack: Any) -> str:
+    """Words on another operator who starts it, by its own word; empty where none does.
+
+    Args:
+        fleet: where it is.
+        robot: it must have a link.
+        ack: its answer to the start from here; None: it has not answered.
+    """
+    link = robot.link
+    others = fleet.others(robot, ack.session if ack else link.session)
+    start = next((c for c in others if c.starts), None)
+    if start:
+        since = robot.signed_acks.get(start.seq)
+        after_us = since.session_us if since else math.inf
+        is_over = _obeyed_a_stop(fleet, robot, link.session, after_us=after_us)
+        return "" if is_over else f"taken over by another operator ({start.words})"
+    is_unheard = ack and ack.accepted and link.session == ack.session
+    if is_unheard and _obeys_unheard(fleet, robot, others) and robot.hears_other_operator:
+        return HELD_BY_ANOTHER
+    return ""
+
+
+def _obeys_unheard(fleet: Fleet, robot: Robot, others: list[Heard]) -> bool:
+    """A command is in force that is above all that were heard."""
+    return robot.link.armed and robot.link.counter > max(
+        [fleet.counter, *(c.counter for c in others)]
+    )
 
 
 def _why_not(fleet: Fleet, robot: Robot, ack: Any) -> str:
@@ -84,27 +122,25 @@ def _why_not(fleet: Fleet, robot: Robot, ack: Any) -> str:
     return STOPPED if _obeyed_a_stop(fleet, robot, ack.session, **between) else ""
 
 
-def _why(fleet: Fleet, robot: Robot, ack: Any) -> tuple[str, bool]:
-    """Reason, empty where it will start; and whether it is another operator's."""
+def _why(fleet: Fleet, robot: Robot, ack: Any) -> str:
+    """Reason of one that has answered and is nobody else's; empty where it will start."""
+    if not ack.accepted:
+        return _why_not(fleet, robot, ack)
     link, now_s = robot.link, time.monotonic()
     if _obeyed_a_stop(fleet, robot, ack.session, after_us=ack.session_us):
-        return STOPPED, False
+        return STOPPED
     if link.session != ack.session:
-        return "started anew, and has forgotten it", False
-    others = fleet.others(robot, ack.session)
-    start = next((c for c in others if c.starts), None)
-    if start:
-        return f"taken over by another operator ({start.words})", True
+        return "started anew, and has forgotten it"
     if link.session_us > ack.session_us:
         if link.status_flags & TELEMETRY.STATUS_LINK_LOST:
-            return "without word from this command for too long", False
+            return "without word from this command for too long"
         if not link.armed:
-            return STOPPED, False
-        if link.counter > max([fleet.counter, *(c.counter for c in others)]):
-            return UNHEARD, False
+            return STOPPED
+        if _obeys_unheard(fleet, robot, fleet.others(robot, ack.session)):
+            return UNHEARD
     if now_s - robot.heard_s > GONE_S or now_s - robot.link_s > SIGNED_S:
-        return "not heard any more", False
-    return "", False
+        return "not heard any more"
+    return ""
 
 
 def _obeyed_a_stop(

@@ -3,6 +3,7 @@
 
 import math
 import re
+import secrets
 import struct
 import time
 from collections import deque
@@ -61,6 +62,10 @@ FRESH_US = 3_000_000  # FW_COMMAND_FRESH_US: robots obey no older word
 # How long robots drive on without their operator unless he says otherwise; firmware's default, too.
 LINK_TIMEOUT_MS = 2000
 HOLD_S = 0.1  # so often robots that were started hear that the operator is there
+# What waits after this program was halted is taken in for so long at most: a flood has no end.
+CATCH_UP_S = 1.0
+# Then for so long: each robot signs, and whoever holds it says so, three times in it.
+LOOK_ROUND_S = 0.3
 
 
 class Step(NamedTuple):
@@ -136,7 +141,9 @@ class Robot:
         acks, signed_acks: by number of the command; the latter with the robot's signature.
         link, link_s: its newest link_t with its signature, and when that was heard.
         answered: its quickest answer.
+        took_s: from a command's first word to its first signed answer here, by its number.
         hold_s: when an operator was heard last, or said from here, that somebody is there.
+        other_hold_s: when another operator was.
         commands: that operators were heard to sign for it, by their counters.
     """
 
@@ -152,7 +159,9 @@ class Robot:
     link: Any = None
     link_s: float = 0.0
     answered: Answered | None = None
+    took_s: dict[int, float] = field(default_factory=dict)
     hold_s: float = 0.0
+    other_hold_s: float = -math.inf
     commands: dict[int, Heard] = field(default_factory=dict)
 
     @property
@@ -265,6 +274,11 @@ class Robot:
     def hears_operator(self) -> bool:
         """Somebody says that he is there for it, be it that it drives or that it is to."""
         return time.monotonic() - self.hold_s < GONE_S
+
+    @property
+    def hears_other_operator(self) -> bool:
+        """Somebody else says that he is there for it."""
+        return time.monotonic() - self.other_hold_s < GONE_S
 
     @property
     def is_double(self) -> bool:
@@ -390,6 +404,11 @@ def _time_of_day(utime_us: int) -> str:
     return f"{datetime.now():%H:%M:%S}"  # no calendar has that time
 
 
+def _time_passed_s() -> float:
+    """A clock that nobody sets, and that goes on while the computer sleeps."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
 class Fleet:
     """All robots of a bus."""
 
@@ -422,6 +441,8 @@ class Fleet:
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
         self._prefix, self.key, self._hold_s = channel_prefix, key, 0.0
+        self._hold_seq = secrets.randbelow(2**31)  # by it what is said from here is known
+        self._looked_s = _time_passed_s()
         self._empty_s = time.monotonic()  # nothing waited here then
         try:
             self.bus = connect(url)
@@ -500,7 +521,9 @@ class Fleet:
         """Keeps the quickest."""
         if ack.seq not in self.said:
             return
-        found = Answered(ack.session, ack.session_us / 1e6 - self.said[ack.seq], time.monotonic())
+        said_s, now_s = self.said[ack.seq], time.monotonic()
+        robot.took_s.setdefault(ack.seq, now_s - said_s)
+        found = Answered(ack.session, ack.session_us / 1e6 - said_s, now_s)
         known = robot.answered
         if not known or known.session != ack.session or found.most_s <= known.most_now_s:
             robot.answered = found
@@ -520,6 +543,8 @@ class Fleet:
             return
         if command.verb == sealed.VERB_HOLD:
             robot.hold_s = time.monotonic()
+            if command.seq != self._hold_seq:
+                robot.other_hold_s = robot.hold_s
         elif sealed.counter not in robot.commands:
             behavior = plain_line(command.behavior, NAME_MAX)
             words = f"{COMMANDS.get(command.verb, '?')} {behavior}"
@@ -569,16 +594,36 @@ class Fleet:
     def listen(self, duration_s: float, enough: Callable[[], bool] = lambda: False) -> None:
         """Takes in what robots say for some time, or until that is enough.
 
-        What has come already is taken in before anybody judges what has not.
+        What has come already is taken in before anybody judges what has not; all of it, and what is
+        said then, where this program was halted, or the computer slept.
         """
         end_s = time.monotonic() + duration_s
+        self._catch_up()
         while not enough() and (left_s := end_s - time.monotonic()) > 0:
             self._take_in(max(1, min(20, int(1000 * left_s))))
             backlog_end_s = time.monotonic() + BACKLOG_S
             while time.monotonic() < backlog_end_s and self._take_in(0):
                 pass
+            self._catch_up()
             self._hold()
             self.watch()
+
+    def _catch_up(self) -> None:
+        """Hears who has the robots by now, where time went on for long and nobody listened here.
+
+        Half of what was said meanwhile tells of robots that lost this operator, and not yet of the
+        one who has started them since.
+        """
+        before_s, self._looked_s = self._looked_s, _time_passed_s()
+        if self._looked_s - before_s < GONE_S:
+            return
+        end_s = time.monotonic() + CATCH_UP_S
+        while self._take_in(0) and time.monotonic() < end_s:
+            pass
+        end_s = time.monotonic() + LOOK_ROUND_S
+        while (left_s := end_s - time.monotonic()) > 0:
+            self._take_in(max(1, int(1000 * left_s)))
+        self._looked_s = _time_passed_s()
 
     def _take_in(self, timeout_ms: int) -> bool:
         """Waits for a message; False if none came."""
@@ -602,7 +647,7 @@ class Fleet:
             return
         self._hold_s = time.monotonic() + HOLD_S
         command = turbopi.swarm_command_t()
-        command.verb = turbopi.signed_command_t.VERB_HOLD
+        command.verb, command.seq = turbopi.signed_command_t.VERB_HOLD, self._hold_seq
         for robot_id in sorted(self.held):
             robot = self.robots.get(robot_id)
             if robot and robot.link:

@@ -5,6 +5,7 @@ A stop is said unsigned, so that anybody can, and holds until robots are armed. 
 operator's signature for each robot and its session. Who is believed what: firmware/RADIO.md.
 """
 
+import math
 import secrets
 import socket
 import threading
@@ -39,6 +40,7 @@ LATE_S = 2.0  # the same where nobody goes on watching; as late a start robots s
 ARM_S = 5.0  # in which a robot that is there has answered, whatever is lost
 AHEAD_S = 600.0  # robots obey no start that is further ahead by their clocks
 TELL_S = 0.3  # most robots have signed by then; a person waits in silence no longer
+STOP_S = 10.0  # a stop that is not confirmed is said for so long
 STOP_LEAST_S = 1.0  # a stop is said for so long at least, for robots not heard of yet
 VERBS = turbopi.swarm_command_t
 SIGNED_VERBS = turbopi.signed_command_t
@@ -47,6 +49,8 @@ STANDING = ("stopped", "fault")
 # Of looking a name up: nobody knows whether there is a machine of it.
 UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
 NEVER_HEARD = "was never heard"
+# It signs, and by its key: the packet with the signature was lost, or is late.
+UNSEALED = "answered, and its signed answer has not come"
 NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
     "signs nothing with this operator's key: `twinmill robot flash` brings robots theirs; has it "
@@ -249,7 +253,7 @@ def arm(fleet: Fleet, robots: set[int], timeout_s: float = ARM_S) -> list[Answer
 def stop(
     fleet: Fleet,
     robots: set[int],
-    timeout_s: float = 10.0,
+    timeout_s: float = STOP_S,
     *,
     hosts: "Hosts | None" = None,
     waiting: Callable[[set[int]], None] = lambda _: None,
@@ -418,7 +422,8 @@ class Start:
         stopped: what they answered to the stop where it was called off.
         late: what those answered to a stop that had accepted, were to drive on by themselves, and
             had not begun.
-        dropouts: robots that had accepted, and for which it was called off.
+        dropouts: robots for which it was called off; of a partial start that was not, those that
+            drive by another's.
         link_timeout_ms: that was sent with it; 0: they drive on without their operator.
         stop_heard: from where a stop came that was not said here, and when; empty: none was heard.
     """
@@ -449,6 +454,7 @@ def start(
     partial: bool,
     verb: int = VERBS.VERB_START,
     link_timeout_ms: int = LINK_TIMEOUT_MS,
+    stopping: Callable[[Fleet, set[int]], list[Answer]] | None = None,
 ) -> Start:
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
@@ -470,8 +476,9 @@ def start(
         partial: start though some do not answer, refuse, or drop out; not if one is stopped.
         verb: start, or play script.
         link_timeout_ms: as of tell().
+        stopping: says stop to robots that are not to start; else stop() does.
     """
-    command = make_command(verb, behavior)
+    command, stopping = make_command(verb, behavior), stopping or stop
     command.start_utime_us = command.utime_us + int(ahead_s * 1e6)
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
@@ -492,21 +499,26 @@ def start(
         fleet.listen(instant_s - time.monotonic(), dropouts)
     if dropouts().taken:  # that operator may be about to tell more of them
         fleet.listen(min(OTHERS_S, instant_s - CALL_OFF_S - time.monotonic()))
-    out, stopped, late = dropouts(), [], []
+    out, others, stopped, late = dropouts(), Dropouts(), [], []
     if agreed and not out:
         patience_s = LATE_S if partial and not link_timeout_ms else BEGUN_S
         waiting = _not_begun(fleet, given, patience_s)
-        waiting -= find_dropouts(fleet, robots, command.seq, only_stopped=False).taken
-        if waiting and not partial:
+        # Those that drive may do so by another's start: their own word tells.
+        others = find_dropouts(fleet, robots, command.seq, only_stopped=False).theirs
+        waiting -= others.taken
+        is_nobodys = others.taken >= {a.robot_id for a in given if a.accepted}
+        if others and (is_nobodys or not partial):
+            out = others
+        elif waiting and not partial:
             why = NOT_BEGUN if len(waiting) < len(given) else NONE_BEGUN
             words = {i: _not_driving(fleet.robots[i], why) for i in waiting}
             out = dropouts().beside(words)
         elif waiting and not link_timeout_ms:
-            late = stop(fleet, waiting)
+            late = stopping(fleet, waiting)
     called_off = bool(out) or not agreed
+    fleet.held -= out.taken | others.taken
     if called_off:
-        fleet.held -= out.taken
-        stopped = stop(fleet, robots - out.taken) if robots - out.taken else []
+        stopped = stopping(fleet, robots - out.taken) if robots - out.taken else []
         out = out.beside(stopped_by_another(fleet, robots - out.taken, command.seq))
     sessions = {
         i: robot.signed_acks[command.seq].session
@@ -516,13 +528,34 @@ def start(
     if not called_off:
         fleet.listen(OTHERS_S, lambda: _all_say_how_long(fleet, command, robots))
     final = answers(fleet, command, robots)
-    if called_off:  # an answer that came after that does not tell why it was
+    if called_off:
         final = [
-            replace(now, accepted=a.accepted, signed=a.signed, reason=a.reason)
+            _at_call_off(a, now, fleet.robots.get(a.robot_id), command.seq)
             for now, a in zip(final, given, strict=True)
         ]
-    begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out)
+    begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out or others)
     return Start(*begun, link_timeout_ms, fleet.stop_heard(robots))
+
+
+def _at_call_off(then: Answer, now: Answer, robot: Robot | None, seq: int) -> Answer:
+    """What a robot had answered when a start was called off, with why by all that came since."""
+    reason = then.reason if then.signed else now.reason
+    if now.signed and not then.signed and robot and seq in robot.took_s:
+        reason = late_words(robot.took_s[seq])
+    return replace(now, accepted=then.accepted, signed=then.signed, reason=reason)
+
+
+def late_words(took_s: float) -> str:
+    """Words on an answer to a start that came so long after that was said, and what to do."""
+    return (
+        f"answered too late, after {took_s:.2f} s: the network is late; {in_s_option(took_s)} "
+        "leaves time for it"
+    )
+
+
+def in_s_option(took_s: float) -> str:
+    """How far ahead a start must be where answers take so long; with room for slower ones."""
+    return f"--in-s {math.ceil(2 * (CALL_OFF_S + took_s))}"
 
 
 def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
@@ -562,7 +595,7 @@ def _answer(robot: Robot, command, unsigned: str) -> Answer:
     ack = signed or robot.acks.get(command.seq)
     reason = ack.reason if ack else _why_silent(robot, unsigned)
     if ack and not signed:
-        reason = reason or unsigned
+        reason = reason or (UNSEALED if robot.link or robot.signed_acks else unsigned)
     return Answer(
         robot_id=robot.robot_id,
         accepted=bool(ack.accepted) if ack else None,
@@ -603,7 +636,7 @@ def _stands(robot: Robot, command) -> bool:
 def _why_silent(robot: Robot, unsigned: str) -> str:
     if not robot.heard_s:
         return NEVER_HEARD
-    return "no answer" if robot.link else unsigned
+    return "no answer" if robot.link or robot.signed_acks else unsigned
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:
