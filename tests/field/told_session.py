@@ -220,7 +220,7 @@ class Field:
         return self.row(fault_s, operator.end())
 
     def ctrl_c_and_one_is_gone(self) -> dict:
-        """What it waits for is said; who does not want to wait on presses the key again."""
+        """The end says what it waits for; who does not want to wait on presses the key again."""
         operator = self.held(terminal=False)
         self.robots[2].process.kill()
         fault_s = time.monotonic()

@@ -257,7 +257,7 @@ def test_the_last_of_a_stop_and_a_start_of_another_counts(accepted, stop_us, is_
 
 
 def test_a_robot_that_another_holds_is_his_though_his_start_was_not_heard(accepted):
-    """What was said to a program that sleeps for long is dropped where its buffer is full."""
+    """Words to a program that sleeps for long are dropped where its buffer is full."""
     fleet, robot = accepted
     robot.link = link(counter=OWN + 9)
     assert not dropouts(fleet).taken

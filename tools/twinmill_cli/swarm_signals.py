@@ -89,8 +89,10 @@ def what_ends(lcm_url: str, channel_prefix: str | None) -> str:
 
 
 def told_of_signals(signals: Sequence[int]) -> str:
-    """Sentence on the signal that ended a command first; empty where a key did, as who pressed it
-    knows, or none."""
+    """Sentence on the signal that ended a command first.
+
+    Empty where none did, or a key, as who pressed it knows.
+    """
     if not signals or signals[0] in KEYS:
         return ""
     return f"Stopped by {_name(signals[0])}: {signal.strsignal(signals[0])}."

@@ -256,7 +256,7 @@ def waiting_words(fleet: Fleet, left: set[int], hosts: tell.Hosts, timeout_s: fl
 
 
 class LastStop:
-    """The stop of a command that ends: as `swarm stop`, it says what it waits for, and can be ended.
+    """The stop of a command that ends: like `swarm stop` it says what it awaits, and can be ended.
 
     Signals that come before that is said ask for the stop itself, be they many.
 

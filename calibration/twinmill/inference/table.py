@@ -169,7 +169,7 @@ def table_of(search: Search) -> Table:
 
 
 def _likeliest_of_each(entries: list[Entry]) -> dict[tuple, Entry]:
-    """Of each set of effects, kind of base and dependences the entry with the most evidence."""
+    """Entry with the most evidence for each set of effects, kind of base and dependences."""
     order = sorted(entries, key=lambda e: e.log_evidence)
     return {(e.effects, e.stale, frozenset(e.words)): e for e in order}
 

@@ -538,7 +538,7 @@ def start(
 
 
 def _at_call_off(then: Answer, now: Answer, robot: Robot | None, seq: int) -> Answer:
-    """What a robot had answered when a start was called off, with why by all that came since."""
+    """Answer of a robot when a start was called off, with the reason by all that came since."""
     reason = then.reason if then.signed else now.reason
     if now.signed and not then.signed and robot and seq in robot.took_s:
         reason = late_words(robot.took_s[seq])
