@@ -76,11 +76,9 @@ def leave(
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
         say(stopped, program)
+    code = _written(program, code)
     if (code == STOPPED and words[0] == "swarm") or sys.flags.inspect:
         # PYTHONINSPECT: an interpreter would take the end for an error, whatever the code is
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError):
-                stream.flush()
         exit_now(code)
     sys.exit(code)
 
@@ -90,10 +88,31 @@ def _end_untouched() -> None:
 
     What waits for its reader is written before, and whoever does not want to wait may say so.
     """
-    with suppress(OSError, ValueError):  # it fails again at the end, and is told there
+    with suppress(OSError, ValueError):  # it fails again in _written, and is told there
         sys.stdout.flush()
     with suppress(ValueError):  # not the main thread
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _written(program: str, code: int) -> int:
+    """Exit code after the last words are written; of success 1, if they could not be.
+
+    A stream that takes no more leads nowhere from then on: at the interpreter's end it would make
+    120 of any code, and Python's words of it.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except ValueError:  # closed
+            continue
+        except OSError as error:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, stream.fileno())
+            os.close(nowhere)
+            if code == 0:
+                code, sentence = _told(OSError(error.errno, error.strerror, "standard output"))
+                say(sentence, program)
+    return code
 
 
 def _take_standard_files() -> None:
