@@ -152,7 +152,28 @@ def main(folder: Path) -> dict:
         result["lost_telemetry"] = characterise(folder, "lost_telemetry", "long.csv", freeze)
         (folder / "fast.csv").write_text(SCRIPT.replace("50", "70"))
         result["too_fast"] = characterise_fails(folder, "fast.csv")
+        result["held_by_another"] = held_by_another(folder)
     return result
+
+
+def held_by_another(folder: Path) -> dict:
+    """`swarm start` of somebody else holds the robot, before and after."""
+    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
+    command = [sys.executable, "-c", code, "swarm", "start", "--robots", "3", "--arm"]
+    command += ["--behavior", "milling"]
+    fleet = Fleet(URL)
+    with subprocess.Popen(
+        [*command, "--key", str(folder / "operator.key")],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        try:
+            fleet.listen(20, lambda: 3 in fleet.robots and fleet.robots[3].mode == "running")
+            result = characterise_fails(folder, "steps.csv")
+            fleet.listen(0.5)
+            return {**result, "mode_after": fleet.robots[3].mode}
+        finally:
+            process.send_signal(signal.SIGINT)
 
 
 def characterise_fails(folder: Path, script: str) -> dict:

@@ -51,7 +51,7 @@ if working():  # not for --help
     from twinmill_cli.ros_script import write_script
     from twinmill_cli.swarm_door import check_clocks, refuse_doubles
     from twinmill_cli.swarm_signals import ended_by_signals
-    from twinmill_cli.swarm_verdict import Saying, of_stop
+    from twinmill_cli.swarm_verdict import Saying, of_busy, of_stop
     from twinmill_cli.voice import Voice
 
 LOST_S = 0.5  # without telemetry, or without a valid pose: stop
@@ -260,13 +260,18 @@ class Run:
             Why it was cut short; empty if it was not.
 
         Raises:
-            ValueError: the robot is not there, or refuses.
+            ValueError: the robot is not there, drives already, or refuses.
         """
         self._listen()
         tell.find(self.fleet, {self.robot_id})
         self._check_ready("" if end_s is not None else script)
         check_clocks(self.fleet, {self.robot_id}, countdown_s, may_differ=True)
         refuse_doubles(self.fleet, {self.robot_id})
+        if busy := tell.find_busy(self.fleet, {self.robot_id}):
+            raise ValueError(
+                f"{of_busy(busy)}; it is left alone. Stop it first (twinmill swarm stop), then do "
+                "this again with --arm."
+            )
         if self.arm:
             tell.arm(self.fleet, {self.robot_id})
         with ended_by_signals(self.fleet, self.voice.check):
