@@ -43,7 +43,7 @@ if working():  # not for --help
     from twinmill.terminal import PlainConsole
     from twinmill_cli.room import refuse_deleted, refuse_full
     from twinmill_cli.swarm_end import clocks, driving, finish
-    from twinmill_cli.swarm_screen import status_table
+    from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
         Verdict,
         of_arm,
@@ -192,8 +192,10 @@ def _drive(
         options: of tell.start().
     """
     begun, held, odd, halt = None, None, "", LastStop(voice, signals)
+    voice.show(lambda: countdown(asked, options["ahead_s"]))
     try:
         started = tell.start(fleet, asked, behavior, stopping=halt, **options)
+        voice.clear()
         odd = clocks(fleet, asked)
         begun, held = of_start(started, ends()).more(heard).more(odd), Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
@@ -212,6 +214,7 @@ def _drive(
         if held:
             held.settle()
         given = halt(fleet, asked)
+        voice.clear()
         states, known = held.ends() if held else {}, tell.have_confirmed(fleet, asked)
         stopped = of_stop(given, halt.how)
         ended = of_end(begun, states, stopped, was_confirmed=known)

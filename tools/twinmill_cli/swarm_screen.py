@@ -14,6 +14,13 @@ from twinmill.robots.tell import CLOCK_WARN_S, Answer
 from twinmill.terminal import Fitting
 
 
+def countdown(robots: set[int], ahead_s: float) -> Text:
+    """Line of a start that is ahead: who, and when by this computer's clock."""
+    names = ", ".join(f"R{i:02d}" for i in sorted(robots))
+    at = time.strftime("%H:%M:%S", time.localtime(time.time() + ahead_s))
+    return Text(f"{names}: to start at {at}. Ctrl-C calls that off.")
+
+
 def answer_table(given: list[Answer]) -> Fitting:
     """One row a robot: what it answered to a command."""
     table = Table(box=box.SIMPLE_HEAD, show_edge=False)
