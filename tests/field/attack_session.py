@@ -300,7 +300,7 @@ def unknown_mode(robot: Robot, key_file: Path, key: bytes) -> dict:
 
 
 def start_that_cannot_be_told(robot: Robot, key_file: Path, key: bytes) -> dict:
-    """The operator's disk is full below the words of his command: robots that drive are stopped."""
+    """The operator's disk is full below the words of his command: no robot starts."""
     command = ["swarm", "start", "--untethered", "--arm", "--key", str(key_file)]
     begin_s = time.monotonic()
     with open("/dev/full", "w") as full:

@@ -51,7 +51,7 @@ def test_mode_that_there_is_not_keeps_no_tool_from_its_work(session):
 
 
 def test_robots_stop_if_the_command_that_started_them_fails(session):
-    assert session["start_that_cannot_be_told"] == {"code": 1, "drove": True, "stands": True}
+    assert session["start_that_cannot_be_told"] == {"code": 1, "drove": False, "stands": True}
 
 
 def test_one_stop_beats_a_flood_of_starts(session):

@@ -200,6 +200,7 @@ signals, fated = sorted(signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP
 for number in signals:
     child = os.fork()
     if child == 0:
+        os.setpgid(0, 0)  # a group without a parent outside it cannot be halted (POSIX)
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
         os._exit(0)
