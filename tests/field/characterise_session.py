@@ -27,6 +27,8 @@ from twinmill.robots.key import load
 SCRIPT = (
     "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,0,0,0,0\n0.4,50,50,50,50\n1.2,-50,-50,-50,-50\n2,0,0,0,0\n"
 )
+CODE = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
+TWINMILL = [sys.executable, "-c", CODE]
 LONG = "t_s,speed_input,turn_input\n0,20,0\n60,0,0\n"
 
 
@@ -55,8 +57,7 @@ def characterise(folder: Path, name: str, script: str, act=lambda: None) -> dict
     A script that does not lie in the folder is one on the robot.
     """
     log = folder / f"{name}.lcmlog"
-    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
-    command = [sys.executable, "-c", code, "characterise", "--robot", "3", "--json"]
+    command = [*TWINMILL, "characterise", "--robot", "3", "--json"]
     here = folder / script
     command += ["--script", str(here) if here.exists() else script]
     command += ["--out", str(log), "--countdown-s", "1"]
@@ -158,8 +159,7 @@ def main(folder: Path) -> dict:
 
 def held_by_another(folder: Path) -> dict:
     """`swarm start` of somebody else holds the robot, before and after."""
-    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
-    command = [sys.executable, "-c", code, "swarm", "start", "--robots", "3", "--arm"]
+    command = [*TWINMILL, "swarm", "start", "--robots", "3", "--arm"]
     command += ["--behavior", "milling"]
     fleet = Fleet(URL)
     with subprocess.Popen(
@@ -178,8 +178,7 @@ def held_by_another(folder: Path) -> dict:
 
 def characterise_fails(folder: Path, script: str) -> dict:
     log = folder / "none.lcmlog"
-    code = "import sys; from twinmill_cli.main import main; sys.argv[0] = 'twinmill'; main()"
-    command = [sys.executable, "-c", code, "characterise", "--robot", "3"]
+    command = [*TWINMILL, "characterise", "--robot", "3"]
     command += ["--key", str(folder / "operator.key")]
     done = subprocess.run(
         [*command, "--script", str(folder / script), "--out", str(log)],

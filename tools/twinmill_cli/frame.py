@@ -17,6 +17,7 @@ from twinmill.model.model_file import ModelFile
 from twinmill.provenance import Provenance
 from twinmill.version import __version__
 from twinmill_cli.exit_now import STOPPED
+from twinmill_cli.options import repeated
 from twinmill_cli.output import CHANGED, deliver, say
 
 if TYPE_CHECKING:  # slow to import, and JSON needs none of it
@@ -53,6 +54,11 @@ def open_model(model: str, out: Path | None) -> ModelFile:
 def is_mjcf(model: str) -> bool:
     """True of a model in MuJoCo's own format, which is of joints."""
     return Path(model).suffix.lower() in (".xml", ".mjcf")
+
+
+def with_own(verb: str, own: list[Path]) -> str:
+    """Words of a command with the logs that its model was made with."""
+    return shlex.join([*shlex.split(verb), *repeated("--own", own)])
 
 
 def refuse_report(verb: str, robots: str, out: Path | None) -> None:

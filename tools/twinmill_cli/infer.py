@@ -10,7 +10,7 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Model, Own, repeated
+from twinmill_cli.options import Force, Model, Own
 from twinmill_cli.output import AsJson, deliver, telling
 
 if working():  # not for --help
@@ -24,7 +24,7 @@ if working():  # not for --help
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
     from twinmill.model.parameters import with_role
-    from twinmill_cli.frame import command_line, load, open_model, provenance, told
+    from twinmill_cli.frame import command_line, load, open_model, provenance, told, with_own
 
 
 def register(app: typer.Typer) -> None:
@@ -119,8 +119,8 @@ def inferred(
         ValueError: files or options do not fit together.
     """
     native.keep_memory()  # what the work frees it wants again
-    name, beside = verb.split()[-1], shlex.join(repeated("--own", own))
-    typed = f"{verb} {beside}".rstrip() + (f" --keep {shlex.quote(str(keep))}" if keep else "")
+    name, typed = verb.split()[-1], with_own(verb, own)
+    typed += f" --keep {shlex.quote(str(keep))}" if keep else ""
     source = provenance(
         command_line(typed, logs, model, output), model_file := open_model(model, None)
     )
@@ -152,7 +152,7 @@ def inferred(
         written.file.write(force)
     each = [result.to_json() for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
-    writes = f"{'explain' if verb == 'diagnose' else verb} {beside}".rstrip()
+    writes = with_own("explain" if verb == "diagnose" else verb, own)
     commands = (
         [] if written or len(results) > 1 else _mending(results[0].answer, writes, logs, model)
     )

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,7 @@ from twinmill.joints.hook import hook_beside
 from twinmill.joints.next import Excitation, next_joints
 from twinmill.report import joints as shown
 from twinmill.version import __version__
-from twinmill_cli.frame import command_line, refuse_report
-from twinmill_cli.options import repeated
+from twinmill_cli.frame import command_line, refuse_report, with_own
 from twinmill_cli.output import deliver, say, telling
 
 JOINTED = "jointed robots"
@@ -32,7 +30,7 @@ def diagnosed(
     with telling(f"diagnosing with {model}") as progress, threadpool_limits(1, "blas"):
         found = diagnose_joints(logs, model, progress, own=own)
     _warn(found.warnings)
-    command = _command("diagnose", own, logs, model)
+    command = command_line(with_own("diagnose", own), logs, model)
     deliver({**found.to_json(), **_source(command)}, shown.diagnosis(found), as_json)
     return found
 
@@ -63,7 +61,7 @@ def explained(
             written[key] = str(path)
     if "output" in written and "hook" not in written:
         hook.unlink(missing_ok=True)  # of the model that --force replaced
-    command = _command("explain", own, logs, model, output)
+    command = command_line(with_own("explain", own), logs, model, output)
     data = {**found.to_json(), "output": None, "hook": None, **written, **_source(command)}
     deliver(data, shown.explanation(found, written), as_json)
     return found
@@ -108,16 +106,11 @@ def designed(
     with replacing(output, force) as place:
         place.write_text(found.text(), encoding="utf-8")
     verb = f"next --duration-s {duration_s:g} --times-speed {times_speed:g}"
-    command = _command(verb, own, logs, model, output)
-    then = _command("diagnose", own, [*logs, Path("next.mcap")], model)
+    command = command_line(with_own(verb, own), logs, model, output)
+    then = command_line(with_own("diagnose", own), [*logs, Path("next.mcap")], model)
     data = {"script": str(output), **found.to_json(), "then": then, **_source(command)}
     deliver(data, shown.excitation(found, output, then), as_json)
     return found
-
-
-def _command(verb: str, own: list[Path], *rest: Any) -> str:
-    """A command of these, with the logs that the model was made with."""
-    return command_line(shlex.join([*shlex.split(verb), *repeated("--own", own)]), *rest)
 
 
 def _warn(warnings: tuple[str, ...]) -> None:

@@ -67,14 +67,7 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     if beside := each[0].kernels:
         each.append(_grown(p, h, p.view(noise_of(h, p, _columns(beside)))))
     likely = max(each, key=lambda g: g.log_evidence)
-    words = dict.fromkeys(k.depends_on for k in p.kernels if not k.lasting)
-    chance = _sizes(p, h, likely)
-    for word in words:
-        own = [name for name in chance if dependence_of(name) == word]
-        whole = sum(chance[name].sum() for name in own)
-        there = _probability(p, h, each, word)
-        chance |= {name: there * chance[name] / whole for name in own}
-    return _conditioned(p, h, likely, chance)
+    return _conditioned(p, h, likely, _wander(p, h, each, _sizes(p, h, likely)))
 
 
 def _columns(found: list[tuple[Kernel, float]]) -> np.ndarray | None:
@@ -125,6 +118,18 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     size = {k.name: s for k, s in found}
     own = [size[k.name] * view.white(f) for f, k in enumerate(view.kernels) if k.name in size]
     return np.concatenate([view.stacked.columns[:0], *own])
+
+
+def _wander(
+    p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], sizes: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """(S,) shares of each kernel and size in the probability of its dependence."""
+    found = {}
+    for word in dict.fromkeys(map(dependence_of, sizes)):
+        own = {name: chance for name, chance in sizes.items() if dependence_of(name) == word}
+        there, whole = _probability(p, h, each, word), sum(c.sum() for c in own.values())
+        found |= {name: there * chance / whole for name, chance in own.items()}
+    return found
 
 
 def _sizes(p: PlanarProblem, h: Hypothesis, grown: _Grown) -> dict[str, np.ndarray]:

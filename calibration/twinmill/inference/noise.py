@@ -209,19 +209,17 @@ def first_noise(course: Course, recorded: dict[str, float]) -> Noise:
     )
 
 
-def fit_noise(
-    errors: np.ndarray, columns: np.ndarray, begin: Noise, usual: Usual | None = None
-) -> Noise:
+def fit_noise(errors: np.ndarray, columns: np.ndarray, begin: Noise, usual: Usual) -> Noise:
     """The noise with the largest posterior of a linear model, channel by channel.
 
     Args:
         errors: (W, C) of the base.
         columns: (K, W, C) of what is free, each with a standard normal prior.
         begin: where to begin.
-        usual: its prior; None for one about where it begins.
+        usual: its prior.
     """
     logs = begin.logs
-    for c, channel in _channels(errors, columns, begin, usual or Usual.about(begin)):
+    for c, channel in _channels(errors, columns, begin, usual):
         logs[:, c] = channel.fitted(logs[:, c])
     return begin.at(logs)
 

@@ -94,10 +94,12 @@ def test_a_noise_is_known_as_well_as_many_logs_of_it_scatter():
     pace = np.abs(random.normal(size=count)) * (random.random(count) > 0.4)
     covariance = dense_covariance(*np.exp(logs), pace)
     noise = Noise(*np.exp(logs)[:, None], Course(STEP_S, [slice(0, count)], pace))
-    none = np.zeros((0, count, 1))
+    none, usual = np.zeros((0, count, 1)), Usual.about(noise)
     errors = random.multivariate_normal(np.zeros(count), covariance, size=40)[..., None]
-    found = np.array([fit_noise(one, none, noise).logs[:, 0] for one in errors])
-    of_one = [usual_after(one, none, fit_noise(one, none, noise)).cov[0] for one in errors[:5]]
+    found = np.array([fit_noise(one, none, noise, usual).logs[:, 0] for one in errors])
+    of_one = [
+        usual_after(one, none, fit_noise(one, none, noise, usual)).cov[0] for one in errors[:5]
+    ]
     told = np.mean([np.diag(cov) for cov in of_one], axis=0) - PRIORS.sheet**2
     assert np.sqrt(told) == pytest.approx(found.std(axis=0), rel=0.5)
 
