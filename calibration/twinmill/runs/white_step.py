@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.fitting.score_fit import ScoreFit
-from twinmill.inference.noise import Course, first_noise, fit_noise, weights_of
+from twinmill.inference.noise import Course, Usual, first_noise, fit_noise, weights_of
 from twinmill.inference.steps import Steps, StepsOfLog, motion_of
 from twinmill.predict.datasets import Trajectory
 
@@ -66,7 +66,7 @@ def _blocks(fit: ScoreFit, i: int) -> list[_Block]:
     moved = steps.predicted(fit.models[i])
     pace = motion_of(steps, moved, moved).pace[kept]
     begin = first_noise(Course(float(np.median(steps.step_s)), _stretches(steps, kept), pace), {})
-    noise = fit_noise(errors[0], columns * fit.std[own][:, None, None], begin)
+    noise = fit_noise(errors[0], columns * fit.std[own][:, None, None], begin, Usual.about(begin))
     both = noise.whiten(np.concatenate([errors[:1], columns]))
     weight = weights_of(both[0].reshape(3, -1)).reshape(-1)
     left, slopes = both[0] * weight, both[1:] * weight
