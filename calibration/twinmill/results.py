@@ -95,7 +95,7 @@ class Comparison(Reported):
         return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
 
 
-class Inference(Shown):
+class Inference(Reported):
     """Posterior probabilities of the effects that a model may lack.
 
     Attributes:
@@ -104,6 +104,7 @@ class Inference(Shown):
         sentence: the same for people.
         findings: effects that are missing, each with `effect`, `probability` and `certainty`.
         nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
+        score: as of `compare`, of the model as given.
 
     Examples:
         >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
@@ -115,7 +116,11 @@ class Inference(Shown):
         self._result, answer = result, result.answer
         self.verdict, self.findings = answer.verdict, list(answer.findings)
         self.nothing, self.outside = answer.nothing, answer.outside
-        self.sentence = inference.sentence(answer)
+        self.sentence, self.score = inference.sentence(answer), result.before.score
+
+    def to_json(self) -> dict[str, Any]:
+        """As of `Comparison`, for `twinmill lab infer`."""
+        return {"sentence": self.sentence, **super().to_json()}
 
     def table(self) -> pd.DataFrame:
         """Effects and their numbers.
@@ -134,6 +139,21 @@ class Inference(Shown):
             for name, (value, std) in f.numbers.items()
         ]
         return pd.DataFrame(rows, columns=columns)
+
+    def plot(self) -> Figure:
+        """Probability of each effect, of nothing and of an unknown cause.
+
+        Returns:
+            A figure of matplotlib.
+
+        Examples:
+            >>> len(inferred.plot().axes)
+            1
+        """
+        return inference.probabilities(self._result.answer).svg.picture
+
+    def _page(self) -> tuple[report.Section, str]:
+        return inference.section([self._result]), "twinmill.infer"
 
     def _text(self) -> RenderableType:
         return inference.terminal(self._result)

@@ -12,7 +12,7 @@ from twinmill_cli.infer import _mending
 
 
 def answer(verdict, *added):
-    return Answer(verdict, [], 0.0, 0.1, 0.0, {}, {}, 0.0, added, None)
+    return Answer(verdict, [], 0.0, 0.1, 0.0, {}, {}, 0.0, added, None, None)
 
 
 @pytest.mark.parametrize(
@@ -53,15 +53,17 @@ def test_diagnose_and_explain_with_the_models_own_log_find_what_came_since(
     assert effect["deceleration_mps2"] == pytest.approx(0.7, rel=0.1)
 
 
-@pytest.mark.parametrize("verb", ["diagnose", "explain"])
-def test_probabilities_have_no_report(
-    twinmill, brief_coasting_robot, brief_log_without_coasting, tmp_path, verb
+def test_the_page_of_a_diagnosis_shows_its_probabilities(
+    twinmill, brief_coasting_robot, brief_log_without_coasting, tmp_path
 ):
-    """Refused before anything is judged."""
-    new = ["-o", tmp_path / "new.toml"] if verb == "explain" else []
-    own = ["--own", brief_log_without_coasting, "--out", tmp_path / "report"]
+    """Text and figures of the page, and numbers of the JSON, are of one result."""
+    own = ["--own", brief_log_without_coasting, "--out", tmp_path / "report", "--json"]
     model = ["--model", brief_coasting_robot.model]
-    code, _, err = twinmill(verb, brief_coasting_robot.log, *model, *own, *new)
-    assert code == 1
-    assert "leave --out away" in err
-    assert not [*tmp_path.iterdir()]
+    code, out, _ = twinmill("diagnose", brief_coasting_robot.log, *model, *own)
+    found = json.loads(out)
+    assert code == 0 and found["report"] == str(tmp_path / "report" / "index.html")
+    page = (tmp_path / "report" / "index.html").read_text()
+    for shown in (found["sentence"], "What is missing, with its probability", "Prior knowledge"):
+        assert shown in page
+    assert found["score_after"] < min(found["score_refit"], found["score"])
+    assert found["ranking"][0]["effect"] == found["found"][0] == "coasting"

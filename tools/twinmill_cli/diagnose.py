@@ -41,7 +41,6 @@ if working():  # not for --help
         open_model,
         option,
         provenance,
-        refuse_report,
         told,
     )
 if TYPE_CHECKING:
@@ -52,7 +51,6 @@ if TYPE_CHECKING:
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
-WITH_OWN = "probabilities that --own gives"
 
 
 def register(app: typer.Typer) -> None:
@@ -89,8 +87,7 @@ def _diagnose(
     if own:
         from twinmill_cli.infer import inferred  # slow to import, as what follows is
 
-        refuse_report("diagnose", WITH_OWN, out)
-        return inferred("diagnose", logs, model, own=own, as_json=as_json)
+        return inferred("diagnose", logs, model, own=own, as_json=as_json, out=out)
     native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
@@ -286,9 +283,13 @@ def _explain(
     if own:
         from twinmill_cli.infer import inferred  # as in diagnose
 
-        refuse_report("explain", WITH_OWN, out)
         return inferred(
-            "explain", logs, model, own=own, output=output, force=force, as_json=as_json
+            *("explain", logs, model),
+            own=own,
+            output=output,
+            force=force,
+            as_json=as_json,
+            out=out,
         )
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 

@@ -10,8 +10,8 @@ import typer
 
 from twinmill.defaults import DEFAULT_MODEL
 from twinmill_cli.lazy import working
-from twinmill_cli.options import Force, Model, Own
-from twinmill_cli.output import AsJson, deliver, telling
+from twinmill_cli.options import Force, Model, Out, Own
+from twinmill_cli.output import AsJson, telling
 
 if working():  # not for --help
     import shlex
@@ -24,7 +24,16 @@ if working():  # not for --help
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
     from twinmill.model.parameters import with_role
-    from twinmill_cli.frame import command_line, load, open_model, provenance, told, with_own
+    from twinmill.report.inference import section, sentence, terminal_of_robots
+    from twinmill_cli.frame import (
+        command_line,
+        finish,
+        load,
+        open_model,
+        provenance,
+        told,
+        with_own,
+    )
 
 
 def register(app: typer.Typer) -> None:
@@ -67,6 +76,7 @@ def _infer(
     ] = None,
     force: Force = False,
     as_json: AsJson = False,
+    out: Out = None,
 ) -> list[Inference]:
     """Posterior probability of each effect that a model may lack, and of an unknown cause.
 
@@ -89,6 +99,7 @@ def _infer(
         output=output,
         force=force,
         as_json=as_json,
+        out=out,
     )
 
 
@@ -102,6 +113,7 @@ def inferred(
     output: Path | None = None,
     force: bool = False,
     as_json: bool,
+    out: Path | None,
 ) -> list[Inference]:
     """Tells what is missing with its probability, and writes the models that are asked for.
 
@@ -114,6 +126,7 @@ def inferred(
         output: where the model is written with what is missing.
         force: replaces what is there.
         as_json: one JSON object in the place of tables.
+        out: folder of a report.
 
     Raises:
         ValueError: files or options do not fit together.
@@ -122,7 +135,7 @@ def inferred(
     name, typed = verb.split()[-1], with_own(verb, own)
     typed += f" --keep {shlex.quote(str(keep))}" if keep else ""
     source = provenance(
-        command_line(typed, logs, model, output), model_file := open_model(model, None)
+        command_line(typed, logs, model, output), model_file := open_model(model, out)
     )
     if keep is not None and not own:
         raise ValueError(f"{name}: --keep stores what --own shows; give the model's own log, too.")
@@ -150,21 +163,22 @@ def inferred(
         with_kept(model_file, results[0].always, keep, source.command).write(force)
     if written:
         written.file.write(force)
-    each = [result.to_json() for result in results]
+    each = [{"sentence": sentence(result.answer), **result.to_json()} for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
     writes = with_own("explain" if verb == "diagnose" else verb, own)
     commands = (
         [] if written or len(results) > 1 else _mending(results[0].answer, writes, logs, model)
     )
     data = {**data, **(written.to_json() if written else {})}
-    data |= {"commands": [command for _, command in commands]}
-    data |= {**told(measurements), **source.to_json()}
-    if as_json:
-        deliver(data, None, as_json)
-    else:
-        from twinmill.report.inference import terminal_of_robots  # slow, and JSON needs none
-
-        deliver(data, terminal_of_robots(results, commands, written), as_json)
+    data |= {"commands": [command for _, command in commands], **told(measurements)}
+    finish(
+        data,
+        None if as_json else terminal_of_robots(results, commands, written),
+        source,
+        section=lambda: section(results, commands, written),
+        as_json=as_json,
+        out=out,
+    )
     return results
 
 

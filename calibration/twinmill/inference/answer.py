@@ -2,6 +2,7 @@
 """From beliefs to an answer: verdict, findings with their certainty, what the rest depends on."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -38,7 +39,7 @@ class Named:
     share: float
     numbers: dict[str, tuple[float, float]]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of `findings` of the interface."""
         return {
             "effect": self.effect,
@@ -69,6 +70,7 @@ class Answer:
         share: of the excess squared error that the likeliest dependence takes.
         added: the likeliest set of effects of the catalogue that are missing, each kind once.
         numbers: of the likeliest model that has these.
+        refit: of the base with nothing that is missing.
     """
 
     verdict: Verdict
@@ -81,12 +83,18 @@ class Answer:
     share: float
     added: tuple[str, ...]
     numbers: Numbers
+    refit: Numbers
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
+        findings = [f.to_json() for f in self.findings]
+        group = next((f.group for f in self.findings if f.certainty == "group"), ())
         return {
             "verdict": self.verdict,
-            "findings": [f.to_json() for f in self.findings],
+            "findings": findings,
+            "found": [f.effect for f in self.findings],
+            "ranking": self._ranking(findings),
+            "confusable_with": [*group[1:]],
             "probability": {
                 "nothing": self.nothing,
                 "outside": self.outside,
@@ -99,7 +107,28 @@ class Answer:
                 "probability": self.depends_on,
                 "formula": None,
             },
+            "unexplained": {"depends_on": list(self.depends_on), "share": self.share},
         }
+
+    def _ranking(self, findings: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """All effects that were fitted, likeliest first; a p value is of another statistics."""
+        of_finding = {f["effect"]: f for f in findings}
+        groups = [f.group for f in self.findings if f.certainty == "group"]
+        rows = []
+        for name, probability in self.effects.items():
+            found = of_finding.get(name)
+            rows.append(
+                {
+                    "effect": name,
+                    "probability": probability,
+                    "score_heldout": None,
+                    "share_explained": found["share"] if found else None,
+                    "p_value": None,
+                    "parameters": found["parameters"] if found else [],
+                    "group": next((k for k, g in enumerate(groups, 1) if name in g), None),
+                }
+            )
+        return rows
 
 
 def answer(table: Table) -> Answer:
@@ -135,6 +164,7 @@ def answer(table: Table) -> Answer:
         share,
         added,
         table.numbers[own.entry.effects],
+        table.numbers[()],
     )
 
 

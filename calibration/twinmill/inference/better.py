@@ -9,31 +9,17 @@ out, too, but the base's numbers are those beside it, so that they do not stand 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 import tomlkit
-import twinmill_native as native
 
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.opening import open_measurements
 from twinmill.inference.always import always_of
-from twinmill.inference.duties import TABLE
+from twinmill.inference.found_model import found_model
 from twinmill.inference.infer import Inference
 from twinmill.inference.kept import as_table
-from twinmill.inference.table import Numbers
 from twinmill.model.child_file import Fitted, child_of
-from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.model.parameters import (
-    CLOCK,
-    CLOCK_RATE,
-    ParameterEstimate,
-    catalogue_name,
-    effect_names,
-    instance_of,
-    key_of,
-    newest_instance,
-    with_role,
-)
+from twinmill.model.parameters import CLOCK, CLOCK_RATE, instance_of, with_role
 
 
 @dataclass(frozen=True)
@@ -93,75 +79,21 @@ def _fitted(
     found: Inference, model_file: ModelFile, score: float
 ) -> tuple[Fitted, tuple[str, ...]]:
     """Fit to be written, and its new instances of effects; the score is not known yet."""
-    model, name_of = _with_effects(model_file, found)
-    duties = model_file.model.drive == "duty"
-    estimates, covariance = _told(found.answer.numbers, name_of, model, duties=duties)
-    kept = [e for e in estimates if instance_of(e.name) != "clock"]
-    for estimate in kept:
-        model.set(estimate.name, estimate.value)
-    clock = {e.name: e for e in estimates if e.name in (CLOCK, CLOCK_RATE)}
-    declared = model.clock_same or any(m.same_clock for m in found.measurements)
+    always = found.always.effects if found.always else ()
+    lasting = [n for n in (*always, *found.answer.added) if not with_role(n, "moment")]
+    own = found_model(model_file.model, found.answer.numbers, lasting)
+    kept = [e for e in own.estimates if instance_of(e.name) != "clock"]
+    clock = {e.name: e for e in own.estimates if e.name in (CLOCK, CLOCK_RATE)}
+    declared = own.model.clock_same or any(m.same_clock for m in found.measurements)
     if declared or len(found.measurements) > 1:  # several logs may have an offset each
         clock = {}
     fitted = Fitted(
-        model=model,
+        model=own.model,
         estimates=kept,
         logs={m.log_name: m.log_sha256 for m in found.measurements},
         score_before=score,
         score_after=score,
         clock=clock,
-        covariance=covariance.of([*(e.name for e in kept), *clock]),
+        covariance=own.covariance.of([*(e.name for e in kept), *clock]),
     )
-    return fitted, tuple(name_of.values())
-
-
-def _with_effects(model_file: ModelFile, found: Inference) -> tuple[native.Model, dict[str, str]]:
-    """The file's model with the effects, and the name there of each instance that was added."""
-    own = found.answer.numbers.model
-    model, name_of = model_file.model.copy(), {}
-    always = found.always.effects if found.always else ()
-    for instance in effect_names(own)[len(effect_names(model)) :]:
-        kind = catalogue_name(instance)
-        if kind not in (*always, *found.answer.added) or with_role(kind, "moment"):
-            continue
-        model.add_effect(kind)
-        name_of[instance] = newest_instance(model, kind)
-        for entry in own.values():
-            if instance_of(entry["name"]) == instance:
-                model.set(f"{name_of[instance]}.{key_of(entry['name'])}", entry["value"])
-    return model, name_of
-
-
-def _told(
-    numbers: Numbers, name_of: dict[str, str], model: native.Model, *, duties: bool
-) -> tuple[list[ParameterEstimate], Covariance]:
-    """Estimates of the file's own quantities: of a refined table's nodes every second is one."""
-    entries = {v["name"]: v for v in model.values()}
-    at, names = [], []
-    for k, label in enumerate(numbers.labels):
-        name = label
-        if instance_of(label) in name_of:
-            name = f"{name_of[instance_of(label)]}.{key_of(label)}"
-        elif duties and label.startswith(TABLE):
-            node = int(label.removeprefix(TABLE))
-            name = f"{TABLE}{node // 2}" if node % 2 == 0 else ""
-        if name in entries:
-            at.append(k)
-            names.append(name)
-    mean, cov = numbers.alone @ numbers.mean, numbers.alone @ numbers.cov @ numbers.alone.T
-    cov = cov[np.ix_(at, at)]
-    estimates = []
-    for name, value, std in zip(names, mean[at], np.sqrt(np.diag(cov)), strict=True):
-        low, high = entries[name]["min"], entries[name]["max"]
-        value = np.clip(value, low, high)
-        estimates.append(
-            ParameterEstimate(
-                name=name,
-                value=float(value),
-                std=float(std),
-                unit=entries[name]["unit"],
-                at_bound=not low < value < high,
-                seen=True,
-            )
-        )
-    return estimates, Covariance(tuple(names), cov)
+    return fitted, own.added

@@ -3,18 +3,22 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
+from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.opening import open_measurements
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
 from twinmill.inference.discrepancy import SIZES
+from twinmill.inference.found_model import found_model
 from twinmill.inference.kept import kept
 from twinmill.inference.planar import problem_of
 from twinmill.inference.prior import Always
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
-from twinmill.inference.table import table_of
+from twinmill.inference.table import Numbers, table_of
 from twinmill.model.model_file import ModelFile
 
 HELD, HELD_OWN = "infer: the logs hold", "infer: the model's own logs hold"
@@ -34,13 +38,19 @@ class Inference:
         answer: verdict, effects and dependences with their probabilities.
         measurements: of the logs.
         always: what the model misses in its own logs, too; None where that is not known.
+        before: these logs and the model as given.
+        refitted: with the base's numbers where nothing is missing.
+        after: with the likeliest set of effects.
     """
 
     answer: Answer
     measurements: Sequence[Measurement]
     always: Always | None
+    before: Comparison
+    refitted: Comparison
+    after: Comparison
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
@@ -54,6 +64,12 @@ class Inference:
                 "depends_on": [{"name": name, "size": size} for name, size in kernels],
                 "wander": {word: dict(zip(map(str, SIZES), p, strict=True)) for word, p in wander},
             },
+            "score": self.before.score,
+            "score_refit": self.refitted.score,
+            "score_after": self.after.score,
+            "robots_off": [],
+            "next_experiment": None,
+            "warnings": self.before.warnings,
             "settings": {name: value for name, value, _ in PRIORS.listed()},
         }
 
@@ -85,7 +101,28 @@ def infer(
         always = always_of(of_one_robot(own, HELD_OWN, OWN, robot), model_file)
     problem = problem_of(runs, model_file, always)
     search = Search(problem, progress).run()
-    return Inference(answer(table_of(search)), runs, always)
+    progress("scores")
+    return _scored(answer(table_of(search)), runs, always, model_file)
+
+
+def _scored(
+    found: Answer, runs: Sequence[Measurement], always: Always | None, model_file: ModelFile
+) -> Inference:
+    opened = open_measurements(runs, model_file)
+    there = always.effects if always else ()
+
+    def score(numbers: Numbers, effects: Sequence[str]) -> Comparison:
+        model = found_model(opened[0].model, numbers, effects).model
+        return comparison(model_file, [o.aligned(model) for o in opened])
+
+    return Inference(
+        found,
+        runs,
+        always,
+        before=comparison(model_file, opened),
+        refitted=score(found.refit, there),
+        after=score(found.numbers, (*there, *found.added)),
+    )
 
 
 def infer_robots(

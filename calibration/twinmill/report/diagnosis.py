@@ -23,7 +23,7 @@ from twinmill.report import Figure, Section, comparisons, detections, formula, s
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import robot_pictures
-from twinmill.report.tables import Cell, Table, Tone, number, rounded, tone
+from twinmill.report.tables import VERDICTS, Cell, Table, Tone, number, rounded, tone
 
 TOO_FEW = (
     f"Among fewer than {SETTINGS.fewest_robots} robots none can be called the outlier, and an "
@@ -37,16 +37,6 @@ NOTHING_GAINED = (
 )
 
 Steps = Sequence[tuple[str | None, float]]  # what came into the model, and the score then
-
-TONES: dict[str, Tone] = {
-    "cannot_tell": "warn",
-    "bad_input": "bad",
-    "model_adequate": "good",
-    "refit_enough": "warn",
-    "effect_missing": "bad",
-    "ambiguous": "warn",
-    "outside_catalogue": "bad",
-}
 
 
 def findings(diagnosis: Diagnosis) -> Table:
@@ -283,7 +273,7 @@ def _said(diagnosis: Diagnosis) -> list[RenderableType]:
 
 
 def _tone_of(diagnosis: Diagnosis) -> Tone:
-    return "bad" if diagnosis.robots_off or diagnosis.runs_off else TONES[diagnosis.verdict]
+    return "bad" if diagnosis.robots_off or diagnosis.runs_off else VERDICTS[diagnosis.verdict]
 
 
 def _each(diagnosis: Diagnosis) -> str:

@@ -103,8 +103,18 @@ def regimes(
     )
 
 
-def waterfall(scores: list[tuple[str, float]]) -> Figure:
-    """Fall of the score by each step, on a scale of factors."""
+HELD_OUT = (
+    "on parts of the data that were not fitted to, without robots that differ from the others"
+)
+
+
+def waterfall(scores: list[tuple[str, float]], judged: str = HELD_OUT) -> Figure:
+    """Fall of the score by each step, on a scale of factors.
+
+    Args:
+        scores: name of each step, and the score after it.
+        judged: on which data, in words.
+    """
     values = np.array([score for _, score in scores])
 
     def paint(axes) -> None:
@@ -138,7 +148,6 @@ def waterfall(scores: list[tuple[str, float]]) -> Figure:
     return Figure(
         draw(0.9 + 0.36 * max(len(scores), 3), paint),
         "What each step gained",
-        "The score after each step, on parts of the data that were not fitted to, without robots "
-        "that differ from the others. Green is what the step took away (red: added); the dashed "
-        "line at 1 is as good as this log can tell.",
+        f"The score after each step, {judged}. Green is what the step took away (red: added); the "
+        "dashed line at 1 is as good as this log can tell.",
     )

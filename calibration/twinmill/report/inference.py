@@ -3,17 +3,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.arguments import option
+from twinmill.fitting.compare import Comparison
 from twinmill.inference.answer import Answer, Named
 from twinmill.inference.infer import Inference
+from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import catalogue
-from twinmill.report import show
-from twinmill.report.tables import Cell, Table, number
+from twinmill.report import Figure, Section, comparisons, show
+from twinmill.report.canvas import FLOOR, PREDICTED, draw
+from twinmill.report.charted import charts
+from twinmill.report.error_figures import waterfall
+from twinmill.report.sections import robot_pictures
+from twinmill.report.tables import VERDICTS, Cell, Table, number, tone
 
 if TYPE_CHECKING:
     from twinmill.inference.better import Better
@@ -44,9 +53,9 @@ def sentence(answer: Answer) -> str:
 
 
 def terminal_of_robots(
-    results: list[Inference], commands: show.Commands = (), written: Better | None = None
+    results: Sequence[Inference], commands: show.Commands = (), written: Better | None = None
 ) -> RenderableType:
-    """Text of `twinmill lab infer`: of one robot all, of several what is missing of each.
+    """Text on the robots of a log: of one all, of several what is missing of each.
 
     Args:
         results: one for each robot.
@@ -59,6 +68,108 @@ def terminal_of_robots(
     return Group(terminal(results[0]), *new, *show.typed_next(commands))
 
 
+def section(
+    results: Sequence[Inference], commands: show.Commands = (), written: Better | None = None
+) -> Section:
+    """The page on the robots of a log: verdicts, figures, tables and the commands that follow.
+
+    Args:
+        results: as of `terminal_of_robots`.
+        commands: likewise.
+        written: likewise.
+    """
+    before, refitted, after = (
+        joined([getattr(result, which) for result in results])
+        for which in ("before", "refitted", "after")
+    )
+    scores = [("as given", before.score), ("base refitted", refitted.score)]
+    if any(result.answer.added for result in results):
+        scores.append(("with what was found", after.score))
+    errors = [("as given", before.shown), ("with what was found", _same_robot(before, after))]
+    one = results[0] if len(results) == 1 else None
+    return Section(
+        f"What {before.model_name} lacks",
+        [(label, number(value), tone(value)) for label, value in scores],
+        "\n".join(_verdicts(results)),
+        comparisons.facts(before),
+        [
+            *([probabilities(one.answer)] if one else []),
+            waterfall(scores, "on the logs that were judged"),
+            *robot_pictures(before, errors),
+        ],
+        _tables(one) if one else [_robots(results)],
+        charts=charts(before, [("with what was found", robot.model) for robot in after.robots]),
+        commands=[(f"{why}:", command) for why, command in commands],
+        notes=[
+            *(_known(one) if one else [ONE_BY_ONE]),
+            *([_new(written)] if written else []),
+        ],
+        warnings=before.warnings,
+        folded=[_priors()],
+    )
+
+
+def joined(each: Sequence[Comparison]) -> Comparison:
+    """One comparison of the robots of several."""
+    robots = [robot for one in each for robot in one.robots]
+    return replace(each[0], robots=robots, warnings=[w for one in each for w in one.warnings])
+
+
+def _same_robot(before: Comparison, after: Comparison) -> Any:
+    """The robot that is shown of the model as given, with the other model."""
+    pairs = zip(before.robots, after.robots, strict=True)
+    return next(other for own, other in pairs if own is before.shown)
+
+
+def _verdicts(results: Sequence[Inference]) -> list[str]:
+    if len(results) == 1:
+        return [sentence(results[0].answer)]
+    return [f"{_label(result)}: {sentence(result.answer)}" for result in results]
+
+
+def _label(result: Inference) -> str:
+    return f"R{result.measurements[0].track.robot_id:02d}"
+
+
+def probabilities(answer: Answer) -> Figure:
+    """Bars of the probability of each effect, of nothing and of an unknown cause."""
+    told = {"nothing is missing": answer.nothing, "outside the catalogue": answer.outside}
+    effects = {name: p for name, p in answer.effects.items() if p >= SHOWN}
+    rows = dict(sorted({**told, **effects}.items(), key=lambda row: -row[1]))
+    values = np.array([*rows.values()])
+
+    def paint(axes: Any) -> None:
+        at = np.arange(len(rows))
+        colours = [PREDICTED if name in effects else FLOOR for name in rows]
+        axes.barh(at, values, color=colours, height=0.62)
+        for y, value in zip(at, values, strict=True):
+            axes.annotate(
+                percent(value),
+                (value, y),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontweight="bold",
+            )
+        axes.axvline(PRIORS.sure, color="#3c3c3c", lw=1, ls="--")
+        axes.set(xlim=(0, 1.12), ylim=(len(rows) - 0.4, -0.6), xlabel="posterior probability")
+        axes.set_yticks(at, [*rows])
+        axes.grid(False, axis="y")
+
+    return Figure(
+        draw(0.9 + 0.36 * max(len(rows), 3), paint),
+        "What is missing, with its probability",
+        f"Several effects may be missing at once. Dashed: {PRIORS.sure:g}, from which on an effect "
+        "is called sure.",
+    )
+
+
+def _priors() -> Table:
+    """Numbers of prior knowledge, each with its meaning."""
+    rows = [[Cell(name), Cell(f"{value:g}"), Cell(what)] for name, value, what in PRIORS.listed()]
+    return Table("Prior knowledge", ["name", "value", "meaning"], rows, words=(0, 2))
+
+
 def _new(written: Better) -> str:
     has = f"has {', '.join(written.added)}" if written.added else "has the base's new numbers"
     return (
@@ -67,7 +178,7 @@ def _new(written: Better) -> str:
     )
 
 
-def _robots(results: list[Inference]) -> Table:
+def _robots(results: Sequence[Inference]) -> Table:
     rows = []
     for result in results:
         numbers = "; ".join(
@@ -75,33 +186,48 @@ def _robots(results: list[Inference]) -> Table:
             for f in result.answer.findings
             for name, (value, std) in f.numbers.items()
         )
-        robot = f"R{result.measurements[0].track.robot_id:02d}"
-        rows.append([Cell(robot), Cell(sentence(result.answer)), Cell(numbers)])
+        rows.append([Cell(_label(result)), Cell(sentence(result.answer)), Cell(numbers)])
     return Table("Each robot by itself", ["robot", "answer", "numbers"], rows, words=(0, 1, 2))
 
 
 def terminal(result: Inference) -> RenderableType:
-    """Text on one robot: verdict, effects, dependences, and errors that are not new."""
+    """Text on one robot: verdict, scores, effects, dependences, and errors that are not new."""
+    scores = (
+        f"score {number(result.before.score)} as given, "
+        f"{number(result.refitted.score)} after a refit of the base"
+    )
+    if result.answer.added:
+        scores += f", {number(result.after.score)} with what was found"
+    return Group(
+        Text(sentence(result.answer), show.STYLES[VERDICTS[result.answer.verdict]]),
+        Text(scores),
+        Text(),
+        *map(show.table, _tables(result)),
+        *map(Text, _known(result)),
+        *show.warned(result.before.warnings),
+    )
+
+
+def _tables(result: Inference) -> list[Table]:
     answer = result.answer
-    parts: list[RenderableType] = [Text(sentence(answer)), Text()]
-    if answer.findings:
-        parts.append(show.table(_effects(answer.findings)))
-    if answer.depends_on:
-        parts.append(show.table(_dependences(answer)))
-    if others := _others(answer):
-        parts.append(show.table(others))
-    if result.always is None:
-        parts.append(
-            Text(
-                "The model's error on the log that it was fitted to is not known, so it may be "
-                f"reported as new: give that log with {option('own')}, and store its result with "
-                f"{option('keep')}."
-            )
-        )
-    elif result.always.kernels or result.always.effects:
-        known = ", ".join([*result.always.effects, *(name for name, _ in result.always.kernels)])
-        parts.append(Text(f"Not reported, since its own log shows it, too: {known}."))
-    return Group(*parts)
+    return [
+        *([_effects(answer.findings)] if answer.findings else []),
+        *([_dependences(answer)] if answer.depends_on else []),
+        *([others] if (others := _others(answer)) else []),
+    ]
+
+
+def _known(result: Inference) -> list[str]:
+    """What is known of errors that are not new, in sentences."""
+    always = result.always
+    if always is None:
+        return [
+            "The model's error on the log that it was fitted to is not known, so it may be "
+            f"reported as new: give that log with {option('own')}, and store its result with "
+            f"{option('keep')}."
+        ]
+    known = [*always.effects, *(name for name, _ in always.kernels)]
+    return [f"No news, since its own log shows it: {', '.join(known)}."] if known else []
 
 
 def percent(probability: float) -> str:

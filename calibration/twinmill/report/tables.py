@@ -16,6 +16,15 @@ from twinmill.predict.regimes import HORIZON, Regime
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 
 Tone = Literal["", "good", "warn", "bad", "dim"]
+VERDICTS: dict[str, Tone] = {
+    "cannot_tell": "warn",
+    "bad_input": "bad",
+    "model_adequate": "good",
+    "refit_enough": "warn",
+    "effect_missing": "bad",
+    "ambiguous": "warn",
+    "outside_catalogue": "bad",
+}
 
 OF_RESPONSE = "held-out error of a smooth response to the commands"
 SHOWN = {

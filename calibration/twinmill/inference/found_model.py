@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot's model with the numbers of one hypothesis: its base, and effects that are let in."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+import twinmill_native as native
+
+from twinmill.inference.duties import TABLE
+from twinmill.inference.table import Numbers
+from twinmill.model.covariance import Covariance
+from twinmill.model.parameters import (
+    ParameterEstimate,
+    catalogue_name,
+    effect_names,
+    instance_of,
+    key_of,
+    newest_instance,
+)
+
+
+@dataclass(frozen=True)
+class FoundModel:
+    """Model and estimates of one hypothesis.
+
+    Attributes:
+        model: with base and effects at their estimates.
+        added: instances of effects that the given model does not have.
+        estimates: of the given model's quantities and of these effects.
+        covariance: of all of them.
+    """
+
+    model: native.Model
+    added: tuple[str, ...]
+    estimates: list[ParameterEstimate]
+    covariance: Covariance
+
+
+def found_model(given: native.Model, numbers: Numbers, let_in: Collection[str]) -> FoundModel:
+    """Estimates of the given model's own quantities: of a refined table every second node is one.
+
+    Args:
+        given: the robot's model, which stays as it is.
+        numbers: of a hypothesis.
+        let_in: kinds of effects that the model gets; others of the hypothesis stay out.
+    """
+    model, name_of = _with_effects(given, numbers, let_in)
+    entries = {v["name"]: v for v in model.values()}
+    names_at = [
+        (k, name)
+        for k, label in enumerate(numbers.labels)
+        if (name := _name(label, name_of, model.drive)) in entries
+    ]
+    at, names = [k for k, _ in names_at], tuple(name for _, name in names_at)
+    mean, cov = numbers.alone @ numbers.mean, numbers.alone @ numbers.cov @ numbers.alone.T
+    cov = cov[np.ix_(at, at)]
+    estimates = []
+    for name, value, std in zip(names, mean[at], np.sqrt(np.diag(cov)), strict=True):
+        low, high = entries[name]["min"], entries[name]["max"]
+        value = float(np.clip(value, low, high))
+        estimates.append(
+            ParameterEstimate(
+                name=name,
+                value=value,
+                std=float(std),
+                unit=entries[name]["unit"],
+                at_bound=not low < value < high,
+                seen=True,
+            )
+        )
+        if instance_of(name) != "clock":  # each log has its own
+            model.set(name, value)
+    return FoundModel(model, tuple(name_of.values()), estimates, Covariance(names, cov))
+
+
+def _with_effects(
+    given: native.Model, numbers: Numbers, let_in: Collection[str]
+) -> tuple[native.Model, dict[str, str]]:
+    """The model with the effects, and the name there of each instance that was added."""
+    own, model, name_of = numbers.model, given.copy(), {}
+    for instance in effect_names(own)[len(effect_names(given)) :]:
+        kind = catalogue_name(instance)
+        if kind not in let_in:
+            continue
+        model.add_effect(kind)
+        name_of[instance] = newest_instance(model, kind)
+        for entry in own.values():
+            if instance_of(entry["name"]) == instance:
+                model.set(f"{name_of[instance]}.{key_of(entry['name'])}", entry["value"])
+    return model, name_of
+
+
+def _name(label: str, name_of: dict[str, str], drive: str) -> str:
+    """Name in the given model of what a hypothesis calls so; empty if it has none."""
+    if instance_of(label) in name_of:
+        return f"{name_of[instance_of(label)]}.{key_of(label)}"
+    if drive == "duty" and label.startswith(TABLE):
+        node = int(label.removeprefix(TABLE))
+        return f"{TABLE}{node // 2}" if node % 2 == 0 else ""
+    return label
