@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
@@ -40,7 +41,7 @@ class Inference:
     measurements: Sequence[Measurement]
     always: Always | None
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
@@ -108,13 +109,15 @@ def infer_robots(
         ModelError: what the file keeps cannot be read.
     """
     robots, known = _robots(measurements), _robots(own)
-    found = []
-    for k, robot in enumerate(robots):
+
+    def judged(k: int, robot: int) -> Inference:
         of = f"R{robot:02d} ({k + 1} of {len(robots)}), " if len(robots) > 1 else ""
         runs = of_one_robot(measurements, HELD, ONE, robot)
         strange = robot not in known and set(known) & set(robots)
         own_logs = () if strange else own
-        found.append(infer(runs, model_file, own_logs, lambda s, of=of: progress(of + s)))
+        return infer(runs, model_file, own_logs, lambda said: progress(of + said))
+
+    found = [judged(k, robot) for k, robot in enumerate(robots)]
     return found or [infer(measurements, model_file, own, progress)]
 
 
