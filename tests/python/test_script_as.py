@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from ros_stand_in import StandIn
 
 SCRIPT = "t_s,fl_pct,fr_pct,rl_pct,rr_pct\n0,0,0,0,0\n1,50,50,50,50\n2,-40,40,-40,40\n3,0,0,0,0\n"
+PUBLISHER = ("--script-as", "publisher", "--output", "p.py")
 # Of the model below: 0.36 m/s at full duty; turning 0.4 * 0.36 / 0.126 at duty 40 %.
 WANTED = [(0, 0, 0), (0.18, 0, 0), (0, 0, 0.4 * 0.36 / 0.126)]
 
@@ -93,6 +94,18 @@ def test_a_script_of_velocities_is_published_as_it_is(folder, monkeypatch):
     with pytest.raises(ValueError, match="end with a row of zeros, which stops the robot"):
         convert("publisher", "q.py")
     assert not (folder / "q.py").exists()
+
+
+def test_one_wheel_at_a_time_is_published_as_what_it_does_to_the_body(folder, monkeypatch):
+    """Mecanum wheels (Lynch and Park 2017, section 13.2.1): each a fourth of its rim's speed."""
+    assert run(["wheels", "--duty-pct", "40", "--model", "m.toml", *PUBLISHER]) == 0
+    StandIn(monkeypatch).run(folder / "p.py", monkeypatch)
+    _, *rows = (folder / "p_sent.csv").read_text().split()
+    sent = np.array([row.split(",")[1:] for row in rows], float)
+    signs = [(1, -1, -1), (1, 1, 1), (1, 1, -1), (1, -1, 1)]  # fl, fr, rl, rr
+    each = 0.4 * 0.36 / 4 * np.array(signs) / (1, 1, 0.126)
+    driven = sent[sent.any(axis=1)]
+    np.testing.assert_allclose(driven, np.column_stack([each, -each]).reshape(8, 3), atol=1e-5)
 
 
 def test_a_publisher_waits_until_someone_listens(folder, monkeypatch):

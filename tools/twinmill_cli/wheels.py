@@ -21,6 +21,7 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.data.log import read_log
+    from twinmill.experiment.played import Rows
     from twinmill.experiment.wheel_signs import (
         Column,
         WheelSigns,
@@ -102,7 +103,7 @@ def _twists(model: native.Model, t_s: np.ndarray, values: np.ndarray, end_s: flo
     """Velocities as they are; those that duties lead to."""
     if model.drive == "twist":
         return TwistScript(t_s, values, end_s)
-    return TwistScript.of(model, t_s, values / 100, end_s)
+    return TwistScript.of(model, Rows(t_s, values / 100, end_s))
 
 
 def _shown(signs: WheelSigns) -> list:

@@ -124,7 +124,7 @@ def _wander(
     p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], sizes: dict[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """(S,) shares of each kernel and size in the probability of its dependence."""
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for word in dict.fromkeys(map(dependence_of, sizes)):
         own = {name: chance for name, chance in sizes.items() if dependence_of(name) == word}
         there, whole = _probability(p, h, each, word), sum(c.sum() for c in own.values())

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """From beliefs to an answer: verdict, findings with their certainty, what the rest depends on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,7 +145,7 @@ def answer(table: Table) -> Answer:
     stale = sum(b.probability for b in every if b.entry.stale)
     if not something:
         refit = sum(b.probability for b in every if b.nothing and b.entry.stale)
-        verdict = "refit_enough" if refit > nothing / 2 else "model_adequate"
+        verdict: Verdict = "refit_enough" if refit > nothing / 2 else "model_adequate"
         verdict = verdict if nothing >= 0.5 else "cannot_tell"
     elif outside >= 0.5 or not findings:
         verdict = "outside_catalogue"
@@ -174,11 +175,11 @@ def _of_each(every: list[Belief]) -> dict[str, float]:
     return dict(sorted(p.items(), key=lambda item: -item[1]))
 
 
-def _likeliest(every: list[Belief], key):
-    total: dict = {}
+def _likeliest(every: list[Belief], key: Callable[[Belief], tuple[str, ...]]) -> tuple[str, ...]:
+    total: dict[tuple[str, ...], float] = {}
     for b in every:
         total[key(b)] = total.get(key(b), 0.0) + b.probability
-    return max(total, key=total.get)
+    return max(total, key=total.__getitem__)
 
 
 def _by_worth(best: tuple[str, ...], table: Table) -> list[str]:

@@ -8,6 +8,7 @@ out, too, but the base's numbers are those beside it, so that they do not stand 
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 
@@ -37,7 +38,7 @@ class Better:
     before: Comparison
     after: Comparison
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --output --json`."""
         return {
             "model": str(self.file.path),

@@ -14,6 +14,35 @@ LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual limit: each a fifth more
 
 
 @dataclass(frozen=True)
+class Where:
+    """Places or whiles at which an effect may act, G of them.
+
+    Attributes:
+        masks: (M, W) steps of each place, or from each moment on.
+        at: (G, Q) values of the parameters that say where or when.
+        ends: (G, 2) numbers of the masks at which each while begins and ends; None where each mask
+            is a place, or a while that does not end.
+    """
+
+    masks: np.ndarray
+    at: np.ndarray
+    ends: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits that an effect may set, G of them.
+
+    Attributes:
+        at: (G, P) values of its parameters.
+        changes: (G, W, C) change of the errors by each.
+    """
+
+    at: np.ndarray
+    changes: np.ndarray
+
+
+@dataclass(frozen=True)
 class Candidate:
     """An effect that may be added to a model.
 
@@ -21,20 +50,15 @@ class Candidate:
         name: of the effect.
         parameters: of its newest instance.
         columns: (k, W, C) change of the errors by each size at its default strength.
-        masks: (G, W) steps of each place, or from each moment on; None where it acts everywhere.
-        ends: (G', 2) numbers of the masks at which each while begins and ends, where masks alone
-            are no whiles.
-        at: (G, P) values that belong to these, or to limits; None where it has neither.
-        fixed: (G, W, C) change of the errors by limits, which have no size.
+        where: it may act; None for everywhere.
+        limits: it may set, which have no size; None where it has sizes.
     """
 
     name: str
     parameters: list[Parameter]
     columns: np.ndarray
-    masks: np.ndarray | None = None
-    ends: np.ndarray | None = None
-    at: np.ndarray | None = None
-    fixed: np.ndarray | None = None
+    where: Where | None = None
+    limits: Limits | None = None
 
     @property
     def sizes(self) -> list[int]:
@@ -65,9 +89,7 @@ def with_sizes(
     steps: Any,
     *,
     on: np.ndarray,
-    masks: np.ndarray | None = None,
-    ends: np.ndarray | None = None,
-    at: np.ndarray | None = None,
+    where: Where | None = None,
 ) -> Candidate:
     """An effect with a column for each of its sizes.
 
@@ -77,9 +99,7 @@ def with_sizes(
         model: with it.
         steps: of the log.
         on: (P,) values at which it does nothing, and acts everywhere.
-        masks: of its places or whiles, as of `Candidate`.
-        ends: of its whiles, too.
-        at: values that belong to these.
+        where: it may act, as of `Candidate`.
     """
     sizes = [k for k, p in enumerate(parameters) if is_size(p)]
     points = [on]
@@ -87,7 +107,7 @@ def with_sizes(
         points.append(on.copy())
         points[-1][k] = parameters[k].value
     errors = steps.errors(model, [p.name for p in parameters], np.array(points))
-    return Candidate(name, parameters, errors[0] - errors[1:], masks, ends, at)
+    return Candidate(name, parameters, errors[0] - errors[1:], where)
 
 
 def with_limits(name: str, parameters: list[Parameter], model: Any, steps: Any) -> Candidate:
@@ -103,5 +123,5 @@ def with_limits(name: str, parameters: list[Parameter], model: Any, steps: Any) 
         ]
     )
     errors = steps.errors(model, [p.name for p in parameters], np.vstack([usual, at]))
-    fixed = errors[0] - errors[1:]
-    return Candidate(name, parameters, fixed[:0], at=at, fixed=fixed)
+    changes = errors[0] - errors[1:]
+    return Candidate(name, parameters, changes[:0], limits=Limits(at, changes))

@@ -2,13 +2,14 @@
 """Effects of the catalogue that a model may lack, and what each would change in a log."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import twinmill_native as native
 
 from twinmill.data.track import Track
-from twinmill.inference.candidate import Candidate, with_limits, with_sizes
+from twinmill.inference.candidate import Candidate, Where, with_limits, with_sizes
 from twinmill.inference.steps import Steps
 from twinmill.model.parameters import (
     DURATION,
@@ -76,15 +77,16 @@ def candidate(name: str, model: native.Model, steps: Steps) -> Candidate:
     roles = [p.role for p in parameters]
     if "limit" in roles:
         return with_limits(name, parameters, model, steps)
-    masks, ends, at = None, None, None
+    grid = None
     on = np.array([p.usual for p in parameters])
     where = [k for k, r in enumerate(roles) if r in WHERE_OR_WHEN and r != DURATION]
     if where:
-        masks, ends, at = _places(steps) if "place" in roles else _whiles(steps, len(where))
+        grid = _places(steps) if "place" in roles else _whiles(steps, len(where))
         on[where] = _everywhere([parameters[k] for k in where], steps)
         at_once_s = on[[k for k, r in enumerate(roles) if r == DURATION]]
-        at = np.column_stack([at, np.tile(at_once_s, (len(at), 1))])
-    return with_sizes(name, parameters, model, steps, on=on, masks=masks, ends=ends, at=at)
+        at = np.column_stack([grid.at, np.tile(at_once_s, (len(grid.at), 1))])
+        grid = replace(grid, at=at)
+    return with_sizes(name, parameters, model, steps, on=on, where=grid)
 
 
 def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
@@ -94,8 +96,8 @@ def _everywhere(where: list[Parameter], steps: Steps) -> list[float]:
     return [0.0, where[-1].max][: len(where)]
 
 
-def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
-    """Masks (G, W) of circles on the floor, no ends, and (G, 3) their centres and radii in m.
+def _places(steps: Steps) -> Where:
+    """Circles on the floor, and (G, 3) their centres and radii in m.
 
     They overlap by half, and reach into the floor from outside, too.
     """
@@ -113,16 +115,16 @@ def _places(steps: Steps) -> tuple[np.ndarray, None, np.ndarray]:
     x, y = steps.place.T
     inside = np.hypot(x - at[:, :1], y - at[:, 1:2]) < at[:, 2:]
     used = inside.any(axis=1)
-    return inside[used].astype(float), None, at[used]
+    return Where(inside[used].astype(float), at[used])
 
 
-def _whiles(steps: Steps, count: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
-    """Masks (M, W) of times from a moment on, (G, 2) pairs of these, and (G, count) times in s."""
+def _whiles(steps: Steps, count: int) -> Where:
+    """Times from a moment on, or between two, and (G, count) these in s."""
     t_s, begin_s = steps.t_s, steps.logs[0].measurement.track.command_t_s[0]
     grid_s = np.linspace(t_s[0], t_s[-1], MOMENTS + 2)[1:-1]
     masks = (t_s >= grid_s[:, None]).astype(float)
     if count == 1:
-        return masks, None, (grid_s - begin_s)[:, None]
+        return Where(masks, (grid_s - begin_s)[:, None])
     ends = np.column_stack(np.triu_indices(len(grid_s), 1))
     ends = ends[grid_s[ends[:, 1]] - grid_s[ends[:, 0]] >= LEAST_S]
-    return masks, ends, grid_s[ends] - begin_s
+    return Where(masks, grid_s[ends] - begin_s, ends)

@@ -7,7 +7,7 @@ each has, so that a size of one is a gain error of one (Rasmussen and Williams 2
 A kernel's size is integrated over SIZES.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -232,7 +232,7 @@ def _of_past(m: Motion) -> Iterator[Form]:
     yield "turning after turning back", _pushes(m, np.array(back), "turn"), 1 / 6
 
 
-def _terms(terms, usual: np.ndarray) -> np.ndarray:
+def _terms(terms: Sequence[tuple[np.ndarray, int]], usual: np.ndarray) -> np.ndarray:
     """(K, W, 3) of pairs of a unitless term (W,) and the axis that it moves."""
     out = np.zeros((len(terms), len(terms[0][0]), 3))
     for k, (term, axis) in enumerate(terms):
@@ -280,7 +280,7 @@ def _pushes(m: Motion, waves: np.ndarray, frame: str) -> np.ndarray:
     return np.concatenate([on * np.column_stack(way) * m.usual for way in ways])
 
 
-def _compass(m: Motion, orders) -> np.ndarray:
+def _compass(m: Motion, orders: Iterable[int]) -> np.ndarray:
     """(2 K, W, 3) of a heading that is read wrong by harmonics of itself."""
     out = []
     for n in orders:
@@ -309,7 +309,7 @@ def waves(
     return waves, share / share.sum()
 
 
-def harmonics(angle_rad: np.ndarray, orders) -> np.ndarray:
+def harmonics(angle_rad: np.ndarray, orders: Iterable[int]) -> np.ndarray:
     """(2 K, W) sines and cosines of an angle, of mean square one."""
     each = [(np.cos(n * angle_rad), np.sin(n * angle_rad)) for n in orders]
     return np.sqrt(2) * np.concatenate(each)

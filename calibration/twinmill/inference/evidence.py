@@ -205,7 +205,9 @@ class Linear:
         return -0.5 * np.bincount(block, self.residuals**2)
 
 
-def gains_by_size(gram: np.ndarray, push: np.ndarray, sizes) -> tuple[np.ndarray, np.ndarray]:
+def gains_by_size(
+    gram: np.ndarray, push: np.ndarray, sizes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Gain in log evidence by w ~ N(0, size^2), for each size, and the fall of the squares.
 
     Args:

@@ -8,7 +8,7 @@ log, as has the base beside it. Products of columns are enough for that, whichev
 for (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63; Bishop 2006, ch. 3.3).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -40,7 +40,11 @@ class Hidden:
 
     @classmethod
     def of(
-        cls, columns: dict[str, Candidate], linear: Linear, whiten, root: np.ndarray
+        cls,
+        columns: dict[str, Candidate],
+        linear: Linear,
+        whiten: Callable[[np.ndarray], np.ndarray],
+        root: np.ndarray,
     ) -> "Hidden":
         """Evidence from one's own log.
 
@@ -52,7 +56,7 @@ class Hidden:
         """
         names, unit, white = [], [], [linear.x[:0]]
         for name, c in columns.items():
-            if c.masks is None and c.fixed is None and len(c.columns):
+            if c.where is None and c.limits is None and len(c.columns):
                 own = [c.parameters[k] for k in c.sizes]
                 names += [f"{name}.{key_of(p.name)}" for p in own]
                 unit += [PRIORS.size * (p.value - p.usual) for p in own]

@@ -27,24 +27,23 @@ RUNS_AWAY = 1e6  # m or rad in a step for a unit of a number: no slope, the moti
 SETTLED = 0.1  # units of the log posterior: less decides nothing
 LIMIT_SPREAD = 0.5  # prior of a limit about its start on the grid, relative: twice the grid's step
 LIMIT_STEP = 0.02  # of finite differences in a limit, relative: what it cuts off bends with it
+NO_SLOPES = np.zeros((0, 1, 1))
 
 
 @dataclass(frozen=True)
-class Hypothesis:
-    """A set of missing effects at its best numbers.
+class Guess:
+    """A set of missing effects at some numbers, not fitted yet.
 
     Numbers are `labels`: the base's, weights of its discrepancy, then those of effects.
 
     Attributes:
         effects: names, in the order in which they were added; a second of a kind is `name#2`.
-        model: with them, at the best numbers.
+        model: with them.
         labels: N of them; `named` (N,) says which are quantities of the model.
         mean, cov: (N,), (N, N) of the prior.
-        low, high, step, value: (N,) bounds, steps of finite differences, best numbers.
+        low, high, step, value: (N,) bounds, steps of finite differences, numbers.
         one_sided: (N,) numbers whose prior is half a normal distribution.
         grid: log evidence of what was integrated on a grid, by effect, less that of its best point.
-        slopes: (N, W, 3) change of the prediction with each number.
-        errors: (W, 3) at the best numbers.
     """
 
     effects: tuple[str, ...]
@@ -58,12 +57,10 @@ class Hypothesis:
     step: np.ndarray
     value: np.ndarray
     one_sided: np.ndarray
-    grid: dict[str, float] = field(default_factory=dict)
-    slopes: np.ndarray | None = field(default=None, repr=False)
-    errors: np.ndarray | None = field(default=None, repr=False)
+    grid: dict[str, float]
 
     @classmethod
-    def of_base(cls, model: Any, prior: Prior) -> "Hypothesis":
+    def of_base(cls, model: Any, prior: Prior) -> "Guess":
         """The base alone, at the prior's mean."""
         more = len(prior.mean) - len(prior.names)
         wide = np.full(more, np.inf)
@@ -81,6 +78,7 @@ class Hypothesis:
             step=np.r_[prior.step, np.ones(more)],
             value=value,
             one_sided=np.zeros(len(prior.mean), bool),
+            grid={},
         )
 
     @property
@@ -95,6 +93,19 @@ class Hypothesis:
         own = [n for n in self.effects if catalogue_name(n) == kind]
         every = [n for n in effect_names(self.model) if catalogue_name(n) == kind]
         return every[own.index(effect) - len(own)]
+
+
+@dataclass(frozen=True)
+class Hypothesis(Guess):
+    """A set of missing effects at its best numbers, to which its model is set.
+
+    Attributes:
+        slopes: (N, W, 3) change of the prediction with each number.
+        errors: (W, 3) at the best numbers.
+    """
+
+    slopes: np.ndarray = field(repr=False)
+    errors: np.ndarray = field(repr=False)
 
     def rows(self, fitter: "Fitter") -> np.ndarray:
         """(M, R) white slopes of named quantities, what the effects' span, and what is to explain.
@@ -192,26 +203,26 @@ class Fitter:
         """(K, K) their products."""
         return self.always @ self.always.T
 
-    def fit(self, h: Hypothesis, rounds: int = ROUNDS, known: int = 0) -> Hypothesis:
-        """Levenberg and Marquardt from its numbers; so many of the first slopes are kept."""
+    def fit(self, h: Guess, rounds: int = ROUNDS, kept: np.ndarray = NO_SLOPES) -> Hypothesis:
+        """Levenberg and Marquardt from its numbers; (K, W, 3) first slopes are kept."""
         precision = np.linalg.inv(h.cov)
         value, damping = np.clip(h.value, h.low, h.high), 1e-3
         errors, cost = self._cost(h, value, precision)
-        slopes, count = h.slopes, len(value)
+        count = len(value)
         white, gram = np.zeros((count, self.always.shape[1])), np.zeros((count, count))
         white[~h.named], gram[np.ix_(~h.named, ~h.named)] = self.always, self.gram_always
-        kept = np.arange(count) < known
+        fresh = np.arange(count) >= len(kept)
 
-        def take(rows: np.ndarray) -> None:
+        def take(rows: np.ndarray, slopes: np.ndarray) -> None:
             white[rows] = self.whiten(slopes[rows])
             gram[rows] = white[rows] @ white.T
             gram[:, rows] = gram[rows].T
 
-        if known:
-            take(np.flatnonzero(h.named & kept))
+        if len(kept):
+            take(np.flatnonzero(h.named & ~fresh), kept)
         for _ in range(rounds):
-            slopes = self._slopes(replace(h, value=value), slopes, known)
-            take(np.flatnonzero(h.named & ~kept))
+            slopes = self._slopes(replace(h, value=value), kept)
+            take(np.flatnonzero(h.named & fresh), slopes)
             curved = gram + precision
             pull = white @ self.whiten(errors) - precision @ (value - h.mean)
             fell = 0.0
@@ -226,23 +237,25 @@ class Fitter:
                 damping *= 10
             if fell < SETTLED:
                 break
-        return self.at(replace(h, value=value, slopes=slopes), errors, known)
+        return self.at(replace(h, value=value), errors, kept)
 
-    def at(self, h: Hypothesis, errors: np.ndarray | None = None, known: int = 0) -> Hypothesis:
+    def at(
+        self, h: Guess, errors: np.ndarray | None = None, kept: np.ndarray = NO_SLOPES
+    ) -> Hypothesis:
         """A hypothesis linear about its numbers, its model set to them.
 
         Args:
             h: with these numbers.
             errors: (W, 3) at them.
-            known: so many of the first slopes are kept.
+            kept: (K, W, 3) first slopes, as they were elsewhere.
         """
         model = h.model.copy()
         for name, v in zip(np.array(h.labels)[h.named], h.value[h.named], strict=True):
             model.set(str(name), float(v))
         if errors is None:
             errors = self.steps.errors(model)[0] - self._always(h)
-        found = replace(h, model=model, errors=errors)
-        return replace(found, slopes=self._slopes(found, h.slopes, known))
+        found = replace(h, model=model)
+        return Hypothesis(**{**vars(found), "slopes": self._slopes(found, kept), "errors": errors})
 
     def with_effect(
         self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float
@@ -270,7 +283,7 @@ class Fitter:
         cov = np.zeros((count + len(free),) * 2)
         cov[:count, :count] = h.cov
         cov[range(count, len(cov)), range(count, len(cov))] = std**2
-        grown = Hypothesis(
+        grown = Guess(
             effects=(*h.effects, effect),
             model=model,
             labels=(*h.labels, *(f"{instance}.{key_of(p.name)}" for p in free)),
@@ -285,9 +298,8 @@ class Fitter:
                 h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
             ],
             grid={**h.grid, effect: grid},
-            slopes=h.slopes,
         )
-        return self.fit(grown, known=count)
+        return self.fit(grown, kept=h.slopes)
 
     def without(self, h: Hypothesis, effect: str) -> Hypothesis:
         """The hypothesis without one of its effects, of several of a kind the last, fitted anew."""
@@ -307,9 +319,9 @@ class Fitter:
             grid={k: v for k, v in h.grid.items() if k != effect},
             **part,
         )
-        return self.fit(less, rounds=3, known=int(keep.sum()))
+        return self.fit(less, rounds=3, kept=less.slopes)
 
-    def _cost(self, h: Hypothesis, value: np.ndarray, precision) -> tuple[np.ndarray, float]:
+    def _cost(self, h: Guess, value: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, float]:
         """Errors (W, 3) at some numbers, and the negative log posterior."""
         names = np.array(h.labels)[h.named].tolist()
         errors = self.steps.errors(h.model, names, value[h.named])[0]
@@ -317,13 +329,13 @@ class Fitter:
         white, away = self.whiten(errors), value - h.mean
         return errors, float(0.5 * white @ white + 0.5 * away @ precision @ away)
 
-    def _slopes(self, h: Hypothesis, slopes: np.ndarray | None, known: int) -> np.ndarray:
-        """(N, W, 3) change of the prediction with each number; the first `known` are kept."""
-        count = len(h.value)
-        if known == count and slopes is not None:
-            return slopes
+    def _slopes(self, h: Guess, kept: np.ndarray) -> np.ndarray:
+        """(N, W, 3) change of the prediction with each number; (K, W, 3) first ones are kept."""
+        count, known = len(h.value), len(kept)
+        if known == count:
+            return kept
         out = np.empty((count, len(self.steps), len(self.steps.observed)))
-        out[:known] = slopes[:known] if known else 0.0
+        out[:known] = kept
         if not h.named.all():
             out[~h.named] = self.discrepancy
         fresh = np.flatnonzero(h.named & (np.arange(count) >= known))
@@ -345,7 +357,7 @@ class Fitter:
         out[fresh] = found
         return out
 
-    def _always(self, h: Hypothesis) -> np.ndarray | float:
+    def _always(self, h: Guess) -> np.ndarray | float:
         """(W, 3) the base's discrepancy at the best weights."""
         weights = h.value[~h.named]
         return np.tensordot(weights, self.discrepancy, 1) if len(weights) else 0.0

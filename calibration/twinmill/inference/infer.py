@@ -145,13 +145,15 @@ def infer_robots(
         ModelError: what the file keeps cannot be read.
     """
     robots, known = _robots(measurements), _robots(own)
-    found = []
-    for k, robot in enumerate(robots):
+
+    def judged(k: int, robot: int) -> Inference:
         of = f"R{robot:02d} ({k + 1} of {len(robots)}), " if len(robots) > 1 else ""
         runs = of_one_robot(measurements, HELD, ONE, robot)
         strange = robot not in known and set(known) & set(robots)
         own_logs = () if strange else own
-        found.append(infer(runs, model_file, own_logs, lambda s, of=of: progress(of + s)))
+        return infer(runs, model_file, own_logs, lambda said: progress(of + said))
+
+    found = [judged(k, robot) for k, robot in enumerate(robots)]
     return found or [infer(measurements, model_file, own, progress)]
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lasting errors of a model in its own logs, kept in its file as [fit.always]."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def as_table(always: Always) -> dict[str, Any]:
     }
 
 
-def _hidden(table: dict, numbers: int) -> Hidden:
+def _hidden(table: dict[str, Any], numbers: int) -> Hidden:
     """Effects that the base may have lacked; `numbers` of the base and beside it."""
     count = len(table["names"])
     gram = np.zeros((count, count))
@@ -103,5 +104,5 @@ def _hidden(table: dict, numbers: int) -> Hidden:
     )
 
 
-def _short(values) -> list[float]:
+def _short(values: Iterable[float]) -> list[float]:
     return [float(f"{value:.{DIGITS}g}") for value in values]

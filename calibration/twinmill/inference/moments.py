@@ -127,7 +127,8 @@ def find(linear: Linear, bank: Bank, gram: np.ndarray, worth: float) -> Found:
         - cross[: nodes - n] @ cross[n:].swapaxes(1, 2)
         for n in (0, *(length for length in LENGTHS if length < nodes))
     }
-    gains, on, done = [0.0], [], []
+    gains, on = [0.0], []
+    done: list[tuple[np.ndarray, np.ndarray]] = []
     for _ in range(MOST):
         each = [
             (*_best(near, push, length, way), length, way)

@@ -11,7 +11,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.inference import candidates, discrepancy, moments
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.duties import refined
-from twinmill.inference.hypothesis import Fitter, Hypothesis
+from twinmill.inference.hypothesis import Fitter, Guess, Hypothesis
 from twinmill.inference.noise import Course, Noise, Usual, first_noise
 from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
@@ -149,7 +149,7 @@ def problem_of(
         prior = with_always(prior, always, found)
         missed = _missed_by_formulas(steps, model, motion, always.effects)
         prior = prior.with_columns(_seen(missed, noise))
-    base = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
+    base = Fitter(steps, noise, prior.columns).fit(Guess.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
     wander = {k: discrepancy.in_another_log(p) for k, p in always.wander.items()} if always else {}
@@ -237,5 +237,6 @@ def _begin_noise(
 ) -> Noise:
     course = Course(float(np.median(steps.step_s)), steps.stretches, motion.pace)
     if always is not None:
-        return Noise(*np.exp(always.noise.logs), course)
+        sensor, drive, gain, memory_s = np.exp(always.noise.logs)
+        return Noise(sensor, drive, gain, memory_s, course)
     return first_noise(course, model_file.recorded_noise)

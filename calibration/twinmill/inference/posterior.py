@@ -7,6 +7,7 @@ dependence is the part that the effect's form does not take. The data cannot tel
 the last by likelihood where both hold the same columns; the prior of the sizes does.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,7 +99,7 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
     swells = table.swells.get(entry.effects)
     steps = [n for n in at_moments if n != swells] if len(at_moments) > 1 else []
 
-    def once(effects) -> tuple[str, ...]:
+    def once(effects: Iterable[str]) -> tuple[str, ...]:
         return tuple(n for n in dict.fromkeys(map(catalogue_name, effects)) if n not in steps)
 
     again = steps and swells is None and TIME not in entry.words

@@ -226,8 +226,8 @@ def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
     told = [k for k in own if k < count]
     cov[np.ix_(told, told)] += drift([prior.names[k] for k in told], mean[told])
     for k in own:  # what the base lacks is known less well than its own numbers
-        size = 1.0 if k >= count else 0.0 if _is_base(labels[k]) else mean[k]
-        cov[k, k] += (PRIORS.sheet * size) ** 2
+        scale = 1.0 if k >= count else 0.0 if _is_base(labels[k]) else mean[k]
+        cov[k, k] += (PRIORS.sheet * scale) ** 2
     return replace(
         prior, mean=mean, cov=cov, columns=np.concatenate(columns) if columns else prior.columns
     )

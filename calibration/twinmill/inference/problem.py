@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any, Protocol, SupportsIndex
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class View:
         """Constant by which each log evidence under this noise is less."""
         return float(self.log_sizes.sum())
 
-    def white(self, f: int) -> np.ndarray:
+    def white(self, f: SupportsIndex) -> np.ndarray:
         """(K, R) white columns of a kernel."""
         return self.stacked.columns[self.parts[f]]
 
@@ -188,7 +188,7 @@ class Problem(ABC):
         known &= self.prior.known
         value = np.where(known, np.clip(h.mean, h.low, h.high), h.value)
         fitter = Fitter(self.steps, self.noise, self.prior.columns)
-        return fitter.at(replace(h, value=value, slopes=None))
+        return fitter.at(replace(h, value=value))
 
     def columns(self, h: Hypothesis, names: Collection[str] | None = None) -> dict[str, Candidate]:
         """Change by each effect that a hypothesis lacks; of some effects, or of all.
@@ -210,7 +210,7 @@ def flexible_noise(p: Problem) -> Noise:
     base = p.told(p.base)
     free = [np.tensordot(np.linalg.cholesky(base.cov).T, base.slopes, 1)]
     for c in p.columns(base).values():
-        if c.masks is None and len(c.columns):
+        if c.where is None and len(c.columns):
             free.append(PRIORS.size * c.columns)
     free += [FLEXIBLE * k.columns for k in p.kernels]
     columns = np.concatenate(free)

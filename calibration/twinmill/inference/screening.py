@@ -8,7 +8,7 @@ from itertools import combinations, product
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
-from twinmill.inference.candidate import Candidate
+from twinmill.inference.candidate import Candidate, Limits
 from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Hypothesis
 from twinmill.inference.problem import Steps
@@ -46,13 +46,17 @@ def screened(linear: Linear, columns: dict[str, Candidate], whiten: Whiten) -> d
     """Gain of each effect beside a linear model."""
     each = {}
     for name, c in columns.items():
-        each[name] = _by_size(c, linear, whiten) if c.fixed is None else _fixed(c, linear, whiten)
+        if c.limits is None:
+            each[name] = _by_size(c, linear, whiten)
+        else:
+            each[name] = _by_limits(c.limits, linear, whiten)
     return each
 
 
 def gains_of_pairs(linear: Linear, white: dict[str, np.ndarray]) -> dict[tuple[str, str], float]:
     """Gain in log evidence by two effects together, for each pair of (k, R) white columns."""
-    parts, stacked = {}, np.concatenate([np.zeros((0, len(linear.y))), *white.values()])
+    stacked = np.concatenate([np.zeros((0, len(linear.y))), *white.values()])
+    parts: dict[str, np.ndarray] = {}
     for name, own in white.items():
         begin = sum(len(other) for other in parts.values())
         parts[name] = np.arange(begin, begin + len(own))
@@ -177,22 +181,23 @@ def _gains(
 
 
 def _by_size(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
-    masks = np.ones((1, c.columns.shape[1])) if c.masks is None else c.masks
+    masks = np.ones((1, c.columns.shape[1])) if c.where is None else c.where.masks
+    ends = None if c.where is None else c.where.ends
     white = PRIORS.size * np.stack([whiten(masks[:, :, None] * own) for own in c.columns], axis=1)
-    if c.ends is None:
+    if ends is None:
         gram, push = _products(white, linear)
     else:
-        gram, push = _products_of_whiles(white, c.ends, linear)
+        gram, push = _products_of_whiles(white, ends, linear)
     gains, solved = _gains(gram, push, c.one_sided)
     order, total = np.argsort(-gains), float(logsumexp(gains) - np.log(len(gains)))
     best = order[0]
-    if c.masks is None:
+    if c.where is None:
         starts = [_start(c, solved[best], np.zeros(0), [])]
     else:
         where = [k for k in range(len(c.parameters)) if k not in c.sizes]
         other = [k for k in order if solved[k, 0] * solved[best, 0] < 0][:1]
-        starts = [_start(c, solved[k], c.at[k], where) for k in (best, *other)]
-    columns = white[best] if c.ends is None else np.subtract(*white[c.ends[best]])
+        starts = [_start(c, solved[k], c.where.at[k], where) for k in (best, *other)]
+    columns = white[best] if ends is None else np.subtract(*white[ends[best]])
     return Screened(total, np.array(starts), total - float(gains[best]), columns)
 
 
@@ -206,10 +211,10 @@ def _start(c: Candidate, weights: np.ndarray, at: np.ndarray, where: list[int]) 
     return start
 
 
-def _fixed(c: Candidate, linear: Linear, whiten: Whiten) -> Screened:
+def _by_limits(limits: Limits, linear: Linear, whiten: Whiten) -> Screened:
     """An effect of limits, which has no size."""
-    white = whiten(c.fixed)
+    white = whiten(limits.changes)
     cross, push = linear.taken(white)
     gains = push - 0.5 * ((white**2).sum(axis=1) - (cross**2).sum(axis=1))
     best, total = int(np.argmax(gains)), float(logsumexp(gains) - np.log(len(gains)))
-    return Screened(total, c.at[[best]], total - float(gains[best]), white[[best]])
+    return Screened(total, limits.at[[best]], total - float(gains[best]), white[[best]])

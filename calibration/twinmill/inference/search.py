@@ -6,8 +6,9 @@ effect more, two at once, one exchanged, one left out.
 """
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from typing import SupportsIndex
 
 import numpy as np
 import twinmill_native as native
@@ -63,7 +64,7 @@ class Evidence:
     push: np.ndarray
     grams: list[np.ndarray]
 
-    def white(self, view: View, f: int) -> np.ndarray:
+    def white(self, view: View, f: SupportsIndex) -> np.ndarray:
         """(K, R) white columns of a kernel, without what the effects take."""
         return view.white(f) - self.inside[view.parts[f]] @ self.span
 
@@ -113,7 +114,7 @@ class Search:
 
     def polished(self, effects: tuple[str, ...]) -> Hypothesis:
         """A set fitted anew with all slopes where its numbers are now."""
-        self._keep(self.view.fitter.fit(replace(self.fitted[effects].hypothesis, slopes=None)))
+        self._keep(self.view.fitter.fit(self.fitted[effects].hypothesis))
         return self.fitted[effects].hypothesis
 
     def _exchange(self) -> None:
@@ -202,13 +203,13 @@ class Search:
             seen: what it would gain beside `told`.
         """
         fitter, start, grid = self.view.fitter, seen.starts[0], seen.grid
-        if c.masks is not None:
+        if c.where is not None:
             start, log_share = nearby(
                 c, seen.starts, *told, steps=fitter.steps, whiten=fitter.whiten
             )
             grid += log_share
         found = fitter.with_effect(h, c, start, grid)
-        if c.masks is not None or c.fixed is not None:
+        if c.where is not None or c.limits is not None:
             return found
         value = np.array([p.value for p in c.parameters])
         best = found.log_evidence(found.linear(fitter))

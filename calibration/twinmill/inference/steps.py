@@ -9,6 +9,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
+from twinmill.data.track import Track
 from twinmill.model.parameters import CLOCK
 
 STEP_S = 0.1  # shorter than the memories looked for, long against the time between poses
@@ -59,7 +60,9 @@ class Steps:
     def __len__(self) -> int:
         return len(self.t_s)
 
-    def errors(self, model: native.Model, names=(), values=None) -> np.ndarray:
+    def errors(
+        self, model: native.Model, names: Sequence[str] = (), values: np.ndarray | None = None
+    ) -> np.ndarray:
         """(B, W, 3) m and rad measured less predicted, for B rows of values of named quantities.
 
         Without names (1, W, 3) of the model as it stands.
@@ -99,7 +102,9 @@ class StepsOfLog:
             measured[:, 2] = end[:, 2] - start[:, 2]
         self.measured = measured[:, None]
 
-    def errors(self, model: native.Model, names=(), values=None) -> np.ndarray:
+    def errors(
+        self, model: native.Model, names: Sequence[str] = (), values: np.ndarray | None = None
+    ) -> np.ndarray:
         """(B, W, 3) as of `Steps`."""
         names = list(names) or [CLOCK]
         values = np.array([[model.get(CLOCK)]]) if values is None else np.atleast_2d(values)
@@ -124,7 +129,7 @@ class StepsOfLog:
         return found.reshape(len(values), len(self.t_s), 3)
 
 
-def _cut(track) -> tuple[np.ndarray, np.ndarray, list[slice]]:
+def _cut(track: Track) -> tuple[np.ndarray, np.ndarray, list[slice]]:
     """Poses at which steps start and end, and the stretches of steps."""
     period_s = track.timing.pose_period_s
     every_s = max(1, round(STEP_S / period_s)) * period_s
@@ -186,7 +191,12 @@ class Motion:
         return np.sqrt(((self.moved / self.usual) ** 2).sum(axis=1) / 2)
 
 
-def motion_of(steps: Steps, moved: np.ndarray, instant: np.ndarray, scale=None) -> Motion:
+def motion_of(
+    steps: Steps,
+    moved: np.ndarray,
+    instant: np.ndarray,
+    scale: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Motion:
     """The motion of a log; `scale` (usual, top) is that of the base's own log, if it is known."""
     return Motion(
         moved, instant, steps.t_s, steps.step_s, steps.place, steps.heading,

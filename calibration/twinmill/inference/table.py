@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of evidence: sets of effects, each alone and with nameless dependences."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -12,7 +13,7 @@ from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP, TIME
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
-from twinmill.inference.moments import MOMENTS, Rate
+from twinmill.inference.moments import MOMENTS, Moment, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Kinds, Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
@@ -168,7 +169,10 @@ def table_of(search: Search) -> Table:
     )
 
 
-def _likeliest_of_each(entries: list[Entry]) -> dict[tuple, Entry]:
+_Case = tuple[tuple[str, ...], bool, frozenset[str]]  # effects, stale base, dependences
+
+
+def _likeliest_of_each(entries: list[Entry]) -> dict[_Case, Entry]:
     """Entry with the most evidence for each set of effects, kind of base and dependences."""
     order = sorted(entries, key=lambda e: e.log_evidence)
     return {(e.effects, e.stale, frozenset(e.words)): e for e in order}
@@ -397,7 +401,9 @@ class _Comparison:
                     best = gain, replace(beside, white=both, log_chance=likely)
         return [best[1]] if best[0] else []
 
-    def _price(self, bare: Linear, white: np.ndarray, on, chance: float) -> np.ndarray:
+    def _price(
+        self, bare: Linear, white: np.ndarray, on: Sequence[Moment], chance: float
+    ) -> np.ndarray:
         """(B,) change of the evidence by moments less that of the density, in their blocks."""
         block, count = self.view.block, self.view.block.max() + 1
         if not len(on):
@@ -524,7 +530,7 @@ class _Comparison:
             each = each.reshape(len(relative), likely.size)
             mimicked = np.logaddexp.reduce(each, axis=1) - total
         f, s = np.unravel_index(likely.argmax(), likely.shape)
-        linear = own.with_kernel(self.view, at[f], SIZES[s])
+        linear = own.with_kernel(self.view, at[f], float(SIZES[s]))
         return self._entry(
             beside,
             linear,

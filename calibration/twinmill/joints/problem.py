@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from twinmill.inference.candidate import Candidate, with_limits, with_sizes
-from twinmill.inference.hypothesis import Fitter, Hypothesis
+from twinmill.inference.hypothesis import Fitter, Guess
 from twinmill.inference.noise import Course, Noise, Usual
 from twinmill.inference.prior import Prior
 from twinmill.inference.problem import Kinds, Problem, flexible_noise
@@ -103,7 +103,7 @@ def problem_of(
     effects, model, prior = begun(plant, always)
     steps = Steps(plant, about and about.of(model.catalogue))
     noise = _begin_noise(steps, model)
-    fitted = Fitter(steps, noise, prior.columns).fit(Hypothesis.of_base(model, prior))
+    fitted = Fitter(steps, noise, prior.columns).fit(Guess.of_base(model, prior))
     kinds = Kinds({name: effect.words() for name, effect in effects.items()})
     found = dependences.kernels(plant)
     p = JointProblem(

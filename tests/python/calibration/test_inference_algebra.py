@@ -279,6 +279,7 @@ def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_log
         step=np.ones(4),
         value=np.zeros(4),
         one_sided=np.zeros(4, bool),
+        grid={},
         slopes=later[:, :, None],
         errors=y_later[:, None],
     )
