@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from twinmill.inference.answer import Answer
+from twinmill_cli.frame import Given
 from twinmill_cli.infer import _mending
 
 
@@ -26,7 +27,8 @@ def answer(verdict, *added):
     ],
 )
 def test_a_model_is_offered_that_has_what_lasts(said, new):
-    typed = [c for _, c in _mending(said, "lab infer", [Path("run.lcmlog")], "base.toml")]
+    given = Given([Path("run.lcmlog")], "base.toml", None, None)
+    typed = [c for _, c in _mending(said, "lab infer", given)]
     assert typed == ([f"twinmill lab infer run.lcmlog --model base.toml -o {new}"] if new else [])
 
 
@@ -51,6 +53,8 @@ def test_diagnose_and_explain_with_the_models_own_log_find_what_came_since(
     (effect,) = tomllib.loads(better.read_text())["effect"]
     assert effect["name"] == "coasting"
     assert effect["deceleration_mps2"] == pytest.approx(0.7, rel=0.1)
+    code, out, _ = twinmill("diagnose", log, "--model", better, "--json")
+    assert code == 0 and json.loads(out)["probability"]["nothing"] > 0.5
 
 
 def test_the_page_of_a_diagnosis_shows_its_probabilities(

@@ -24,7 +24,7 @@ if working():  # not for --help
     import twinmill_native as native
 
     from twinmill.data.log import read_log
-    from twinmill.data.measurement import Measurements
+    from twinmill.data.measurement import Measurement, Measurements
     from twinmill.data.steady_table import is_steady_table
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.diagnosis.first_sight import at_first_sight
@@ -34,13 +34,14 @@ if working():  # not for --help
     from twinmill.model.model_file import ModelFile
     from twinmill.provenance import Provenance
     from twinmill_cli.frame import (
+        Given,
         command_line,
         finish,
         is_mjcf,
-        load,
         open_model,
         option,
         provenance,
+        read,
         told,
     )
 if TYPE_CHECKING:
@@ -74,7 +75,8 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
 
-    With the log that the model was fitted to, each effect has a probability:
+    With the log that the model was fitted to, each effect has a probability, as it
+    has with a model that keeps what it misses there:
     twinmill diagnose run.lcmlog --model fitted.toml --own calibration.lcmlog
 
     Of a robot that MuJoCo can load:
@@ -84,14 +86,16 @@ def _diagnose(
         from twinmill_cli.joints import diagnosed  # MuJoCo's Python is slow to import
 
         return diagnosed(logs, model, own=own or [], as_json=as_json, out=out)
-    if own:
-        from twinmill_cli.infer import inferred  # slow to import, as what follows is
-
-        return inferred("diagnose", logs, model, own=own, as_json=as_json, out=out)
     native.keep_memory()  # what the work frees it wants again
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
+    with _told_if_stopped(source, as_json):
+        given = read(logs, model, model_file)
+        if own or keeps_its_error(given):
+            from twinmill_cli.infer import inferred  # slow to import
+
+            return inferred("diagnose", given, own=own or [], as_json=as_json, out=out)
+    measurements = given.measurements
     with _told_if_stopped(source, as_json), telling(f"diagnosing with {model}") as progress:
-        measurements = load(logs, model_file)
         _hint(measurements, model_file)
         result = diagnose(measurements, model_file, progress, stoppable=True)
     swarm = None
@@ -112,6 +116,15 @@ def _diagnose(
         out=out,
     )
     return result
+
+
+def keeps_its_error(given: Given) -> bool:
+    """True if the file tells what its model always misses, and one robot's logs are judged.
+
+    Several robots are compared with each other, and tables read, by the older engine alone.
+    """
+    of = {m.track.robot_id if isinstance(m, Measurement) else None for m in given.measurements}
+    return "always" in given.model_file.fit and len(of) == 1 and None not in of
 
 
 def _shown() -> ModuleType:
@@ -280,12 +293,20 @@ def _explain(
         return of_joints(
             *(logs, model, output), own=own or [], force=force, as_json=as_json, out=out
         )
-    if own:
+    native.keep_memory()  # what the work frees it wants again
+    verb = "explain" if formula else "explain --no-formula"
+    source = provenance(
+        command_line(verb, logs, model, output), model_file := open_model(model, out)
+    )
+    check_new_file(output, force, [model_file.path, *logs, *(own or [])])
+    with _told_if_stopped(source, as_json):
+        given = read(logs, model, model_file)
+    if own or keeps_its_error(given):
         from twinmill_cli.infer import inferred  # as in diagnose
 
         return inferred(
-            *("explain", logs, model),
-            own=own,
+            *("explain", given),
+            own=own or [],
             output=output,
             force=force,
             as_json=as_json,
@@ -293,14 +314,8 @@ def _explain(
         )
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
-    verb = "explain" if formula else "explain --no-formula"
-    native.keep_memory()  # what the work frees it wants again
-    source = provenance(
-        command_line(verb, logs, model, output), model_file := open_model(model, out)
-    )
-    check_new_file(output, force, [model_file.path, *logs])
+    measurements = given.measurements
     with _told_if_stopped(source, as_json), telling(f"explaining with {model}") as progress:
-        measurements = load(logs, model_file)
         _hint(measurements, model_file)
         result = explain(
             measurements,

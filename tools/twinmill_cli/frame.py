@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from twinmill.provenance import Provenance
 from twinmill.version import __version__
 from twinmill_cli.exit_now import STOPPED
 from twinmill_cli.options import repeated
-from twinmill_cli.output import CHANGED, deliver, say
+from twinmill_cli.output import CHANGED, deliver, say, telling
 
 if TYPE_CHECKING:  # slow to import, and JSON needs none of it
     from types import ModuleType
@@ -83,6 +84,29 @@ def load(logs: list[Path], model_file: ModelFile) -> Measurements:
     for sentence in [*measurements.excluded, *mild]:
         say(sentence)
     return measurements
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a command judges, as it was typed and as it was read.
+
+    Attributes:
+        logs: files.
+        model: file or name.
+        model_file: the model.
+        measurements: of the logs.
+    """
+
+    logs: list[Path]
+    model: str
+    model_file: ModelFile
+    measurements: Measurements
+
+
+def read(logs: list[Path], model: str, model_file: ModelFile) -> Given:
+    """Reads logs as `load`, and tells so while it lasts."""
+    with telling(f"reading {', '.join(log.name for log in logs)}"):
+        return Given(logs, model, model_file, load(logs, model_file))
 
 
 def told(measurements: Measurements) -> dict:

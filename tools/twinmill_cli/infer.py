@@ -26,11 +26,13 @@ if working():  # not for --help
     from twinmill.model.parameters import with_role
     from twinmill.report.inference import section, sentence, terminal_of_robots
     from twinmill_cli.frame import (
+        Given,
         command_line,
         finish,
         load,
         open_model,
         provenance,
+        read,
         told,
         with_own,
     )
@@ -92,8 +94,7 @@ def _infer(
     """
     return inferred(
         "lab infer",
-        logs,
-        model,
+        read(logs, model, open_model(model, out)),
         own=own or [],
         keep=keep,
         output=output,
@@ -105,8 +106,7 @@ def _infer(
 
 def inferred(
     verb: str,
-    logs: list[Path],
-    model: str,
+    given: Given,
     *,
     own: list[Path],
     keep: Path | None = None,
@@ -119,8 +119,7 @@ def inferred(
 
     Args:
         verb: of the command that was typed.
-        logs: of one robot or several.
-        model: file or name.
+        given: logs of one robot or several, and the model.
         own: logs that the model was fitted to.
         keep: where the model is written with what it misses in these.
         output: where the model is written with what is missing.
@@ -134,43 +133,38 @@ def inferred(
     native.keep_memory()  # what the work frees it wants again
     name, typed = verb.split()[-1], with_own(verb, own)
     typed += f" --keep {shlex.quote(str(keep))}" if keep else ""
-    source = provenance(
-        command_line(typed, logs, model, output), model_file := open_model(model, out)
-    )
+    source = provenance(command_line(typed, given.logs, given.model, output), given.model_file)
     if keep is not None and not own:
         raise ValueError(f"{name}: --keep stores what --own shows; give the model's own log, too.")
     for path in filter(None, (keep, output)):
-        check_new_file(path, force, [model_file.path, *logs, *own])
+        check_new_file(path, force, [given.model_file.path, *given.logs, *own])
     if keep is not None and keep == output:
         raise ValueError(f"{name}: --keep and -o are both {keep}; give each a file of its own.")
-    with telling(f"inferring with {model}") as progress, threadpool_limits(1, "blas"):
-        measurements = load(logs, model_file)
-        robots = {track.robot_id for _, track in measurements.tracks}
+    with telling(f"inferring with {given.model}") as progress, threadpool_limits(1, "blas"):
+        robots = {track.robot_id for _, track in given.measurements.tracks}
         if (keep or output) and len(robots) > 1:
             raise ValueError(
                 f"{name}: {'--keep' if keep else '-o'} writes what one robot's log tells, and "
                 f"these are {len(robots)} robots; give logs of one robot."
             )
-        before = load(own, model_file) if own else ()
-        results = infer_robots(measurements, model_file, before, progress)
+        before = load(own, given.model_file) if own else ()
+        results = infer_robots(given.measurements, given.model_file, before, progress)
         written = None
         if output is not None:
             from twinmill.inference.better import better  # slow, and judging needs none
 
             progress("what the new model still misses in these logs")
-            written = better(results[0], model_file, output, source.command)
+            written = better(results[0], given.model_file, output, source.command)
     if keep is not None:
-        with_kept(model_file, results[0].always, keep, source.command).write(force)
+        with_kept(given.model_file, results[0].always, keep, source.command).write(force)
     if written:
         written.file.write(force)
     each = [{"sentence": sentence(result.answer), **result.to_json()} for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
     writes = with_own("explain" if verb == "diagnose" else verb, own)
-    commands = (
-        [] if written or len(results) > 1 else _mending(results[0].answer, writes, logs, model)
-    )
+    commands = [] if written or len(results) > 1 else _mending(results[0].answer, writes, given)
     data = {**data, **(written.to_json() if written else {})}
-    data |= {"commands": [command for _, command in commands], **told(measurements)}
+    data |= {"commands": [command for _, command in commands], **told(given.measurements)}
     finish(
         data,
         None if as_json else terminal_of_robots(results, commands, written),
@@ -182,7 +176,7 @@ def inferred(
     return results
 
 
-def _mending(answer: Answer, verb: str, logs: list[Path], model: str) -> list[tuple[str, str]]:
+def _mending(answer: Answer, verb: str, given: Given) -> list[tuple[str, str]]:
     """Reason and command for the model that has what is missing.
 
     What is of a moment of these logs is added to none.
@@ -191,5 +185,10 @@ def _mending(answer: Answer, verb: str, logs: list[Path], model: str) -> list[tu
     if not lasting and answer.verdict != "refit_enough":
         return []
     why = f"To add {' and '.join(lasting)}" if lasting else "To refit the base"
-    new = Path(f"{Path(model).stem}_{'_'.join(lasting) or 'fitted'}.toml")
-    return [(f"{why}, and see by how much the error falls", command_line(verb, logs, model, new))]
+    new = Path(f"{Path(given.model).stem}_{'_'.join(lasting) or 'fitted'}.toml")
+    return [
+        (
+            f"{why}, and see by how much the error falls",
+            command_line(verb, given.logs, given.model, new),
+        )
+    ]
