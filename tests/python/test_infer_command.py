@@ -5,6 +5,7 @@ import json
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from twinmill.inference.answer import Answer
@@ -43,7 +44,7 @@ def test_diagnose_and_explain_with_the_models_own_log_find_what_came_since(
     assert code == 0
     assert found["findings"][0]["effect"] == "coasting"
     assert found["command"].startswith("twinmill diagnose --own ")
-    (then,) = found["commands"]
+    then, *_ = found["commands"]
     assert then.startswith("twinmill explain --own ")
     better = tmp_path / "better.toml"
     code, out, _ = twinmill("explain", log, *model, *own, "-o", better, "--json")
@@ -71,3 +72,27 @@ def test_the_page_of_a_diagnosis_shows_its_probabilities(
         assert shown in page
     assert found["score_after"] < min(found["score_refit"], found["score"])
     assert found["ranking"][0]["effect"] == found["found"][0] == "coasting"
+
+
+def test_a_run_is_designed_for_what_probabilities_leave_open(
+    twinmill, brief_coasting_robot, brief_log_without_coasting, tmp_path
+):
+    """The robot rolls on, so that is in question; the script keeps within duty and time."""
+    given = [brief_coasting_robot.log, "--model", brief_coasting_robot.model]
+    script = tmp_path / "next.csv"
+    options = ["--duration-s", "15", "--max-duty-pct", "60", "-o", script, "--json"]
+    code, out, _ = twinmill("next", *given, "--own", brief_log_without_coasting, *options)
+    assert code == 0
+    assert "coasting" in {row["effect"] for row in json.loads(out)["effects"]}
+    rows = np.loadtxt(script, delimiter=",", skiprows=1)
+    assert np.abs(rows[:, 1:]).max() <= 60
+    assert rows[-1, 0] <= 15
+
+
+def test_a_run_for_a_swarm_takes_no_own_log(twinmill, brief_coasting_robot, tmp_path):
+    """Refused in one sentence, with nothing written."""
+    given = [brief_coasting_robot.log, "--model", brief_coasting_robot.model]
+    own = ["--own", brief_coasting_robot.log, "--for", "milling", "-o", tmp_path / "next.csv"]
+    code, _, err = twinmill("next", *given, *own)
+    assert code == 1 and "leave --own away" in err
+    assert not [*tmp_path.iterdir()]

@@ -24,17 +24,17 @@ if working():  # not for --help
     import twinmill_native as native
 
     from twinmill.data.log import read_log
-    from twinmill.data.measurement import Measurement, Measurements
+    from twinmill.data.measurement import Measurements
     from twinmill.data.steady_table import is_steady_table
     from twinmill.diagnosis.diagnose import diagnose
     from twinmill.diagnosis.first_sight import at_first_sight
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.diagnosis.stopped import NOTHING_TRIED, stopped
     from twinmill.files import check_new_file
+    from twinmill.inference.infer import keeps_its_error
     from twinmill.model.model_file import ModelFile
     from twinmill.provenance import Provenance
     from twinmill_cli.frame import (
-        Given,
         command_line,
         finish,
         is_mjcf,
@@ -90,7 +90,7 @@ def _diagnose(
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json):
         given = read(logs, model, model_file)
-        if own or keeps_its_error(given):
+        if own or keeps_its_error(given.measurements, model_file):
             from twinmill_cli.infer import inferred  # slow to import
 
             return inferred("diagnose", given, own=own or [], as_json=as_json, out=out)
@@ -116,15 +116,6 @@ def _diagnose(
         out=out,
     )
     return result
-
-
-def keeps_its_error(given: Given) -> bool:
-    """True if the file tells what its model always misses, and one robot's logs are judged.
-
-    Several robots are compared with each other, and tables read, by the older engine alone.
-    """
-    of = {m.track.robot_id if isinstance(m, Measurement) else None for m in given.measurements}
-    return "always" in given.model_file.fit and len(of) == 1 and None not in of
 
 
 def _shown() -> ModuleType:
@@ -301,7 +292,7 @@ def _explain(
     check_new_file(output, force, [model_file.path, *logs, *(own or [])])
     with _told_if_stopped(source, as_json):
         given = read(logs, model, model_file)
-    if own or keeps_its_error(given):
+    if own or keeps_its_error(given.measurements, model_file):
         from twinmill_cli.infer import inferred  # as in diagnose
 
         return inferred(

@@ -24,7 +24,7 @@ if working():  # not for --help
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import with_kept
     from twinmill.model.parameters import with_role
-    from twinmill.report.inference import section, sentence, terminal_of_robots
+    from twinmill.report.inference import next_run, section, sentence, terminal_of_robots
     from twinmill_cli.frame import (
         Given,
         command_line,
@@ -161,10 +161,16 @@ def inferred(
         written.file.write(force)
     each = [{"sentence": sentence(result.answer), **result.to_json()} for result in results]
     data = each[0] if len(each) == 1 else {"robots": each}
+    answer = results[0].answer if len(results) == 1 else None
     writes = with_own("explain" if verb == "diagnose" else verb, own)
-    commands = [] if written or len(results) > 1 else _mending(results[0].answer, writes, given)
+    mending = _mending(answer, writes, given) if answer and not written else []
+    settling = _settling(answer, given, own) if answer else []
+    commands = [*mending, *settling]
     data = {**data, **(written.to_json() if written else {})}
     data |= {"commands": [command for _, command in commands], **told(given.measurements)}
+    if answer and settling:
+        why, command = next_run(answer), settling[0][1]
+        data["next_experiment"] = {"separates": answer.open, "why": why, "command": command}
     finish(
         data,
         None if as_json else terminal_of_robots(results, commands, written),
@@ -192,3 +198,11 @@ def _mending(answer: Answer, verb: str, given: Given) -> list[tuple[str, str]]:
             command_line(verb, given.logs, given.model, new),
         )
     ]
+
+
+def _settling(answer: Answer, given: Given, own: list[Path]) -> list[tuple[str, str]]:
+    """Reason and command for the run that tells what is neither sure nor ruled out."""
+    if not answer.open or not (own or "always" in given.model_file.fit):
+        return []
+    verb = with_own("next", own)
+    return [("To design that run", command_line(verb, given.logs, given.model, Path("next.csv")))]

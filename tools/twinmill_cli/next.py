@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -35,6 +36,7 @@ if working():  # not for --help
         open_model,
         provenance,
         told,
+        with_own,
     )
     from twinmill_cli.ros_script import check_new_script, ros_path, write_script
 
@@ -116,7 +118,8 @@ def _next(
 
     Example: twinmill next run.lcmlog --model fitted.toml -o script.csv
 
-    Of an MJCF, which alone takes --own:
+    With --own, the log that the model was fitted to, all effects are in question
+    that are neither sure nor ruled out. Of an MJCF:
     twinmill next run.mcap --model arm.xml -o excitation.csv
     """
     if is_mjcf(model):
@@ -125,17 +128,19 @@ def _next(
         how_long = {"duration_s": duration_s, "times_speed": times_speed}
         told_too = {"own": own or [], "force": force, "as_json": as_json, "out": out}
         return designed(logs, model, output, **how_long, **told_too)
-    if own:
+    if own and behavior:
         raise ValueError(
-            "next: --own is for models in MJCF; a run for a robot on wheels is designed without it."
+            "next: --for draws models from the uncertainty of the fits, to which --own adds "
+            "nothing; leave --own away."
         )
     limits = Limits(duration_s, _sides(floor_m), max_duty_pct / 100)
     verb = f"next --duration-s {duration_s:g} --floor-m {floor_m} --max-duty-pct {max_duty_pct}"
     verb += f" --script-as {script_as}" if script_as else ""
+    verb = with_own(verb, own or [])
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
-    check_new_file(output, force, [model_file.path, *logs])
+    check_new_file(output, force, [model_file.path, *logs, *(own or [])])
     if script_as:
         check_new_script(script_as, ros_path(script_as, output), force)
     if behavior:
@@ -155,9 +160,10 @@ def _next(
         return narrowing
     with telling(f"designing a run with {model}") as progress:
         measurements = load(logs, model_file)
-        plan = plan_run(measurements, model_file, limits, progress)
+        before = load(own, model_file) if own else ()
+        plan = plan_run(measurements, model_file, limits, progress, own=before)
     write_whole(output, csv_text(plan.rows), force)
-    how = _how(plan, logs, model, output, form=script_as)
+    how = _how(plan, logs, model, output, form=script_as, own=own or [])
     data = {"script": str(output), **plan.to_json(), **told(measurements)}
     if script_as:
         twists = TwistScript.of(model_file.model, plan.rows)
@@ -201,6 +207,7 @@ def _how(
     script: Path,
     *,
     form: ScriptForm | None = None,
+    own: Sequence[Path] = (),
 ) -> present.How:
     """How to play the script, or what was written of it for ROS, and what to do then."""
     path, number = shlex.quote(str(script)), plan.robot_id
@@ -209,7 +216,7 @@ def _how(
         f"Written: {written}. Put the robot in the middle of the floor, its camera along the first "
         "side."
     )
-    then = command_line("diagnose", [*logs, Path("next.lcmlog")], model)
+    then = command_line(with_own("diagnose", [*own]), [*logs, Path("next.lcmlog")], model)
     if form:
         player = "ros2 bag play" if form is ScriptForm.BAG else "python3"
         steps = [

@@ -21,6 +21,7 @@ from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
+from twinmill.inference.infer import Inference, infer, keeps_its_error
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import base_parameters, catalogue_of
 from twinmill.predict.modelled_log import ModelledLog
@@ -130,29 +131,42 @@ def plan_run(
     model_file: ModelFile,
     limits: Limits,
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    own: Sequence[Measurement | SteadyTable] = (),
 ) -> Plan:
     """Diagnoses logs, and designs the run that best names what they leave open.
+
+    They are judged by probabilities where it is known what the model always misses.
 
     Args:
         measurements: the logs so far.
         model_file: that they are diagnosed with.
         limits: time, floor, duty.
         progress: told in words what is being done.
+        own: of the logs that the model was fitted to.
 
     Raises:
         ValueError: no script can be within these limits, or none shows what is in question.
     """
     check(measurements, model_file, limits)
-    return design(diagnose(measurements, model_file, progress), model_file, limits, progress)
+    found: Diagnosis | Inference
+    if own or keeps_its_error(measurements, model_file):
+        found = infer(measurements, model_file, own, progress)
+    else:
+        found = diagnose(measurements, model_file, progress)
+    return design(found, model_file, limits, progress)
 
 
 def design(
-    diagnosis: Diagnosis, model_file: ModelFile, limits: Limits, progress: Callable[[str], None]
+    found: Diagnosis | Inference,
+    model_file: ModelFile,
+    limits: Limits,
+    progress: Callable[[str], None],
 ) -> Plan:
     """Designs the run that best names what the diagnosis leaves open.
 
     Args:
-        diagnosis: of the logs so far.
+        found: diagnosis of the logs so far.
         model_file: that the diagnosis was given. Its score on other logs says what it lacks in
             drives that these logs do not have; its base is refitted to all that the run shows.
         limits: time, floor, duty; as `check` let them pass.
@@ -161,13 +175,13 @@ def design(
     Raises:
         ValueError: there is no log, or no move shows what is in question.
     """
-    logs = [o for o in diagnosis.opened if o.floor]
+    logs = [o for o in found.opened if o.floor]
     hashes = [o.measurement.log_sha256 for o in logs]
     usual = model_file.usual_score(hashes)
     moves = family(_axes([o.track for o in logs], model_file.model, limits))
     progress("playing the moves in the twin")
     names = base_names(model_file.model, logs, model_file.known_from_other_logs(hashes))
-    asked = hypotheses_of(diagnosis, base_parameters(model_file.model, names))
+    asked = hypotheses_of(found, base_parameters(model_file.model, names))
     modelled = log_of(asked.state.logs)
     predicted = Played.of([[m] for m in moves], modelled).modelled(modelled, CENTRE)
     known = candidate_effects(

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effects the next run must part, and the model without them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import twinmill_native as native
 
 from twinmill.diagnosis.finding import Ranked
 from twinmill.diagnosis.result import Diagnosis
@@ -12,6 +14,8 @@ from twinmill.diagnosis.trials import without_effect
 from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import CandidateEffect
 from twinmill.experiment.screen import screen
+from twinmill.fitting.opening import Opened
+from twinmill.inference.infer import Inference
 from twinmill.model.parameters import (
     Parameter,
     all_effect_parameters,
@@ -56,8 +60,28 @@ class Hypotheses:
     fitted: dict[str, dict[str, float]]
 
 
-def hypotheses_of(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
+def hypotheses_of(found: Diagnosis | Inference, base: list[Parameter]) -> Hypotheses:
     """Open questions of a diagnosis; `base`: of the model, also ones these logs cannot tell."""
+    return _inferred(found, base) if isinstance(found, Inference) else _diagnosed(found, base)
+
+
+def _inferred(found: Inference, base: list[Parameter]) -> Hypotheses:
+    """Effects that are neither sure nor ruled out are alike; else those named are in question."""
+    answer, once = found.answer, beginning_at_a_moment()  # another run cannot show the latter
+    unsure = [name for name in answer.open if name not in once]
+    sure = [f.effect for f in answer.findings if f.certainty == "sure" and f.effect not in once]
+    alike = unsure if len(unsure) > 1 else []
+    return Hypotheses(
+        alike,
+        [] if alike else [*sure, *unsure],
+        [],
+        [*answer.effects][:2],
+        _state(found.opened, found.opened[0].model, base),
+        {f.effect: {name: v for name, (v, _) in f.numbers.items()} for f in answer.findings},
+    )
+
+
+def _diagnosed(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
     ranking = diagnosis.ranking
     top = next((r.group for r in ranking if r.group is not None), None)
     alike = [r.effect for r in ranking if r.group == top and top is not None]
@@ -143,10 +167,13 @@ def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> S
     last = diagnosis.search.last
     for name in names:
         last = without_effect(last, name) or last
-    model = last.state.model
+    return _state(diagnosis.opened, last.state.model, base)
+
+
+def _state(opened: Sequence[Opened], model: native.Model, base: list[Parameter]) -> State:
     logs = [
         (log.with_model(model), o.floor.rms)
-        for o in diagnosis.opened
+        for o in opened
         if o.floor and o.data is not None and isinstance(log := o.modelled(), ModelledLog)
     ]
     free = [p.at(model.get(p.name)) for p in [*base, *all_effect_parameters(model)]]

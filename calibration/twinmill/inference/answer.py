@@ -86,6 +86,11 @@ class Answer:
     numbers: Numbers
     refit: Numbers
 
+    @property
+    def open(self) -> list[str]:
+        """Effects that are neither sure nor ruled out, likeliest first."""
+        return [name for name, p in self.effects.items() if PRIORS.member <= p < PRIORS.sure]
+
     def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         findings = [f.to_json() for f in self.findings]

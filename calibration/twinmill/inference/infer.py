@@ -8,7 +8,7 @@ from typing import Any
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.opening import open_measurements
+from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
 from twinmill.inference.discrepancy import SIZES
@@ -41,6 +41,7 @@ class Inference:
         before: these logs and the model as given.
         refitted: with the base's numbers where nothing is missing.
         after: with the likeliest set of effects.
+        opened: these logs with the model of `refitted`.
     """
 
     answer: Answer
@@ -49,6 +50,7 @@ class Inference:
     before: Comparison
     refitted: Comparison
     after: Comparison
+    opened: Sequence[Opened]
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --json`."""
@@ -108,21 +110,34 @@ def infer(
 def _scored(
     found: Answer, runs: Sequence[Measurement], always: Always | None, model_file: ModelFile
 ) -> Inference:
-    opened = open_measurements(runs, model_file)
+    given = open_measurements(runs, model_file)
     there = always.effects if always else ()
 
-    def score(numbers: Numbers, effects: Sequence[str]) -> Comparison:
-        model = found_model(opened[0].model, numbers, effects).model
-        return comparison(model_file, [o.aligned(model) for o in opened])
+    def under(numbers: Numbers, effects: Sequence[str]) -> list[Opened]:
+        model = found_model(given[0].model, numbers, effects).model
+        return [o.aligned(model) for o in given]
 
+    base = under(found.refit, there)
     return Inference(
         found,
         runs,
         always,
-        before=comparison(model_file, opened),
-        refitted=score(found.refit, there),
-        after=score(found.numbers, (*there, *found.added)),
+        before=comparison(model_file, given),
+        refitted=comparison(model_file, base),
+        after=comparison(model_file, under(found.numbers, (*there, *found.added))),
+        opened=base,
     )
+
+
+def keeps_its_error(
+    measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile
+) -> bool:
+    """True if the file tells what its model always misses, and one robot's logs are judged.
+
+    Several robots are compared with each other, and tables read, by the older engine alone.
+    """
+    robots = {m.track.robot_id if isinstance(m, Measurement) else None for m in measurements}
+    return "always" in model_file.fit and len(robots) == 1 and None not in robots
 
 
 def infer_robots(

@@ -16,6 +16,7 @@ from twinmill.fitting.compare import Comparison
 from twinmill.inference.answer import Answer, Named
 from twinmill.inference.infer import Inference
 from twinmill.inference.settings import PRIORS
+from twinmill.listing import listed
 from twinmill.model.parameters import catalogue
 from twinmill.report import Figure, Section, comparisons, show
 from twinmill.report.canvas import FLOOR, PREDICTED, draw
@@ -50,6 +51,15 @@ def sentence(answer: Answer) -> str:
         outside = f"something outside the catalogue ({percent(answer.outside)})"
         return f"Missing: {outside}{like}{_on(answer)}."
     return f"Missing: {names}{_on(answer)}."
+
+
+def next_run(answer: Answer) -> str:
+    """Purpose of another run, in a sentence; empty where no effect is in question."""
+    if not answer.open:
+        return ""
+    names = listed([f"{name} ({percent(answer.effects[name])})" for name in answer.open])
+    verb = "is" if len(answer.open) == 1 else "are"
+    return f"{names} {verb} neither sure nor ruled out; another run would tell."
 
 
 def terminal_of_robots(
@@ -99,6 +109,7 @@ def section(
         ],
         _tables(one) if one else [_robots(results)],
         charts=charts(before, [("with what was found", robot.model) for robot in after.robots]),
+        next_step=next_run(one.answer) if one else "",
         commands=[(f"{why}:", command) for why, command in commands],
         notes=[
             *(_known(one) if one else [ONE_BY_ONE]),
@@ -204,6 +215,7 @@ def terminal(result: Inference) -> RenderableType:
         Text(),
         *map(show.table, _tables(result)),
         *map(Text, _known(result)),
+        *([Text(step)] if (step := next_run(result.answer)) else []),
         *show.warned(result.before.warnings),
     )
 
