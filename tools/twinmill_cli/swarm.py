@@ -57,7 +57,10 @@ if working():  # not for --help
     )
     from twinmill_cli.voice import Voice, refuse_deaf
 
-Behavior = Annotated[str | None, typer.Option("--behavior", "-b", help="Select it first.")]
+Behavior = Annotated[
+    str | None,
+    typer.Option("--behavior", "-b", metavar="BEHAVIOR", help="Select it first, as milling."),
+]
 
 
 def register(app: typer.Typer) -> None:
