@@ -259,6 +259,15 @@ class Field:
         operator.type(b"\x11")  # Ctrl-Q: the terminal goes on
         return self.row(fault_s, operator.end()) | {"drove": drove, "stood_before_ctrl_q": stood}
 
+    def terminal_halted_in_the_countdown_and_stopped(self) -> dict:
+        """Nobody presses Ctrl-Q: the command ends all the same, and its last word is read."""
+        begin_s = time.monotonic()
+        self.operator = operator = self._counting("--in-s", "5", terminal=True)
+        operator.type(CTRL_S)
+        time.sleep(HALTED_S)
+        tell.stop(Fleet(URL, key=self.key), set())
+        return self._unmoved(begin_s, operator.end())
+
     def terminal_halted_at_the_start(self, *options: str) -> dict:
         """Nothing of the start can be told, and the wheels turn already."""
         begin_s = time.monotonic()
@@ -633,6 +642,29 @@ class Field:
         tell.stop(fleet, set())
         return row
 
+    def untethered_and_one_is_unheard(self) -> dict:
+        """R03 drives for ever, and nobody hears it: its radio was gone before the instant."""
+        machine = Machine()
+        self.stack.callback(machine.end)
+        machine.cable("wlan0", 1)
+        self.robots[3] = self.robot(3, "3 untethered", machine)
+        fleet = Fleet(URL, key=self.key)
+        fleet.listen(1.5)
+        words = ("start", "--arm", "--robots", "1,3", "--untethered", "--partial", "--in-s", "4")
+        self.operator = operator = Operator(self.key_file, *words, terminal=False)
+        known = fleet.robots
+        fleet.listen(20, lambda: 3 in known and len(known[3].signed_acks) > 1)
+        machine.cut("wlan0")
+        code = operator.end(40)
+        drove = self.robots[3].duties() != ZERO
+        machine.cable("wlan0", 1)
+        tell.stop(fleet, {1, 3})
+        row = self.row(time.monotonic(), code, [3]) | {"drove": drove}
+        self.robots.pop(3).process.terminate()
+        machine.cut("wlan0")
+        time.sleep(1)
+        return row
+
     def taken_over(self) -> dict:
         """By another operator, who starts R01 while the first holds both; the first then ends."""
         first = self.held(terminal=False)
@@ -705,10 +737,10 @@ class Field:
         row |= {"said": said, "instant": data["start_utime_us"], "ok": data["ok"]}
         return row | {"ended_s": ended_s, "ahead_s": ahead_s}
 
-    def _counting(self, *words: str) -> Operator:
+    def _counting(self, *words: str, terminal: bool = False) -> Operator:
         """A start whose robots have all accepted; its instant is seconds away."""
         fleet = Fleet(URL, key=self.key)
-        operator = Operator(self.key_file, *START, *words, terminal=False)
+        operator = Operator(self.key_file, *START, *words, terminal=terminal)
         # The answers to arm and to start.
         fleet.listen(
             20, lambda: all(i in fleet.robots and len(fleet.robots[i].signed_acks) > 1 for i in IDS)

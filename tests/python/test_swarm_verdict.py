@@ -50,6 +50,7 @@ def answer(robot_id: int, **fields) -> Answer:
         "stands": False,
         "is_double": False,
         "alarms": [],
+        "last_heard_s": 0.0,
     }
     return Answer(robot_id=robot_id, **(usual | fields))
 
@@ -57,7 +58,7 @@ def answer(robot_id: int, **fields) -> Answer:
 GOOD, STANDS = answer(1), answer(2, mode="stopped", stands=True)
 REFUSED = answer(3, accepted=False, reason="no behaviour 'dance'", mode="stopped", stands=True)
 UNSIGNED = answer(4, signed=False, mode="stopped", stands=True)
-UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="")
+UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="", last_heard_s=None)
 FAULTY = answer(6, mode="fault", alarms=["camera lost"])
 LOST = answer(8, mode="stopped", stands=True, lost_link=True)
 LOOSE = answer(9, link_timeout_s=0.0)
@@ -126,9 +127,14 @@ SENTENCES = [
     (of_start(begun(REFUSED, GOOD)), "Started at", 1),
     (of_start(begun(FAULTY, GOOD)), "Started at", 1),
     (of_start(begun(STANDS)), "NOBODY DRIVES, though it is", 1),
-    (of_start(begun(STANDS, late=[STANDS])), "NOBODY STARTED: R02 did not in", 1),
+    (of_start(begun(STANDS, late=[STANDS])), "NOBODY WAS HEARD TO START: R02 was not", 1),
     (of_start(begun(GOOD, STANDS, late=[STANDS])), "Started at", 1),
     (of_start(begun(REFUSED)), "NOBODY STARTED: R03 refused", 1),
+    (
+        of_start(begun(replace(UNHEARD, robot_id=9, mode="stopped", last_heard_s=3.0))),
+        "NOBODY WAS HEARD TO START: R09 did not acknowledge in time",
+        1,
+    ),
     (of_start(begun(REFUSED, stopped=[STANDS])), "Called off: R03 refused", 1),
     (
         of_start(begun(UNHEARD, GOOD, stopped=[STANDS])),

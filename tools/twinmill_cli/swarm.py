@@ -206,8 +206,7 @@ def _drive(
         if started.called_off or not held.robots:
             return begun
         if options["link_timeout_ms"] == 0:
-            while not voice.is_idle:
-                fleet.listen(0.1)
+            voice.wait(fleet.listen)
             fleet.watch()  # the last that ends it, while robots drive on
             return begun
         _hold(fleet, held, voice)

@@ -359,14 +359,17 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
         words = f"NOBODY STARTED: {_why(given)}. {_as_before(going or faulty)}."
         return Verdict(False, words)
     late = {a.robot_id for a in begun.late}
-    idle = [a for a in standing if a.robot_id not in late]
+    waiting = [a for a in standing if a.robot_id not in late]
+    silent = [a for a in waiting if a.is_silent and a.accepted is not False]
+    idle = [a for a in waiting if a not in silent]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
     told = [
         f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
         if faulty
         else "",
         f"{_names(idle)} did not{_because(idle)}" if idle else "",
-        f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
+        _unheard(silent) + _because(silent) if silent else "",
+        f"{_unheard(begun.late)} in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
         f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
@@ -380,6 +383,11 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     if begun.late:
         words = f"{words} {of_stop(begun.late, is_of_some=True).sentence}"
     return Verdict(False, words)
+
+
+def _unheard(given: list[Answer]) -> str:
+    """Words on robots of which nobody knows whether they did; to go on behind."""
+    return f"{_names(given)} {'was' if len(given) == 1 else 'were'} not heard to start"
 
 
 def of_dry_run(given: list[Answer]) -> str:
@@ -459,9 +467,11 @@ def _of_nobody(begun: Start, at: str, ends: str) -> str:
     """Why none drives though its instant has come."""
     if begun.late:
         stopped = of_stop(begun.late, is_of_some=True).sentence
-        return f"NOBODY STARTED: {_names(begun.late)} did not in time. Told to stop: {stopped}"
+        words = f"{_unheard(begun.late)} in time. Told to stop: {stopped}"
+        return f"NOBODY WAS HEARD TO START: {words}"
     if len(_disobeyed(begun.answers)) == len(begun.answers):
-        return f"NOBODY STARTED: {_why(begun.answers)}."
+        is_sure = not any(a.is_silent and a.accepted is None for a in begun.answers)
+        return f"NOBODY {'STARTED' if is_sure else 'WAS HEARD TO START'}: {_why(begun.answers)}."
     waiting = [a for a in begun.answers if a.accepted and a.signed]
     words = f"{_names(waiting)} accepted the start, and may begin late by a clock that is behind"
     return f"NOBODY DRIVES, though it is {at}: {words}. {ends}."
