@@ -91,7 +91,7 @@ FAULTS = {
         LINK_LOST_S,
     ),
     "slept": Fault(
-        "laptop sleeps for 3 s", ("All stand: R01, R02: it had lost its link",), 1, LINK_LOST_S
+        "laptop sleeps for 3 s", ("All stand: R01, R02: they had lost their link",), 1, LINK_LOST_S
     ),
     "output_full": Fault(
         "disk below the tool's output full",
@@ -121,7 +121,7 @@ FAULTS = {
     ),
     "start_with_a_key_made_now": Fault(
         "`swarm start` in a home folder without a key",
-        ("a new operator's key was made", "signs nothing with this operator's key"),
+        ("a new operator's key was made", "sign nothing with this operator's key"),
         1,
         NEVER,
     ),
@@ -152,7 +152,7 @@ FAULTS = {
     ),
     "other_operator_of_another_key": Fault(
         "an operator with another key starts robots that are held; then Ctrl-C of the first",
-        ("R01, R02: nothing was started: signs nothing with this operator's key",),
+        ("nothing was started: R01, R02 sign nothing with this operator's key",),
         1,
     ),
     "stopped_in_the_countdown": Fault(
@@ -417,6 +417,30 @@ FAULTS = {
         ("Started at", "All stand.", "standard output: nobody reads it any more."),
         1,
         is_brief=True,
+    ),
+    "stop_output_full": Fault(
+        "disk below the output of `swarm stop` full (from its first packet)",
+        ("All stand.", "no space is left there; make room. What was done is done"),
+        1,
+        is_brief=True,
+    ),
+    "selected_in_the_countdown": Fault(
+        "`swarm select diffusing` in the countdown of another to `start --behavior milling`",
+        (
+            "R01, R02 may not play diffusing: where another operator counts down",
+            "R01, R02 will not play diffusing (a start that they wait for plays milling)",
+        ),
+        1,
+        NEVER,
+    ),
+    "start_of_robots_that_never_turn": Fault(
+        "`swarm start` of a robot with `duty_cap_pct = 0`; then Ctrl-C",
+        (
+            "R04 accepted it (no wheel turns: duty_cap_pct is 0 in",
+            "All stand; not all had started.",
+        ),
+        1,
+        NEVER,
     ),
     "start_not_in_utf_8": Fault(
         "`swarm start --behavior` with a word that is not in UTF-8",

@@ -595,6 +595,40 @@ class Field:
         self.operator = Operator(self.key_file, "start", "--behavior", "\udcfc", terminal=False)
         return self._unmoved(begin_s, self.operator.end())
 
+    def stop_output_full(self) -> dict:
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s, open("/dev/full", "w") as full:
+            self.operator = stopping = Operator(
+                self.key_file, "stop", terminal=False, stdout=full, stderr=subprocess.PIPE
+            )
+            _, said = stopping.process.communicate(timeout=20)
+        stopping.said = said.decode()
+        operator.end()
+        return self.row(stops_s[0], stopping.process.returncode)
+
+    def selected_in_the_countdown(self) -> dict:
+        """By another operator, who is told first that it may not be played, and last that it is not."""
+        counting = self._counting("--in-s", "6", "--behavior", "milling")
+        self.operator = Operator(self.key_file, "select", "diffusing", terminal=False)
+        code, begin_s = self.operator.end(), time.monotonic()
+        counting.process.send_signal(signal.SIGINT)
+        counting.end()
+        return self._unmoved(begin_s, code)
+
+    def start_of_robots_that_never_turn(self) -> dict:
+        """By their configuration: they say so, and drive by all else that they say."""
+        self.robots[4] = self.robot(4, "4", settings=("--set", "duty_cap_pct=0"))
+        time.sleep(1)
+        begin_s = time.monotonic()
+        words = ("start", "--arm", "--robots", "4")
+        self.operator = operator = Operator(self.key_file, *words, terminal=False)
+        wait_until(lambda: HELD in operator.plain or operator.has_ended, 20)
+        operator.process.send_signal(signal.SIGINT)
+        row = self._unmoved(begin_s, operator.end(), [4])
+        self.robots.pop(4).process.terminate()
+        time.sleep(1)
+        return row
+
     def stop_not_in_utf_8(self) -> dict:
         return self._stopped_by("--robots", "\udcfc")
 

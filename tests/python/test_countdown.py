@@ -317,7 +317,7 @@ def test_a_start_that_others_drive_by_is_not_said_to_be_begun(monkeypatch):
 
 
 class Unheard(SetBack):
-    """R02 obeys, and nothing that it says comes any more: a buffer is full, or its radio is gone."""
+    """R02 obeys, and nothing that it says comes any more: a buffer is full, its radio is gone."""
 
     def __init__(self, *robots: int, **options):
         super().__init__(*robots, **options)

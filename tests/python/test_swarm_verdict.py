@@ -84,7 +84,7 @@ SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
     (
         of_stop([LOST, STANDS], Saying(to_all=True)),
-        "All stand. 2 robots were heard: R08, R02; --robots says who is to answer. R08 stood",
+        "All stand. 2 robots were heard: R08, R02. If you have more, name all",
         0,
     ),
     (
@@ -371,12 +371,19 @@ def test_a_silent_robot_keeps_the_others_held():
     assert not SILENT.stands and not SILENT.is_meant
 
 
+def test_a_start_that_turns_no_wheel_by_a_robots_own_word_has_not_gone_as_it_was_meant():
+    still = replace(GOOD, reason="no wheel turns: duty_cap_pct is 0 in the robot's configuration")
+    told = of_start(begun(still, GOOD))
+    assert told.code == 1 and "R01 accepted it (no wheel turns: duty_cap_pct is 0" in told.sentence
+
+
 def test_a_selection_that_a_countdown_overrides_has_not_gone_as_it_was_meant():
     """Said by the robot itself, as it will play something else."""
     waits = replace(STANDS, reason="a start that it waits for plays milling")
     told = of_select([STANDS, waits], "diffusing")
     assert told.code == 1
-    assert "will not play diffusing (a start that it waits for plays milling)" in told.sentence
+    words = "R02 will not play diffusing (a start that it waits for plays milling)"
+    assert told.sentence.startswith(words)
     assert of_select([STANDS], "diffusing").code == 0
 
 

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Words on what was meant by a command line that is refused: an option that lacks its name, or a
-dash of it, or one that is no option here.
-"""
+"""Question on what was meant by a command line that is refused, where an option is mistyped."""
 
 import difflib
 import re
@@ -103,9 +101,7 @@ def _long_name(option: TyperOption) -> str:
     return next(name for name in option.opts if name.startswith("--"))
 
 
-def _two_dashes(
-    named: dict[str, TyperOption], name: str, words: Sequence[str], place: int
-) -> str:
+def _two_dashes(named: dict[str, TyperOption], name: str, words: Sequence[str], place: int) -> str:
     """The option as it has to be typed, with its value."""
     value = "" if named[name].is_flag else _value(words[place].partition("=")[0], words[place:])
     return f"--{name} {value}".strip()

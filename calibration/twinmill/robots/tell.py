@@ -592,9 +592,7 @@ def _unanswering(fleet: Fleet, command, robots: set[int]) -> set[int]:
     """Those that were told to start, have not answered, and are not heard to drive."""
     linked = [r for i in robots if (r := fleet.robots.get(i)) and r.link]
     return {
-        r.robot_id
-        for r in linked
-        if command.seq not in r.signed_acks and not r.says_that_it_drives
+        r.robot_id for r in linked if command.seq not in r.signed_acks and not r.says_that_it_drives
     }
 
 
