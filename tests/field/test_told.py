@@ -479,8 +479,8 @@ FAULTS = {
         NEVER,
     ),
     "untethered_and_one_is_unheard": Fault(
-        "R03's network is gone before the instant of `swarm start --untethered --partial`, and comes "
-        "back after it (from a second stop)",
+        "R03's network is gone before the instant of `swarm start --untethered --partial`, and "
+        "comes back after it (from a second stop)",
         (
             "Started at",
             "R03 was not heard to start in time, told to stop",

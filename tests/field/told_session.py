@@ -607,7 +607,7 @@ class Field:
         return self.row(stops_s[0], stopping.process.returncode)
 
     def selected_in_the_countdown(self) -> dict:
-        """By another operator, who is told first that it may not be played, and last that it is not."""
+        """By another operator: told first that it may not be played, and last that it is not."""
         counting = self._counting("--in-s", "6", "--behavior", "milling")
         self.operator = Operator(self.key_file, "select", "diffusing", terminal=False)
         code, begin_s = self.operator.end(), time.monotonic()

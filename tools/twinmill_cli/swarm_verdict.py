@@ -431,7 +431,7 @@ def _dry_run(given: list[Answer]) -> str:
 
 
 def _remarked(given: list[Answer]) -> str:
-    """What robots that obey a start say of it, as that no wheel turns by their configuration."""
+    """Words of robots that obey a start, as that no wheel turns by their configuration."""
     those = [a for a in given if a.accepted and a.signed and a.reason]
     return f"{_names(those)} accepted it{_because(those)}" if those else ""
 

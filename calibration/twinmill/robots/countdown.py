@@ -60,7 +60,7 @@ def find_dropouts(
         robots: of whom it is asked.
         seq: the start's number.
         only_stopped: who does not begin is left behind; but a stop is meant for all.
-        link_timeout_ms: that was sent with it; None: a robot that signs another is not judged by it.
+        link_timeout_ms: that was sent with it; None: nobody is judged by it.
     """
     words, taken = {}, set()
     for robot in _linked(fleet, robots):

@@ -470,8 +470,8 @@ def start(
 
     From the instant on they are held: as long as the fleet listens, they hear that the operator is
     there. Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
-    One of a partial start that is to drive on by itself, and is not heard to begin, is stopped: by a
-    clock that is behind it would begin when nobody expects it, and where its answer was lost it
+    One of a partial start that is to drive on by itself, and is not heard to begin, is stopped: by
+    a clock that is behind it would begin when nobody expects it, and where its answer was lost it
     drives, and nobody knows.
 
     Args:
