@@ -225,6 +225,24 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
     return used;
 }
 
+const char *config_remark(const struct app_config *config)
+{
+    if (config->duty_cap_pct == 0)
+    {
+        return "duty_cap_pct = 0: no wheel ever turns, whatever the robot is told; give 1..100 to "
+               "let it drive";
+    }
+    for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)
+    {
+        if (config->sign[wheel] != 0)
+        {
+            return NULL;
+        }
+    }
+    return "sign_fl, sign_fr, sign_rl, sign_rr = 0: no wheel ever turns, whatever the robot is "
+           "told; give 1 or -1 to let it drive";
+}
+
 // Bits without a gap: the first that is empty is the end.
 static enum fw_err set_bits(const struct app_config *config, struct fw_config *core)
 {

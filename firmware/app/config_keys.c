@@ -34,7 +34,7 @@
     BIT(bit3, 2, "for 8 rows")                                                                     \
     BIT(bit4, 3, "for 16 rows")                                                                    \
     INTEGER(frame_timeout_ms, 1, 10000, "motors stop without a frame for this long")               \
-    INTEGER(duty_cap_pct, 0, 100, "largest duty of any wheel")                                     \
+    INTEGER(duty_cap_pct, 0, 100, "largest duty of any wheel; 0: never turns")                     \
     TEXT(camera, "V4L2 device, or stub:FILE of YUYV frames, or stub:unix:SOCKET")                  \
     INTEGER(width_px, 2, 1280, "frame size asked for; the camera's nearest is taken")              \
     INTEGER(height_px, 1, 1024, "as above")                                                        \

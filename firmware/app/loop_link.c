@@ -99,6 +99,12 @@ static void remark(const struct loop *loop, struct link_ack *ack)
         (void)snprintf(ack->reason, sizeof ack->reason, "armed; the robot's key is %s",
                        loop->link.key_name);
     }
+    else if ((ack->verb == FW_VERB_START || ack->verb == FW_VERB_SCRIPT) && ack->accepted &&
+             loop->core.config.duty_cap_pct == 0)
+    {
+        (void)snprintf(ack->reason, sizeof ack->reason,
+                       "no wheel turns: duty_cap_pct is 0 in the robot's configuration");
+    }
     else if (ack->verb == FW_VERB_SELECT && ack->accepted && loop->plan.waits &&
              (loop->plan.plays_script || loop->plan.behavior[0] != '\0'))
     {

@@ -136,8 +136,18 @@ static int drive(const struct options *options, struct watch *watch, int stop_fd
     return code;
 }
 
+static void say_remark(const struct app_config *config)
+{
+    const char *remark = config_remark(config);
+    if (remark != NULL)
+    {
+        say("configuration: %s", remark);
+    }
+}
+
 static int print_config(const struct app_config *config)
 {
+    say_remark(config);
     static char text[16384];
     (void)config_print(config, true, text, sizeof text);
     return fputs(text, stdout) == EOF;
@@ -165,6 +175,7 @@ int main(int argc, char **argv)
         case OPTIONS_STOP: return stop_command(&options);
         case OPTIONS_RUN: break;
     }
+    say_remark(&options.config);
     if (options.dry_run)
     {
         say("dry run: no motor will move");

@@ -102,6 +102,19 @@ static void test_core_gets_what_was_set(void)
     TEST_ASSERT_EQUAL(FW_ERR_BOX, config_core(&config, &core));
 }
 
+static void test_a_configuration_by_which_no_wheel_turns_is_remarked(void)
+{
+    TEST_ASSERT_NULL(config_remark(&config));
+    TEST_ASSERT_TRUE(parse("sign_fl = 0\nsign_fr = 0\nsign_rl = 0\n"));
+    TEST_ASSERT_NULL(config_remark(&config));
+    TEST_ASSERT_TRUE(parse("sign_rr = 0\n"));
+    TEST_ASSERT_NOT_NULL(strstr(config_remark(&config), "no wheel ever turns"));
+    TEST_ASSERT_TRUE(parse("sign_rr = -1\nduty_cap_pct = 1\n"));
+    TEST_ASSERT_NULL(config_remark(&config));
+    TEST_ASSERT_TRUE(parse("duty_cap_pct = 0\n"));
+    TEST_ASSERT_NOT_NULL(strstr(config_remark(&config), "duty_cap_pct = 0: no wheel ever turns"));
+}
+
 // Without keys of their own bits are those of the keys before there were several.
 static void test_bits_are_the_usual_one_but_for_what_they_state(void)
 {
@@ -259,6 +272,7 @@ int main(void)
     RUN_TEST(test_every_default_is_in_its_own_range);
     RUN_TEST(test_values_comments_and_quotes);
     RUN_TEST(test_core_gets_what_was_set);
+    RUN_TEST(test_a_configuration_by_which_no_wheel_turns_is_remarked);
     RUN_TEST(test_bits_are_the_usual_one_but_for_what_they_state);
     RUN_TEST(test_mistakes_name_file_line_key_and_what_is_allowed);
     RUN_TEST(test_long_lines_and_texts_are_refused);

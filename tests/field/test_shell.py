@@ -61,7 +61,10 @@ CASES = {
         NEVER,
     ),
     "one_of_two_is_heard": Case(
-        ("1 robot was heard: R01; --robots says who is to answer.", "All stand. 1 robot was heard"),
+        (
+            "1 robot was heard: R01. If you have more, name all of them, as --robots 1,2,3",
+            "All stand. 1 robot was heard",
+        ),
         0,
     ),
 }

@@ -259,6 +259,15 @@ class Field:
         operator.type(b"\x11")  # Ctrl-Q: the terminal goes on
         return self.row(fault_s, operator.end()) | {"drove": drove, "stood_before_ctrl_q": stood}
 
+    def terminal_halted_in_the_countdown_and_stopped(self) -> dict:
+        """Nobody presses Ctrl-Q: the command ends all the same, and its last word is read."""
+        begin_s = time.monotonic()
+        self.operator = operator = self._counting("--in-s", "5", terminal=True)
+        operator.type(CTRL_S)
+        time.sleep(HALTED_S)
+        tell.stop(Fleet(URL, key=self.key), set())
+        return self._unmoved(begin_s, operator.end())
+
     def terminal_halted_at_the_start(self, *options: str) -> dict:
         """Nothing of the start can be told, and the wheels turn already."""
         begin_s = time.monotonic()
@@ -586,6 +595,40 @@ class Field:
         self.operator = Operator(self.key_file, "start", "--behavior", "\udcfc", terminal=False)
         return self._unmoved(begin_s, self.operator.end())
 
+    def stop_output_full(self) -> dict:
+        operator = self.held(terminal=False)
+        with self.hearing_stops() as stops_s, open("/dev/full", "w") as full:
+            self.operator = stopping = Operator(
+                self.key_file, "stop", terminal=False, stdout=full, stderr=subprocess.PIPE
+            )
+            _, said = stopping.process.communicate(timeout=20)
+        stopping.said = said.decode()
+        operator.end()
+        return self.row(stops_s[0], stopping.process.returncode)
+
+    def selected_in_the_countdown(self) -> dict:
+        """By another operator: told first that it may not be played, and last that it is not."""
+        counting = self._counting("--in-s", "6", "--behavior", "milling")
+        self.operator = Operator(self.key_file, "select", "diffusing", terminal=False)
+        code, begin_s = self.operator.end(), time.monotonic()
+        counting.process.send_signal(signal.SIGINT)
+        counting.end()
+        return self._unmoved(begin_s, code)
+
+    def start_of_robots_that_never_turn(self) -> dict:
+        """By their configuration: they say so, and drive by all else that they say."""
+        self.robots[4] = self.robot(4, "4", settings=("--set", "duty_cap_pct=0"))
+        time.sleep(1)
+        begin_s = time.monotonic()
+        words = ("start", "--arm", "--robots", "4")
+        self.operator = operator = Operator(self.key_file, *words, terminal=False)
+        wait_until(lambda: HELD in operator.plain or operator.has_ended, 20)
+        operator.process.send_signal(signal.SIGINT)
+        row = self._unmoved(begin_s, operator.end(), [4])
+        self.robots.pop(4).process.terminate()
+        time.sleep(1)
+        return row
+
     def stop_not_in_utf_8(self) -> dict:
         return self._stopped_by("--robots", "\udcfc")
 
@@ -631,6 +674,29 @@ class Field:
         fleet.listen(1.5)
         row = self._unmoved(begin_s, code, [2])
         tell.stop(fleet, set())
+        return row
+
+    def untethered_and_one_is_unheard(self) -> dict:
+        """R03 drives for ever, and nobody hears it: its radio was gone before the instant."""
+        machine = Machine()
+        self.stack.callback(machine.end)
+        machine.cable("wlan0", 1)
+        self.robots[3] = self.robot(3, "3 untethered", machine)
+        fleet = Fleet(URL, key=self.key)
+        fleet.listen(1.5)
+        words = ("start", "--arm", "--robots", "1,3", "--untethered", "--partial", "--in-s", "4")
+        self.operator = operator = Operator(self.key_file, *words, terminal=False)
+        known = fleet.robots
+        fleet.listen(20, lambda: 3 in known and len(known[3].signed_acks) > 1)
+        machine.cut("wlan0")
+        code = operator.end(40)
+        drove = self.robots[3].duties() != ZERO
+        machine.cable("wlan0", 1)
+        tell.stop(fleet, {1, 3})
+        row = self.row(time.monotonic(), code, [3]) | {"drove": drove}
+        self.robots.pop(3).process.terminate()
+        machine.cut("wlan0")
+        time.sleep(1)
         return row
 
     def taken_over(self) -> dict:
@@ -705,10 +771,10 @@ class Field:
         row |= {"said": said, "instant": data["start_utime_us"], "ok": data["ok"]}
         return row | {"ended_s": ended_s, "ahead_s": ahead_s}
 
-    def _counting(self, *words: str) -> Operator:
+    def _counting(self, *words: str, terminal: bool = False) -> Operator:
         """A start whose robots have all accepted; its instant is seconds away."""
         fleet = Fleet(URL, key=self.key)
-        operator = Operator(self.key_file, *START, *words, terminal=False)
+        operator = Operator(self.key_file, *START, *words, terminal=terminal)
         # The answers to arm and to start.
         fleet.listen(
             20, lambda: all(i in fleet.robots and len(fleet.robots[i].signed_acks) > 1 for i in IDS)

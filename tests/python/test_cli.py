@@ -22,6 +22,7 @@ from twinmill.files import plain
 from twinmill.report.tables import number
 from twinmill.terminal import PlainConsole
 from twinmill_cli import main as cli
+from twinmill_cli import output
 from twinmill_cli.ending import _told
 from twinmill_cli.lazy import LazyCommand
 
@@ -381,6 +382,17 @@ def test_a_stream_that_takes_no_more_is_named(cause, why, stream):
     code, sentence = _told(failed.value)
     name = {"stdout": "standard output", "stderr": "standard error"}[stream]
     assert code == 1 and sentence.startswith(f"{name}: ") and why in sentence
+
+
+@pytest.mark.parametrize("is_done", [False, True])
+def test_what_robots_have_done_is_not_to_be_done_again(is_done):
+    """Whoever read it behind "All stand." said a stop again, and looked for what was wrong."""
+    output.begin_telling()
+    if is_done:
+        output.decide(0)
+    _, sentence = _told(OSError(errno.ENOSPC, "No space left on device", "standard output"))
+    output.begin_telling()
+    assert "make room" in sentence and ("do it again" in sentence) != is_done
 
 
 def test_a_file_that_takes_no_more_is_named_behind_its_stream(tmp_path):

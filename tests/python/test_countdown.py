@@ -265,6 +265,18 @@ def test_a_robot_that_another_holds_is_his_though_his_start_was_not_heard(accept
     assert dropouts(fleet).taken == {1}
 
 
+@pytest.mark.parametrize(("own_ms", "is_taken"), [(2000, True), (0, False), (None, False)])
+def test_a_robot_that_another_let_drive_by_itself_is_his_though_that_was_not_heard(
+    accepted, own_ms, is_taken
+):
+    """Nobody says then that he is there; only a start changes for how long it needs nobody."""
+    fleet, robot = accepted
+    robot.link = link(counter=OWN + 9, link_timeout_ms=0)
+    assert bool(dropouts(fleet, link_timeout_ms=own_ms).taken) == is_taken
+    robot.link = link(counter=OWN, link_timeout_ms=0)
+    assert not dropouts(fleet, link_timeout_ms=own_ms).taken
+
+
 def test_nothing_is_judged_before_all_is_heard_that_was_said_in_a_sleep(monkeypatch):
     """Half of it told of robots that had lost this operator, and not of who has them since."""
     fleet = Fleet("", connect=lambda _: Bus(), key=KEY)
@@ -302,6 +314,37 @@ def test_a_start_that_others_drive_by_is_not_said_to_be_begun(monkeypatch):
     assert begun.called_off and begun.dropouts.taken == {1, 2} and not said
     words = "Called off: R01, R02 were taken over by another operator (start at 12:00:01)."
     assert of_start(begun).sentence.startswith(words) and not fleet.held
+
+
+class Unheard(SetBack):
+    """R02 obeys, and nothing that it says comes any more: a buffer is full, its radio is gone."""
+
+    def __init__(self, *robots: int, **options):
+        super().__init__(*robots, **options)
+        self.is_gone, self.stops = False, 0
+
+    def publish(self, channel, data):
+        self.is_gone, start_us = True, self.start_us
+        super().publish(channel, data)
+        if channel == "SWARM_COMMAND":  # of which R01 hears nothing
+            self.stops, self.start_us = self.stops + 1, start_us
+
+    def _say(self, robot_id, kind, message, **fields):
+        if not (self.is_gone and robot_id == 2):
+            super()._say(robot_id, kind, message, **fields)
+
+
+def test_who_may_drive_by_itself_unheard_is_told_to_stop_and_not_said_to_stand(monkeypatch):
+    """It was said not to have started; it drove on for ever, and nobody was told."""
+    fleet = Fleet("", connect=lambda _: Unheard(1, 2, drive=(1,)), key=KEY)
+    fleet.listen(0.2)
+    stop, stopped = tell.stop, []
+    monkeypatch.setattr(tell, "stop", lambda f, r: stopped.append(r) or stop(f, r, timeout_s=0.3))
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=1.0, partial=True, link_timeout_ms=0)
+    sentence = of_start(begun).sentence
+    assert stopped == [{2}] and fleet.bus.stops
+    assert "R02 was not heard to start in time, told to stop" in sentence
+    assert "NOT ALL STAND: R02: no stop was confirmed. SWITCH OFF BY HAND" in sentence
 
 
 class Late(SetBack):

@@ -15,7 +15,7 @@ from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_end import driving
 from twinmill_cli.swarm_screen import status_table
-from twinmill_cli.swarm_verdict import of_busy
+from twinmill_cli.swarm_verdict import of_busy, of_countdown
 
 KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
 VERBS = turbopi.signed_command_t
@@ -186,7 +186,7 @@ def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, key_file,
     fleet = fleet_of(strange)
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
     code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", key_file)
-    assert code == 1 and "R01: nothing was started: signs nothing with this operator's key" in err
+    assert code == 1 and "nothing was started: R01 signs nothing with this operator's key" in err
     assert fleet.bus.said == []
 
 
@@ -249,6 +249,23 @@ def test_arming_shows_for_whom_it_waits(monkeypatch, key_file, twinmill):
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet_of(robot(1)))
     twinmill("swarm", "arm", "--robots", "1,3", "--key", key_file)
     assert shown == ["arming R01, R03, up to 5 s until each has answered"]
+
+
+def test_who_selects_in_anothers_countdown_is_told_first_that_it_may_not_be_played(
+    monkeypatch, key_file, twinmill
+):
+    """It was told last, in the robots' answers, once all had chosen."""
+    fleet = fleet_of(waiting := robot(1), robot(2))
+    hold(fleet, 1)
+    told = []
+    monkeypatch.setattr(swarm, "say", told.append)
+    monkeypatch.setattr(swarm.tell, "tell", lambda *_, **__: told.append("chosen") or [])
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    twinmill("swarm", "select", "diffusing", "--robots", "1,2", "--key", key_file)
+    sentence, chosen = told
+    assert sentence.startswith("R01 may not play diffusing: ") and chosen == "chosen"
+    waiting.link.mode = DRIVING
+    assert "may not play" not in of_countdown([waiting], "diffusing")
 
 
 def test_a_robot_whose_fault_keeps_it_standing_is_not_said_to_drive():

@@ -147,7 +147,7 @@ def test_a_command_line_that_cannot_be_read_stops_all_and_says_so(
     code, out, _ = twinmill("swarm", "stop", *options)
     said = json.loads(out)
     assert code == 2 and told == [("memq://", prefix), set()] and not said["ok"]
-    assert says in said["sentence"] and ". So all robots are told to stop." in said["sentence"]
+    assert says in said["sentence"] and " So all robots are told to stop." in said["sentence"]
 
 
 @pytest.mark.parametrize(

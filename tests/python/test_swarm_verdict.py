@@ -50,6 +50,7 @@ def answer(robot_id: int, **fields) -> Answer:
         "stands": False,
         "is_double": False,
         "alarms": [],
+        "last_heard_s": 0.0,
     }
     return Answer(robot_id=robot_id, **(usual | fields))
 
@@ -57,7 +58,7 @@ def answer(robot_id: int, **fields) -> Answer:
 GOOD, STANDS = answer(1), answer(2, mode="stopped", stands=True)
 REFUSED = answer(3, accepted=False, reason="no behaviour 'dance'", mode="stopped", stands=True)
 UNSIGNED = answer(4, signed=False, mode="stopped", stands=True)
-UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="")
+UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="", last_heard_s=None)
 FAULTY = answer(6, mode="fault", alarms=["camera lost"])
 LOST = answer(8, mode="stopped", stands=True, lost_link=True)
 LOOSE = answer(9, link_timeout_s=0.0)
@@ -83,7 +84,7 @@ SENTENCES = [
     (of_stop([STANDS]), "All stand.", 0),
     (
         of_stop([LOST, STANDS], Saying(to_all=True)),
-        "All stand. 2 robots were heard: R08, R02; --robots says who is to answer. R08 stood",
+        "All stand. 2 robots were heard: R08, R02. If you have more, name all",
         0,
     ),
     (
@@ -126,9 +127,14 @@ SENTENCES = [
     (of_start(begun(REFUSED, GOOD)), "Started at", 1),
     (of_start(begun(FAULTY, GOOD)), "Started at", 1),
     (of_start(begun(STANDS)), "NOBODY DRIVES, though it is", 1),
-    (of_start(begun(STANDS, late=[STANDS])), "NOBODY STARTED: R02 did not in", 1),
+    (of_start(begun(STANDS, late=[STANDS])), "NOBODY WAS HEARD TO START: R02 was not", 1),
     (of_start(begun(GOOD, STANDS, late=[STANDS])), "Started at", 1),
     (of_start(begun(REFUSED)), "NOBODY STARTED: R03 refused", 1),
+    (
+        of_start(begun(replace(UNHEARD, robot_id=9, mode="stopped", last_heard_s=3.0))),
+        "NOBODY WAS HEARD TO START: R09 did not acknowledge in time",
+        1,
+    ),
     (of_start(begun(REFUSED, stopped=[STANDS])), "Called off: R03 refused", 1),
     (
         of_start(begun(UNHEARD, GOOD, stopped=[STANDS])),
@@ -340,8 +346,12 @@ def test_all_stand_is_said_with_code_0_and_only_of_robots_that_have_signed_it(gi
 
 @given(st.lists(answers, min_size=1, max_size=4))
 def test_a_start_is_well_only_where_all_have_signed_it_and_drive(given):
+    """And have nothing to say of it, as that no wheel turns."""
     verdict = of_start(begun(*given))
-    drive = [a.accepted and a.signed and a.mode in ("running", "script") for a in given]
+    signed = [a.accepted and a.signed and not a.reason for a in given]
+    drive = [
+        is_so and a.mode in ("running", "script") for is_so, a in zip(signed, given, strict=True)
+    ]
     assert (
         verdict.ok
         == all(drive)
@@ -365,12 +375,19 @@ def test_a_silent_robot_keeps_the_others_held():
     assert not SILENT.stands and not SILENT.is_meant
 
 
+def test_a_start_that_turns_no_wheel_by_a_robots_own_word_has_not_gone_as_it_was_meant():
+    still = replace(GOOD, reason="no wheel turns: duty_cap_pct is 0 in the robot's configuration")
+    told = of_start(begun(still, GOOD))
+    assert told.code == 1 and "R01 accepted it (no wheel turns: duty_cap_pct is 0" in told.sentence
+
+
 def test_a_selection_that_a_countdown_overrides_has_not_gone_as_it_was_meant():
     """Said by the robot itself, as it will play something else."""
     waits = replace(STANDS, reason="a start that it waits for plays milling")
     told = of_select([STANDS, waits], "diffusing")
     assert told.code == 1
-    assert "will not play diffusing (a start that it waits for plays milling)" in told.sentence
+    words = "R02 will not play diffusing (a start that it waits for plays milling)"
+    assert told.sentence.startswith(words)
     assert of_select([STANDS], "diffusing").code == 0
 
 

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import pty
+import select
 import signal
 import subprocess
 import sys
@@ -258,6 +259,37 @@ def test_what_stderr_would_lose_is_said_on_stdout_unless_an_object_is_there(word
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (ended.stdout, ended.stderr) == (out, err)
+
+
+TOLD_LAST = (
+    "from twinmill_cli.voice import Voice; voice = Voice(); voice.say('All stand.'); voice.end(7)"
+)
+
+
+def test_a_terminal_that_is_halted_does_not_keep_a_command_from_its_end():
+    """By Ctrl-S, whose effect termios(3) has; nobody presses Ctrl-Q, and the last word is read."""
+    keyboard, far = pty.openpty()
+    os.write(keyboard, b"\x13")
+    assert not select.select([], [far], [], 0.1)[1]
+    command = ["setsid", "--ctty", sys.executable, "-c", TOLD_LAST]
+    ended = subprocess.run(command, stdin=far, stdout=far, stderr=far, timeout=20)
+    os.close(far)
+    assert ended.returncode == 0 and b"All stand." in os.read(keyboard, 1000)
+    os.close(keyboard)
+
+
+def test_a_reader_that_reads_nothing_does_not_keep_a_command_from_its_end():
+    """A full pipe, which no program can empty but its reader; the exit code tells all the same."""
+    reads, writes = os.pipe()
+    os.set_blocking(writes, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writes, bytes(4096))
+    os.set_blocking(writes, True)
+    ended = subprocess.run([sys.executable, "-c", TOLD_LAST], stderr=writes, timeout=20)
+    assert ended.returncode == 7
+    os.close(reads)
+    os.close(writes)
 
 
 WHAT_ENDS = (

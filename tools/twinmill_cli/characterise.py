@@ -27,7 +27,7 @@ from twinmill_cli.options import (
     ScriptForm,
     SshConfig,
 )
-from twinmill_cli.output import AsJson, deliver, say
+from twinmill_cli.output import AsJson, decide, deliver, say
 
 if working():  # not for --help
     import numpy as np
@@ -137,6 +137,7 @@ def _characterise(
     if recorder.failed and not why:
         why = f"played to its end, but the end of the log is lost: {recorder.failed}"
     ended = why or "played to its end"
+    decide(1 if why else 0)
     data = {"log": str(out), "events": recorder.events, "ok": not why, "ended": ended}
     deliver(data, f"{ended}\n{out}: {counted(recorder.events, 'message')}", as_json)
     return 1 if why else 0

@@ -18,7 +18,14 @@ from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR, STDOUT, closed_at_first
 from twinmill_cli.exit_now import STOPPED, exit_now
-from twinmill_cli.output import begin_telling, decided_or, has_told, print_object, say
+from twinmill_cli.output import (
+    begin_telling,
+    decided_or,
+    has_told,
+    is_decided,
+    print_object,
+    say,
+)
 
 WRONG_COMMAND_LINE = 2
 LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
@@ -26,9 +33,9 @@ QUOTED = 80  # letters of what a sentence quotes
 TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
 HALTS = ("halt", "abort", "kill", "off")  # other words for it
 NO_ROOM = {  # why a file takes no more, and what to do
-    errno.ENOSPC: "no space is left there; make room, then do it again",
-    errno.EDQUOT: "your quota of that disk is used up; make room, then do it again",
-    errno.EFBIG: "no file may become so large here (ulimit -f); raise that, then do it again",
+    errno.ENOSPC: "no space is left there; make room",
+    errno.EDQUOT: "your quota of that disk is used up; make room",
+    errno.EFBIG: "no file may become so large here (ulimit -f); raise that",
 }
 OF_TABLES = ("import", "track", "track-calibrate", "track-check", "characterise")  # judge no log
 
@@ -173,10 +180,17 @@ def _told(error: Exception) -> tuple[int, str]:
             raise error
         return 1, missing(error.name)
     if isinstance(error, OSError) and error.errno in NO_ROOM:
-        return 1, _short(f"{error.filename or 'the output'}: {NO_ROOM[error.errno]}.")
+        return 1, _short(f"{error.filename or 'the output'}: {NO_ROOM[error.errno]}{_then()}.")
     if isinstance(error, OSError) and error.filename:
         return 1, _short(f"{error.filename}: {error.strerror}.")
     return 1, _short(str(error))
+
+
+def _then() -> str:
+    """Words on what to do besides: nothing that robots have done already."""
+    if not is_decided():
+        return ", then do it again"
+    return ". What was done is done: only what was to be printed is lost"
 
 
 def _short(sentence: str) -> str:

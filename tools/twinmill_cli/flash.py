@@ -11,7 +11,7 @@ import typer
 from twinmill.defaults import URL
 from twinmill_cli.lazy import working
 from twinmill_cli.options import LcmUrl, SshConfig
-from twinmill_cli.output import AsJson, deliver
+from twinmill_cli.output import AsJson, decide, deliver
 
 if working():  # not for --help
     from concurrent.futures import Future, ThreadPoolExecutor
@@ -147,6 +147,8 @@ def _flash(
         "package": given.path.name if given else None,
         "robots": [outcome.to_json() for outcome in outcomes],
     }
+    if not dry_run:
+        decide(0 if data["ok"] else 1)
     deliver(data, _plans(outcomes) if dry_run else _table(outcomes), as_json)
     return 0 if data["ok"] else 1
 

@@ -60,6 +60,11 @@ def decided_or(code: int) -> int:
     return _decided[0] if _decided else code
 
 
+def is_decided() -> bool:
+    """Something was done that cannot be undone, and need not be done again."""
+    return bool(_decided)
+
+
 def has_told() -> bool:
     """True if an object was printed where objects go now."""
     return any(stream is sys.stdout for stream in _told_on)

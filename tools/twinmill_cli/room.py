@@ -33,7 +33,8 @@ def refuse_full() -> dict[int, str]:
         except OSError as error:
             if error.errno in NO_ROOM:
                 raise ValueError(
-                    f"nothing was started: {file_of(name)}: {NO_ROOM[error.errno]}."
+                    f"nothing was started: {file_of(name)}: {NO_ROOM[error.errno]}, then do it "
+                    "again."
                 ) from error
     return {h: file_of(n) for h, n in STREAMS.items() if h not in closed_at_first and _links(h)}
 

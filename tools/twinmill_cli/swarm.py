@@ -48,6 +48,7 @@ if working():  # not for --help
         Verdict,
         of_arm,
         of_busy,
+        of_countdown,
         of_end,
         of_heard,
         of_remarks,
@@ -57,7 +58,10 @@ if working():  # not for --help
     )
     from twinmill_cli.voice import Voice, refuse_deaf
 
-Behavior = Annotated[str | None, typer.Option("--behavior", "-b", help="Select it first.")]
+Behavior = Annotated[
+    str | None,
+    typer.Option("--behavior", "-b", metavar="BEHAVIOR", help="Select it first, as milling."),
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -203,8 +207,7 @@ def _drive(
         if started.called_off or not held.robots:
             return begun
         if options["link_timeout_ms"] == 0:
-            while not voice.is_idle:
-                fleet.listen(0.1)
+            voice.wait(fleet.listen)
             fleet.watch()  # the last that ends it, while robots drive on
             return begun
         _hold(fleet, held, voice)
@@ -270,7 +273,9 @@ def _arm(
             say(f"{of_busy(busy)}.")
         with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
             given = tell.arm(fleet, asked)
-        return finish("arm", given, of_arm(given), {}, as_json=as_json)
+        verdict = of_arm(given)
+        decide(verdict.code)
+        return finish("arm", given, verdict, {}, as_json=as_json)
 
 
 def _select(
@@ -292,10 +297,12 @@ def _select(
         asked = tell.find(fleet, asked)
         busy = tell.find_busy(fleet, asked)
         if busy:
-            say(f"{of_busy(busy)}.")
+            say(" ".join(filter(None, [of_countdown(busy, behavior), f"{of_busy(busy)}."])))
         command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
-        return finish("select", given, of_select(given, behavior), {}, as_json=as_json)
+        verdict = of_select(given, behavior)
+        decide(verdict.code)
+        return finish("select", given, verdict, {}, as_json=as_json)
 
 
 def _status(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from twinmill_cli import several
 from twinmill_cli.lazy import working
 from twinmill_cli.output import say
 
@@ -168,9 +169,10 @@ def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
         )
     # Half of all packets lost, one of a thousand has not been heard to sign in the first second.
     fleet.listen(tell.FIND_S, lambda: tell.all_linked(fleet, robots))
-    strange = names({i for i in robots if not fleet.robots[i].link})
+    strange = {i for i in robots if not fleet.robots[i].link}
     if strange:
-        raise ValueError(f"{strange}: nothing was started: {tell.NO_SIGNATURE}")
+        why = several.of(strange, tell.NO_SIGNATURE)
+        raise ValueError(f"nothing was started: {names(strange)} {why}")
 
 
 def names(robots: Iterable[int]) -> str:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 from twinmill.defaults import URL
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR, STDOUT, STDOUT_NAME, refuse_closed
-from twinmill_cli.output import print_object, say
+from twinmill_cli.exit_now import STOPPED
+from twinmill_cli.output import print_object
 
 if TYPE_CHECKING:
     from twinmill.robots.fleet import Fleet
@@ -192,13 +193,23 @@ def commanding(
         except KeyboardInterrupt:
             became = BECAME[verb] if fleet and fleet.said else "nothing was said to any robot"
             sentence = f"Ended by a signal: {became}."
-            if as_json:
-                print_object({"verb": verb, "ok": False, "sentence": sentence, "robots": []})
-            say(sentence)
+            _tell_end(verb, sentence, asked, as_json=as_json)
             raise
         finally:
             if fleet:
                 fleet.close()
+
+
+def _tell_end(verb: str, sentence: str, signals: Sequence[int], *, as_json: bool) -> None:
+    """Tells how it was ended, and does not wait for a terminal: no signal would end that."""
+    from twinmill_cli.voice import Voice  # not for --help
+
+    voice, data = Voice(as_json=as_json), {"verb": verb, "ok": False, "sentence": sentence}
+    if as_json:
+        voice.tell(lambda: print_object({**data, "robots": []}))
+    voice.say(sentence)
+    voice.end(STOPPED, signals)
+    voice.check()
 
 
 @contextmanager

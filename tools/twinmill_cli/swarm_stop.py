@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperCommand
 
 from twinmill.defaults import URL
+from twinmill_cli import several
 from twinmill_cli.lazy import working
 from twinmill_cli.options import LcmUrl
 from twinmill_cli.output import AsJson, decide
@@ -246,7 +247,8 @@ def waiting_words(fleet: Fleet, left: set[int], hosts: tell.Hosts, timeout_s: fl
     """Reason why a stop still waits."""
     unheard = hosts.unheard(fleet)
     where = f" from {', '.join(unheard)}" if unheard else ""
-    whom = f"{names(left)} to sign that they stand" if left else f"a robot to be heard{where}"
+    words = several.of(left, "to sign that it stands")
+    whom = f"{names(left)} {words}" if left else f"a robot to be heard{where}"
     if fleet.reach.said and not fleet.reach.out:
         return (
             f"nothing leaves this computer ({fleet.reach.fault}); tried again all the time, up to "

@@ -24,10 +24,9 @@ from twinmill.robots.tell import (
     Answer,
     Start,
 )
-from twinmill_cli import exit_now
+from twinmill_cli import exit_now, several
 from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
-SEVERAL = {"was": "were", "is": "are", "has": "have"}  # verbs of one, as of several
 BY_HAND = "SWITCH OFF BY HAND what still drives."
 
 
@@ -65,9 +64,10 @@ class Verdict:
         """This outcome with a word on robots that were not asked, and that drive."""
         if not driving:
             return self
-        verb = "drives, and was" if len(driving) == 1 else "drive, and were"
         told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
-        return replace(self, sentence=told).more(f"{', '.join(driving)} {verb} not asked.")
+        return replace(self, sentence=told).more(
+            f"{', '.join(driving)} {several.of(driving, 'drives, and was not asked')}."
+        )
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""
@@ -181,16 +181,18 @@ def _reasons(given: list[Answer], how: Saying) -> list[str]:
     sentences = []
     for reason in dict.fromkeys(a.reason for a in given if a.reason not in known):
         those = [a for a in given if a.reason == reason]
-        sentences.append(f"{_names(those)}: {reason}{'' if reason.endswith('?') else '.'}")
+        words = several.of(those, reason)
+        sentences.append(f"{_names(those)}: {words}{'' if words.endswith('?') else '.'}")
     strange = [a for a in given if a.reason == NO_SIGNATURE and a.mode == "stopped"]
     if strange:
-        sentences.append(f"{_names(strange)}: by its word, which nobody can check, it stands.")
+        words = several.of(strange, "by its word, which nobody can check, it stands")
+        sentences.append(f"{_names(strange)}: {words}.")
     return sentences
 
 
 def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdict:
     """All that answered have confirmed the stop; others may be there."""
-    names = f"{_names(given)} {'stands' if len(given) == 1 else 'stand'}"
+    names = f"{_names(given)} {several.of(given, 'stands')}"
     more = _joined(_besides(given), how.lost)
     if how.unheard:
         words = f"NOT ALL STAND: {how.hint} {BY_HAND} Whoever was heard stands: {_names(given)}."
@@ -208,13 +210,17 @@ def of_heard(robots: Iterable[int]) -> str:
     """Sentence on how many were heard, where nobody said how many there are."""
     names = [f"R{i:02d}" for i in robots]
     were = "robot was" if len(names) == 1 else "robots were"
-    return f"{len(names)} {were} heard: {', '.join(names)}; --robots says who is to answer."
+    return (
+        f"{len(names)} {were} heard: {', '.join(names)}. If you have more, name all of them, as "
+        "--robots 1,2,3: whoever does not answer is named then."
+    )
 
 
 def _besides(given: list[Answer]) -> str:
     """Remarks on robots that have confirmed a stop."""
     lost_link = [a for a in given if a.lost_link]
-    before = f"{_names(lost_link)} stood before: it had lost its operator." if lost_link else ""
+    why = several.of(lost_link, "it had lost its operator")
+    before = f"{_names(lost_link)} stood before: {why}." if lost_link else ""
     return _joined(before, of_remarks(given))
 
 
@@ -248,6 +254,20 @@ def of_busy(busy: list[Robot]) -> str:
     return "; ".join(
         f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
         for (verb, who), names in by.items()
+    )
+
+
+def of_countdown(busy: list[Robot], behavior: str) -> str:
+    """Sentence on robots that may not play what is chosen; empty where all will.
+
+    What the start names that they may wait for was said before anybody listened here.
+    """
+    waiting = [f"R{robot.robot_id:02d}" for robot in busy if not robot.drives]
+    if not waiting:
+        return ""
+    return (
+        f"{', '.join(waiting)} may not play {behavior}: where another operator counts down to a "
+        "start that names a behaviour, that is played."
     )
 
 
@@ -326,7 +346,7 @@ def of_select(given: list[Answer], behavior: str) -> Verdict:
     waiting = [a for a in given if a.reason]
     if waiting:
         words = f"{_names(waiting)} will not play {behavior}{_because(waiting)}"
-        return Verdict(False, f"All chose {behavior}, but {words}.")
+        return Verdict(False, f"{words}, though all chose it.")
     return Verdict(True, f"All chose {behavior}.")
 
 
@@ -359,18 +379,22 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
         words = f"NOBODY STARTED: {_why(given)}. {_as_before(going or faulty)}."
         return Verdict(False, words)
     late = {a.robot_id for a in begun.late}
-    idle = [a for a in standing if a.robot_id not in late]
+    waiting = [a for a in standing if a.robot_id not in late]
+    silent = [a for a in waiting if a.is_silent and a.accepted is not False]
+    idle = [a for a in waiting if a not in silent]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
     told = [
         f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
         if faulty
         else "",
         f"{_names(idle)} did not{_because(idle)}" if idle else "",
-        f"{_names(begun.late)} did not in time, told to stop" if begun.late else "",
+        _unheard(silent) + _because(silent) if silent else "",
+        f"{_unheard(begun.late)} in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
-        f"{_names(unsure)} drive without having confirmed it{_because(unsure)}" if unsure else "",
+        _unconfirmed(unsure) if unsure else "",
         _dry_run(given),
+        _remarked(given),
         *_odd_links(begun),
     ]
     if not any(told):
@@ -382,18 +406,34 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     return Verdict(False, words)
 
 
+def _unconfirmed(given: list[Answer]) -> str:
+    words = several.of(given, "drives without having confirmed it")
+    return f"{_names(given)} {words}{_because(given)}"
+
+
+def _unheard(given: list[Answer]) -> str:
+    """Words on robots of which nobody knows whether they did; to go on behind."""
+    return f"{_names(given)} {several.of(given, 'was')} not heard to start"
+
+
 def of_dry_run(given: list[Answer]) -> str:
     """Sentence on robots whose stop says nothing of their wheels; empty if none is so."""
-    dry = _dry_run(given)
-    return (
-        f"{dry}: what it signs says nothing of wheels that another program drives." if dry else ""
-    )
+    dry = [a for a in given if DRY_RUN in a.alarms]
+    words = several.of(dry, "what it signs says nothing of wheels that another program drives")
+    return f"{_dry_run(given)}: {words}." if dry else ""
 
 
 def _dry_run(given: list[Answer]) -> str:
     """Robots that do all but move; words to go on behind."""
     dry = [a for a in given if DRY_RUN in a.alarms]
-    return f"{_names(dry)} with --dry-run, its motor board not opened" if dry else ""
+    words = several.of(dry, "with --dry-run, its motor board not opened")
+    return f"{_names(dry)} {words}" if dry else ""
+
+
+def _remarked(given: list[Answer]) -> str:
+    """Words of robots that obey a start, as that no wheel turns by their configuration."""
+    those = [a for a in given if a.accepted and a.signed and a.reason]
+    return f"{_names(those)} accepted it{_because(those)}" if those else ""
 
 
 def _as_before(given: list[Answer]) -> str:
@@ -410,7 +450,7 @@ def _going_on(begun: Start, ends: str) -> str:
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
     taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
     waiting = [a for a in taken if a.link_timeout_s is None]
-    verb = "has" if len(waiting) == 1 else "have"
+    verb = several.of(waiting, "has")
     return f"{words}{f', which {_names(waiting)} {verb} not signed yet' if waiting else ''}."
 
 
@@ -459,9 +499,11 @@ def _of_nobody(begun: Start, at: str, ends: str) -> str:
     """Why none drives though its instant has come."""
     if begun.late:
         stopped = of_stop(begun.late, is_of_some=True).sentence
-        return f"NOBODY STARTED: {_names(begun.late)} did not in time. Told to stop: {stopped}"
+        words = f"{_unheard(begun.late)} in time. Told to stop: {stopped}"
+        return f"NOBODY WAS HEARD TO START: {words}"
     if len(_disobeyed(begun.answers)) == len(begun.answers):
-        return f"NOBODY STARTED: {_why(begun.answers)}."
+        is_sure = not any(a.is_silent and a.accepted is None for a in begun.answers)
+        return f"NOBODY {'STARTED' if is_sure else 'WAS HEARD TO START'}: {_why(begun.answers)}."
     waiting = [a for a in begun.answers if a.accepted and a.signed]
     words = f"{_names(waiting)} accepted the start, and may begin late by a clock that is behind"
     return f"NOBODY DRIVES, though it is {at}: {words}. {ends}."
@@ -506,14 +548,9 @@ def of_end(
 def _told_early(names: list[str], state: State, is_stopped: bool) -> str:
     """Sentence on robots that had ended before they were stopped."""
     if not state.stands:
-        return f"{', '.join(names)} {_of_several(state.before) if names[1:] else state.before}"
-    return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {state.words}"
-
-
-def _of_several(words: str) -> str:
-    """Words to go on behind one robot's name, behind several."""
-    verb, _, rest = words.partition(" ")
-    return f"{SEVERAL.get(verb, verb)} {rest}"
+        return f"{', '.join(names)} {several.of(names, state.before)}"
+    words = several.of(names, state.words)
+    return f"{', '.join(names)}{' stood before' if is_stopped else ''}: {words}"
 
 
 def _disobeyed(given: list[Answer]) -> list[Answer]:
@@ -534,8 +571,7 @@ def _why_dropped_out(begun: Start) -> str:
     for robot_id, words in sorted(begun.dropouts.words.items()):
         by.setdefault(words, []).append(f"R{robot_id:02d}")
     return "; ".join(
-        f"{', '.join(names)} {'was' if len(names) == 1 else 'were'} {words}"
-        for words, names in by.items()
+        f"{', '.join(names)} {several.of(names, f'was {words}')}" for words, names in by.items()
     )
 
 
@@ -555,8 +591,8 @@ def _because(given: list[Answer]) -> str:
         if answer.reason:
             by.setdefault(answer.reason, []).append(answer)
     if len(by) == 1:
-        return f" ({next(iter(by))})"
-    each = "; ".join(f"{_names(who)}: {reason}" for reason, who in by.items())
+        return f" ({several.of(given, next(iter(by)))})"
+    each = "; ".join(f"{_names(who)}: {several.of(who, reason)}" for reason, who in by.items())
     return f" ({each})" if each else ""
 
 

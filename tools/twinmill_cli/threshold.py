@@ -12,7 +12,7 @@ import typer
 
 from twinmill_cli.lazy import working
 from twinmill_cli.options import SshConfig
-from twinmill_cli.output import AsJson, busy, deliver
+from twinmill_cli.output import AsJson, busy, decide, deliver
 
 if working():  # not for --help
     import twinmill_native as native
@@ -135,6 +135,7 @@ def _threshold(
     if good and write:
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
         remote.run("restart")
+        decide(0)
     _tell(taken, balls, found, before=before, after=after, as_json=as_json)
     return 0 if good else 1
 

@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
 
 from twinmill.numbers_typed import REAL
+from twinmill_cli.meant import meant, refuse_one_dash
 
 OF_PYDANTIC = "Input should be "  # how its messages on a value begin
 
@@ -135,6 +136,19 @@ def _refuse_odd(
             raise typer.BadParameter(f"{given} is no finite number.", ctx=ctx, param=option)
 
 
+def _as_meant(command: TyperCommand, ctx: typer.Context, args: list[str]) -> list[str]:
+    """Typer's; where it refuses that, with a question on what was meant."""
+    words = [*args]
+    try:
+        if not ctx.resilient_parsing:
+            refuse_one_dash(command, ctx, words)
+        return _each_once(command, ctx, args)
+    except typer.TyperException as error:
+        if question := meant(command, ctx, words, error) if not error.message.endswith("?") else "":
+            error.message = f"{error.message.rstrip('.')}; {question}"
+        raise
+
+
 def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> list[str]:
     """Typer's, but an option for one value is refused the second time: it takes the last."""
     _, _, given = command.make_parser(ctx).parse_args(args=[*args])
@@ -145,7 +159,7 @@ def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> li
     return _parse_args(command, ctx, args)
 
 
-TyperCommand.parse_args = _each_once
+TyperCommand.parse_args = _as_meant
 TyperOption.display_type_rich = _type_shown
 TyperArgument.display_type_rich = _of_argument
 TyperArgument.get_usage_pieces = _usage

@@ -8,10 +8,13 @@ robots hear their operator, and his stop, all the same.
 from __future__ import annotations
 
 import errno
+import os
 import select
+import termios
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from queue import Queue
 from typing import TYPE_CHECKING
 
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 SHOW_PERIOD_S = 0.25
 JOIN_S = 0.05
 LAST_WORD_S = 0.5  # in which a terminal that takes anything has taken the last sentence
+PATIENCE_S = 2.0  # for a terminal that is halted, or a reader who is slow, once all else is done
 
 
 STREAMS = (STDOUT, STDERR)
@@ -52,6 +56,20 @@ def refuse_deaf() -> None:
     """Raises OSError if nobody can be told anything any more."""
     if not can_be_heard():
         raise OSError(errno.EPIPE, NOBODY)
+
+
+def all_take_words() -> bool:
+    """Nobody keeps a writer waiting: who writes for long then is slow itself."""
+    return len(select.select([], STREAMS, [], 0)[1]) == len(STREAMS)
+
+
+def let_terminals_go_on() -> None:
+    """Undoes Ctrl-S, as Ctrl-C would: what is told last is seen, and its command ends."""
+    for stream in filter(os.isatty, STREAMS):
+        with suppress(termios.error):  # it is gone
+            # The kernel lets only those go on that a program has halted (Linux: n_tty_ioctl_helper)
+            termios.tcflow(stream, termios.TCOOFF)
+            termios.tcflow(stream, termios.TCOON)
 
 
 class Voice:
@@ -145,8 +163,17 @@ class Voice:
         self.check()
         refuse_deaf()
 
+    def wait(self, look: Callable[[float], None]) -> None:
+        """Waits until all is written, or nobody is to wait any longer for who takes nothing.
+
+        Args:
+            look: waits for so many seconds, and raises what ends this sooner.
+        """
+        for _ in self._patience(lambda: not self.is_idle):
+            look(JOIN_S)
+
     def end(self, code: int, signals: Sequence[int] = ()) -> None:
-        """Waits until all is written. Who does not want to wait any more (Ctrl-C) need not.
+        """Waits as wait() does. Who does not want to wait any more (Ctrl-C) need not.
 
         Args:
             code: with which the program then ends at once.
@@ -155,10 +182,22 @@ class Voice:
         self._waiting.put(None)
         before = len(signals)
         try:
-            while self._thread.is_alive() and len(signals) == before:
+            for _ in self._patience(lambda: self._thread.is_alive() and len(signals) == before):
                 self._thread.join(JOIN_S)
         except KeyboardInterrupt:
             pass
         self._thread.join(LAST_WORD_S)
         if self._thread.is_alive():
             exit_now(code)  # it may hold what the interpreter would wait for
+
+    @staticmethod
+    def _patience(is_waiting: Callable[[], bool]) -> Iterator[None]:
+        """Yields while something waits and may; a terminal that halts it goes on before the end."""
+        for patience_s in (PATIENCE_S, LAST_WORD_S):
+            blocked_s = 0.0
+            while is_waiting() and blocked_s < patience_s:
+                begin_s = time.monotonic()
+                yield
+                blocked_s += 0.0 if all_take_words() else time.monotonic() - begin_s
+            if is_waiting():
+                let_terminals_go_on()

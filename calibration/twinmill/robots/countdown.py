@@ -43,7 +43,14 @@ class Dropouts:
         return Dropouts({**more, **self.words}, self.taken)
 
 
-def find_dropouts(fleet: Fleet, robots: set[int], seq: int, *, only_stopped: bool) -> Dropouts:
+def find_dropouts(
+    fleet: Fleet,
+    robots: set[int],
+    seq: int,
+    *,
+    only_stopped: bool,
+    link_timeout_ms: int | None = None,
+) -> Dropouts:
     """Robots for which a start is over, by what they have signed, or not, since they were armed.
 
     Who refuses it for a reason of his own is none of them.
@@ -53,11 +60,12 @@ def find_dropouts(fleet: Fleet, robots: set[int], seq: int, *, only_stopped: boo
         robots: of whom it is asked.
         seq: the start's number.
         only_stopped: who does not begin is left behind; but a stop is meant for all.
+        link_timeout_ms: that was sent with it; None: nobody is judged by it.
     """
     words, taken = {}, set()
     for robot in _linked(fleet, robots):
         ack = robot.signed_acks.get(seq)
-        whose = _whose(fleet, robot, ack) if seq in fleet.said else ""
+        whose = _whose(fleet, robot, ack, link_timeout_ms) if seq in fleet.said else ""
         why = whose or (_why(fleet, robot, ack) if ack else "")
         if why and (why == STOPPED or not only_stopped):
             words[robot.robot_id] = why
@@ -82,13 +90,14 @@ def _answered(fleet: Fleet, robots: set[int], seq: int) -> list[tuple[Robot, Any
     return [(r, ack) for r in _linked(fleet, robots) if (ack := r.signed_acks.get(seq))]
 
 
-def _whose(fleet: Fleet, robot: Robot, ack: Any) -> str:
+def _whose(fleet: Fleet, robot: Robot, ack: Any, link_timeout_ms: int | None) -> str:
     """Words on another operator who starts it, by its own word; empty where none does.
 
     Args:
         fleet: where it is.
         robot: it must have a link.
         ack: its answer to the start from here; None: it has not answered.
+        link_timeout_ms: as of find_dropouts().
     """
     link = robot.link
     others = fleet.others(robot, ack.session if ack else link.session)
@@ -99,8 +108,10 @@ def _whose(fleet: Fleet, robot: Robot, ack: Any) -> str:
         is_over = _obeyed_a_stop(fleet, robot, link.session, after_us=after_us)
         return "" if is_over else f"taken over by another operator ({start.words})"
     is_unheard = ack and ack.accepted and link.session == ack.session
-    if is_unheard and _obeys_unheard(fleet, robot, others) and robot.hears_other_operator:
-        return HELD_BY_ANOTHER
+    # A start alone changes that time; one that is untethered has nobody who says that he is there.
+    is_of_start = link_timeout_ms is not None and link.link_timeout_ms != link_timeout_ms
+    if is_unheard and _obeys_unheard(fleet, robot, others):
+        return HELD_BY_ANOTHER if is_of_start or robot.hears_other_operator else ""
     return ""
 
 

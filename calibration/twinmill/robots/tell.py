@@ -26,7 +26,7 @@ from twinmill.robots.countdown import (
     find_dropouts,
     stopped_by_another,
 )
-from twinmill.robots.fleet import ALL, ASK, DRIVING, LINK_TIMEOUT_MS, Fleet, Robot
+from twinmill.robots.fleet import ALL, ASK, DRIVING, GONE_S, LINK_TIMEOUT_MS, Fleet, Robot
 
 REPEAT_S = 0.03
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
@@ -95,6 +95,11 @@ class Answer:
     def is_driving(self) -> bool:
         """Its telemetry says so."""
         return self.mode in DRIVING
+
+    @property
+    def is_silent(self) -> bool:
+        """Nobody knows what it does: it was not heard, or not just now."""
+        return self.last_heard_s is None or self.last_heard_s > GONE_S
 
     @property
     def untethered(self) -> bool | None:
@@ -420,8 +425,8 @@ class Start:
         sessions: that the start was meant for, by robot; of those that have signed it.
         called_off: nobody was to start, or to drive on.
         stopped: what they answered to the stop where it was called off.
-        late: what those answered to a stop that had accepted, were to drive on by themselves, and
-            had not begun.
+        late: what those answered to a stop that were to drive on by themselves, and were not heard
+            to begin: they had accepted, or not answered.
         dropouts: robots for which it was called off; of a partial start that was not, those that
             drive by another's.
         link_timeout_ms: that was sent with it; 0: they drive on without their operator.
@@ -465,8 +470,9 @@ def start(
 
     From the instant on they are held: as long as the fleet listens, they hear that the operator is
     there. Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
-    One of a partial start that is to drive on by itself, and does not begin, is stopped: by a clock
-    that is behind it would begin when nobody expects it.
+    One of a partial start that is to drive on by itself, and is not heard to begin, is stopped: by
+    a clock that is behind it would begin when nobody expects it, and where its answer was lost it
+    drives, and nobody knows.
 
     Args:
         fleet: where they are.
@@ -483,8 +489,12 @@ def start(
     instant_s = time.monotonic() + ahead_s
     fleet.held |= robots if link_timeout_ms else set()
 
+    def all_dropouts(*, only_stopped: bool) -> Dropouts:
+        told = {"only_stopped": only_stopped, "link_timeout_ms": link_timeout_ms}
+        return find_dropouts(fleet, robots, command.seq, **told)
+
     def dropouts() -> Dropouts:
-        return find_dropouts(fleet, robots, command.seq, only_stopped=partial)
+        return all_dropouts(only_stopped=partial)
 
     given = tell(
         fleet,
@@ -503,8 +513,9 @@ def start(
     if agreed and not out:
         patience_s = LATE_S if partial and not link_timeout_ms else BEGUN_S
         waiting = _not_begun(fleet, given, patience_s)
+        waiting |= set() if link_timeout_ms else _unanswering(fleet, command, robots)
         # Those that drive may do so by another's start: their own word tells.
-        others = find_dropouts(fleet, robots, command.seq, only_stopped=False).theirs
+        others = all_dropouts(only_stopped=False).theirs
         waiting -= others.taken
         is_nobodys = others.taken >= {a.robot_id for a in given if a.accepted}
         if others and (is_nobodys or not partial):
@@ -575,6 +586,14 @@ def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]
     accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
     fleet.listen(patience_s, lambda: not any(robot.mode in STANDING for robot in accepted))
     return {robot.robot_id for robot in accepted if robot.mode in STANDING}
+
+
+def _unanswering(fleet: Fleet, command, robots: set[int]) -> set[int]:
+    """Those that were told to start, have not answered, and are not heard to drive."""
+    linked = [r for i in robots if (r := fleet.robots.get(i)) and r.link]
+    return {
+        r.robot_id for r in linked if command.seq not in r.signed_acks and not r.says_that_it_drives
+    }
 
 
 def _not_driving(robot: Robot, why: str) -> str:
