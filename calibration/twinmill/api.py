@@ -1917,12 +1917,14 @@ def next_run(
     duration_s: float = 30.0,
     floor_m: tuple[float, float] = (2.0, 2.0),
     max_duty: float = 1.0,
+    own: Log | str | Path | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> NextRun:
     """Designs the run that best tells apart what these logs cannot.
 
     What is in question is what `diagnose` leaves open: effects that look alike, else effects that
-    would not show. Play the script, log it, and diagnose the old and the new logs together.
+    would not show; with `own`, or a model that keeps what it misses there, what `infer` finds
+    neither sure nor ruled out. Play the script, log it, and judge the old and the new logs together.
 
     Args:
         log: a log, or the path of one.
@@ -1931,6 +1933,7 @@ def next_run(
         floor_m: free floor, along and across the robot at its start.
         max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
             highest in its logs.
+        own: the log (or logs) that the model was fitted to; see `infer`.
         progress: called with a sentence on each step.
 
     Returns:
@@ -1949,7 +1952,8 @@ def next_run(
     log, model = _log(log), _model(model)
     limits = _limits(duration_s, floor_m, max_duty)
     measurements = log.measurements(model)
-    plan = plan_run(measurements, model.file, limits, _progress(progress))
+    before = _log(own).measurements(model) if own is not None else ()
+    plan = plan_run(measurements, model.file, limits, _progress(progress), own=before)
     return _told(NextRun(plan), measurements)
 
 
