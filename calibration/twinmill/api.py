@@ -1923,8 +1923,8 @@ def next_run(
     """Designs the run that best tells apart what these logs cannot.
 
     What is in question is what `diagnose` leaves open: effects that look alike, else effects that
-    would not show; with `own`, or a model that keeps what it misses there, what `infer` finds
-    neither sure nor ruled out. Play the script, log it, and judge the old and the new logs together.
+    would not show. With `own`, or a model that keeps what it misses there, it is what `infer` finds
+    neither sure nor ruled out. Play the script, log it, and judge all logs together.
 
     Args:
         log: a log, or the path of one.
