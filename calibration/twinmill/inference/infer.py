@@ -19,6 +19,7 @@ from twinmill.inference.prior import Always
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Numbers, table_of
+from twinmill.inference.unnamed import Unnamed, unnamed
 from twinmill.model.model_file import ModelFile
 
 HELD, HELD_OWN = "infer: the logs hold", "infer: the model's own logs hold"
@@ -36,6 +37,7 @@ class Inference:
 
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
+        left: what the likeliest dependence looks like; None without any.
         measurements: of the logs.
         always: what the model misses in its own logs, too; None where that is not known.
         before: these logs and the model as given.
@@ -45,6 +47,7 @@ class Inference:
     """
 
     answer: Answer
+    left: Unnamed | None
     measurements: Sequence[Measurement]
     always: Always | None
     before: Comparison
@@ -56,8 +59,10 @@ class Inference:
         """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
+        told = self.answer.to_json()
+        told["rest"]["curve"] = self.left.to_json() if self.left else None
         return {
-            **self.answer.to_json(),
+            **told,
             "robot_id": self.measurements[0].track.robot_id,
             "log": self.measurements[0].log_name,
             "logs": [m.log_name for m in self.measurements],
@@ -103,12 +108,19 @@ def infer(
         always = always_of(of_one_robot(own, HELD_OWN, OWN, robot), model_file)
     problem = problem_of(runs, model_file, always)
     search = Search(problem, progress).run()
+    found = answer(table_of(search))
     progress("scores")
-    return _scored(answer(table_of(search)), runs, always, model_file)
+    left = unnamed(search, problem.motion, found)
+    return _scored(found, runs, model_file, left=left, always=always)
 
 
 def _scored(
-    found: Answer, runs: Sequence[Measurement], always: Always | None, model_file: ModelFile
+    found: Answer,
+    runs: Sequence[Measurement],
+    model_file: ModelFile,
+    *,
+    left: Unnamed | None,
+    always: Always | None,
 ) -> Inference:
     given = open_measurements(runs, model_file)
     there = always.effects if always else ()
@@ -120,6 +132,7 @@ def _scored(
     base = under(found.refit, there)
     return Inference(
         found,
+        left,
         runs,
         always,
         before=comparison(model_file, given),

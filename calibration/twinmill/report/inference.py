@@ -18,7 +18,7 @@ from twinmill.inference.infer import Inference
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
 from twinmill.model.parameters import catalogue
-from twinmill.report import Figure, Section, comparisons, show
+from twinmill.report import Figure, Section, comparisons, show, unnamed
 from twinmill.report.canvas import FLOOR, PREDICTED, draw
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
@@ -104,6 +104,7 @@ def section(
         comparisons.facts(before),
         [
             *([probabilities(one.answer)] if one else []),
+            *(unnamed.figures(one.left) if one else []),
             waterfall(scores, "on the logs that were judged"),
             *robot_pictures(before, errors),
         ],

@@ -94,6 +94,28 @@ def test_a_lag_more_is_looked_for_where_it_does_what_the_bases_own_does(
     assert candidate.columns[0] == pytest.approx(change, abs=1e-9)
 
 
+def test_a_gain_that_swings_with_the_heading_is_drawn_as_it_is(
+    measure, tanh_robot, one_clock_base, own
+):
+    """The plant turns by 1 + 0.15 sin(heading); bins of 22.5 degrees blur that by 1 % of it."""
+
+    class Turning(tanh_robot):
+        def hindered(self, motion):
+            left, heading = motion.copy(), 0.0
+            for k, turn in enumerate(motion[:, 2]):
+                left[k, 2] = (1 + 0.15 * np.sin(heading)) * turn
+                heading += left[k, 2] * STEP_S
+            return left
+
+    found = infer([measure(Turning(), 7)], one_clock_base, [own])
+    assert next(iter(found.answer.depends_on)) == "heading"
+    curve = found.left
+    known = np.isfinite(curve.gain[:, 2])
+    off = curve.gain[known, 2] - 0.15 * np.sin(curve.at[known, 0])
+    assert np.abs(off).max() < 0.05
+    assert np.sqrt(np.mean(off**2)) < 0.15 / 6
+
+
 def test_a_patch_whose_centre_was_never_driven_to_is_found(
     measure, tanh_robot, one_clock_base, own
 ):
