@@ -119,7 +119,15 @@ class Inference(Reported):
         self.sentence, self.score = inference.sentence(answer), result.before.score
 
     def to_json(self) -> dict[str, Any]:
-        """As of `Comparison`, for `twinmill lab infer`."""
+        """All numbers and names, as of `twinmill lab infer --json`.
+
+        Returns:
+            As the page on probabilities tells; an absent number is None.
+
+        Examples:
+            >>> inferred.to_json()["found"]
+            ['coasting']
+        """
         return {"sentence": self.sentence, **super().to_json()}
 
     def table(self) -> pd.DataFrame:
