@@ -68,13 +68,14 @@ def test_a_model_that_another_command_wrote_meanwhile_stays(
 ):
     out, words = tmp_path / "new.toml", ["coasting"] if verb == "add" else []
     module = importlib.import_module(f"twinmill_cli.{MODULES.get(verb, verb)}")
-    load = module.load
+    reads = "read" if verb == "explain" else "load"
+    load = getattr(module, reads)
 
     def other_is_first(*given):
         out.write_text(USERS)
         return load(*given)
 
-    monkeypatch.setattr(module, "load", other_is_first)
+    monkeypatch.setattr(module, reads, other_is_first)
     robot = brief_coasting_robot
     code, _, err = twinmill(verb, *words, robot.log, "--model", robot.model, "-o", out)
     assert code == 1 and "new.toml: exists" in err
