@@ -174,6 +174,11 @@ class ScoreFit:
                 counted.add(whose)
         return held
 
+    @property
+    def trajectories(self) -> list[Trajectory]:
+        """Data sets that are logs."""
+        return [d for d in self.datasets if isinstance(d, Trajectory)]
+
     # -- errors ---------------------------------------------------------------------------------
 
     def batch(self, i: int, x: np.ndarray) -> np.ndarray:
