@@ -85,13 +85,13 @@ def load(logs: list[Path], model_file: ModelFile) -> Measurements:
     return measurements
 
 
-def told(measurements: Measurements) -> dict:
+def told(measurements: Measurements) -> dict[str, Any]:
     """Provenance as JSON output carries it."""
     return {"input": [finding.to_json() for finding in measurements.findings]}
 
 
 def finish(
-    data: dict,
+    data: dict[str, Any],
     text: RenderableType | None,
     source: Provenance,
     *,

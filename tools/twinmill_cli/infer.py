@@ -146,8 +146,8 @@ def inferred(
 
             progress("what the new model still misses in these logs")
             written = better(results[0], model_file, output, source.command)
-    if keep is not None:
-        with_kept(model_file, results[0].always, keep, source.command).write(force)
+    if keep is not None and (always := results[0].always):
+        with_kept(model_file, always, keep, source.command).write(force)
     if written:
         written.file.write(force)
     each = [result.to_json() for result in results]

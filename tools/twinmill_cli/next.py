@@ -122,9 +122,15 @@ def _next(
     if is_mjcf(model):
         from twinmill_cli.joints import designed  # MuJoCo's Python is slow to import
 
-        how_long = {"duration_s": duration_s, "times_speed": times_speed}
-        told_too = {"own": own or [], "force": force, "as_json": as_json, "out": out}
-        return designed(logs, model, output, **how_long, **told_too)
+        return designed(
+            *(logs, model, output),
+            own=own or [],
+            duration_s=duration_s,
+            times_speed=times_speed,
+            force=force,
+            as_json=as_json,
+            out=out,
+        )
     if own:
         raise ValueError(
             "next: --own is for models in MJCF; a run for a robot on wheels is designed without it."
