@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shlex
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -73,7 +73,11 @@ def _ask(
     if out:
         check_report(out)
     drive = ModelFile.load(model).model.drive
-    rest = {"n": None if question is Question.HOW_MANY else n, "seeds": seeds, "start": start}
+    rest: dict[str, Any] = {
+        "n": None if question is Question.HOW_MANY else n,
+        "seeds": seeds,
+        "start": start,
+    }
     rest |= {"duration_s": duration_s, "target_radius_m": target_radius_m}
     requests = [make_request(behavior, model, [axis], **rest) for axis in axes_for(question, drive)]
     wanted = check_goal(goal) if goal else goal_of(requests[0])

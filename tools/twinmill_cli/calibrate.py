@@ -114,11 +114,10 @@ def _fit(
     check_new_file(output, force, [model_file.path, *logs])
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file)
-        if history:
-            check_history(history, measurements)
+        runs = check_history(history, measurements) if history else []
         result = fit(measurements, model_file, output, source.command, held=held, force=force)
         if history:
-            append(history, calibration(result, measurements, logs, history))
+            append(history, calibration(result, runs, logs, history))
     section = partial(fit_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.fit(result), source, section=section, as_json=as_json, out=out)
@@ -175,8 +174,8 @@ def _add(
     gains = robot is not None and effect == OWN_GAINS
     known = {} if gains else {t["name"]: t["default"] for t in find_effect(effect)["texts"]}
     rates = {"state_rate": state_rate, "second_rate": second_rate}
-    texts = {"adds_to": adds_to, "formula": formula, **rates}
-    texts = {name: text for name, text in texts.items() if text is not None}
+    typed = {"adds_to": adds_to, "formula": formula, **rates}
+    texts = {name: text for name, text in typed.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
         raise ValueError(
             f"{option(extra[0])}: {effect} has none; it is for `twinmill twin add equation`."

@@ -160,8 +160,9 @@ def _for_ros(
         t_s, twist = _read_velocities(script)
         twists, end_s = TwistScript(t_s, twist, float(t_s[-1])), float(t_s[-1])
     else:
-        end_s = check_script(script, cap_pct)
+        check_script(script, cap_pct)
         t_s, duties_pct = read_script(script)
+        end_s = float(t_s[-1])
         twists = TwistScript.of(ModelFile.load(model).model, Rows(t_s, duties_pct / 100, end_s))
     words = ["twinmill", "robot", "characterise", "--script", str(script), "--script-as", form]
     command = shlex.join([*words, "--model", model])

@@ -17,7 +17,7 @@ from twinmill_cli.output import AsJson, say, telling
 if working():  # not for --help
     from threadpoolctl import threadpool_limits
 
-    from twinmill.data.measurement import load_measurements
+    from twinmill.data.measurement import Measurement, load_measurements
     from twinmill.report import runs as present
     from twinmill.runs.compare import RunComparison, compare_runs, of_robot
     from twinmill.runs.history import healthy_logs
@@ -85,7 +85,7 @@ def _compare_runs(
     for sentence in missing:
         say(sentence)
 
-    def run(path: Path):
+    def run(path: Path) -> Measurement:
         return of_robot(load_measurements([path], model_file.model), path.name, robot)
 
     with telling("comparing runs") as tell, threadpool_limits(1, "blas"):

@@ -25,6 +25,7 @@ if working():  # not for --help
 
     import numpy as np
     import tomlkit
+    from matplotlib.axes import Axes
     from rich.text import Text
 
     from twinmill.diagnosis.explain import Explanation
@@ -36,7 +37,7 @@ if working():  # not for --help
     from twinmill.report import Figure, Section, show, write_report
     from twinmill.report import diagnosis as present
     from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
-    from twinmill.report.tables import Cell, Table, number, tone
+    from twinmill.report.tables import Cell, Table, Tone, number, tone
     from twinmill.terminal import PlainConsole
     from twinmill_cli import main as cli
     from twinmill_cli.frame import provenance
@@ -64,7 +65,11 @@ PAIRS = (
     ("slew_limit", "floor_tilt"),
 )
 WITHIN_95 = 1.96
-TONES = {"right": ("good", "green"), "in part": ("warn", "yellow"), "wrong": ("bad", "red")}
+TONES: dict[str, tuple[Tone, str]] = {
+    "right": ("good", "green"),
+    "in part": ("warn", "yellow"),
+    "wrong": ("bad", "red"),
+}
 
 
 @dataclass(frozen=True)
@@ -208,8 +213,8 @@ def _estimate(hidden: Hidden, result: Explanation) -> ParameterEstimate | None:
     return next((e for e in result.parameters if e.name == hidden.name), None)
 
 
-def _holds(estimate: ParameterEstimate, hidden: Hidden) -> bool:
-    return abs(estimate.value - hidden.value) <= WITHIN_95 * estimate.std
+def _holds(estimate: ParameterEstimate | None, hidden: Hidden) -> bool:
+    return estimate is not None and abs(estimate.value - hidden.value) <= WITHIN_95 * estimate.std
 
 
 def _table(hidden: list[Hidden], result: Explanation) -> Table:
@@ -242,7 +247,7 @@ def _section(hidden: list[Hidden], result: Explanation, words: str, grade: str) 
 def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
     """Ratio of the found size to the sealed one."""
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         axes.axvline(1, color=FLOOR, lw=6, alpha=0.35, label="hidden")
         for row, h in enumerate(hidden):
             if (e := _estimate(h, result)) is not None:

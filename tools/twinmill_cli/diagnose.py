@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -140,7 +140,7 @@ def _told_if_stopped(source: Provenance, as_json: bool) -> Iterator[None]:
         raise typer.Exit(STOPPED) from stop
 
 
-def _with_swarm(path: Path, result: Diagnosis) -> tuple[Diagnosis, dict | None]:
+def _with_swarm(path: Path, result: Diagnosis) -> tuple[Diagnosis, dict[str, Any] | None]:
     """With what is said of the swarm as a whole; Ctrl-C leaves that out."""
     try:
         with telling("the swarm as a whole"):
@@ -163,10 +163,10 @@ def _mending(result: Diagnosis, logs: list[Path], model: str) -> list[tuple[str,
         "robots": "To give each robot its own numbers",
         "runs": "To take the middle of the runs, if it predicts better",
     }
-    if result.lasting or result.robots_off or result.apart:
+    added = result.lasting or result.robots_off
+    if added or result.apart:
         to = Path(f"{stem}_explained.toml")
-        added = result.lasting or result.robots_off
-        reason = "To add what was found" if added else why[result.apart.whose]
+        reason = why[result.apart.whose] if result.apart and not added else "To add what was found"
         told.append((reason, command_line("explain", logs, model, to)))
     elif result.verdict == "refit_enough":
         to = Path(f"{stem}_fitted.toml")
@@ -210,7 +210,7 @@ def robots_recorded(path: Path, measurements: Measurements) -> int:
     return len({m.label for m in measurements if m.log_name == path.name})
 
 
-def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
+def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict[str, Any] | None]:
     """Compares the whole log with swarms of the model that was found.
 
     Returns:

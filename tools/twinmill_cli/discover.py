@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -188,7 +188,7 @@ def _source(
 
 
 @contextmanager
-def _progress(generations: int) -> Iterator:
+def _progress(generations: int) -> Iterator[Callable[[int, int], None]]:
     with progress_bar() as progress:
         task = progress.add_task("swarms", total=generations * PER_GENERATION)
         yield lambda tried, kept: progress.update(

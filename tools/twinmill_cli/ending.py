@@ -178,7 +178,7 @@ def _told(error: Exception) -> tuple[int, str]:
     if isinstance(error, ModuleNotFoundError) and not isinstance(error, MissingExtra):
         if error.name != LAB and (error.name or "twinmill").startswith("twinmill"):
             raise error
-        return 1, missing(error.name)
+        return 1, missing(error.name or "")
     if isinstance(error, OSError) and error.errno in NO_ROOM:
         return 1, _short(f"{error.filename or 'the output'}: {NO_ROOM[error.errno]}{_then()}.")
     if isinstance(error, OSError) and error.filename:
@@ -208,13 +208,13 @@ def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
         print_object({**_as_of_robots(words), **told})
 
 
-def _as_of_robots(words: list[str]) -> dict:
+def _as_of_robots(words: list[str]) -> dict[str, Any]:
     """Fields that every object of a command to robots has."""
     verb = words[1] if words[0] == "swarm" else ""
     return {"verb": verb, "ok": False, "robots": []} if verb in TO_ROBOTS else {}
 
 
-def _findings(error: Exception) -> list[dict]:
+def _findings(error: Exception) -> list[dict[str, Any]]:
     """Findings on a log that cannot be judged; empty for other errors."""
     reading = sys.modules.get("twinmill.data.measurement")
     if reading and isinstance(error, reading.LogError):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -43,7 +43,7 @@ def _export(
     model: Model = DEFAULT_MODEL,
     force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Write a log as MCAP for Foxglove, as a ROS bag, or as tables, CSV or Parquet.
 
     MCAP holds all channels with all fields, and robots, views and paths to look

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -66,7 +66,7 @@ def _export_model(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the samples.")] = 1,
     force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Export a model to other simulators, and list what their format cannot represent.
 
     The MJCF runs in MuJoCo as it is. SDF, URDF and ros2_control parameters have

@@ -18,6 +18,7 @@ if working():  # not for --help
 
     from rich import box
     from rich.console import Group
+    from rich.progress import TaskID
     from rich.table import Table
     from rich.text import Text
 
@@ -178,7 +179,7 @@ def _update_all(targets: list[Target], request: UpdateRequest, fleet: Fleet) -> 
         for target in targets:
             line = progress.add_task(f"{target.host}: waits", total=1)
 
-            def say(step: str, line=line, target=target) -> None:
+            def say(step: str, line: TaskID = line, target: Target = target) -> None:
                 progress.update(line, description=f"{target.host}: {step}")
 
             futures.append(pool.submit(update, target, request, fleet, say))

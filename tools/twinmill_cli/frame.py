@@ -109,13 +109,13 @@ def read(logs: list[Path], model: str, model_file: ModelFile) -> Given:
         return Given(logs, model, model_file, load(logs, model_file))
 
 
-def told(measurements: Measurements) -> dict:
+def told(measurements: Measurements) -> dict[str, Any]:
     """Provenance as JSON output carries it."""
     return {"input": [finding.to_json() for finding in measurements.findings]}
 
 
 def finish(
-    data: dict,
+    data: dict[str, Any],
     text: RenderableType | None,
     source: Provenance,
     *,

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -26,8 +27,9 @@ if working():  # not for --help
     from rich.text import Text
 
     from twinmill.data.checks.words import COLUMNS
+    from twinmill.data.log import CommandKind
     from twinmill.experiment.drives import drive as plan
-    from twinmill.experiment.wheel_signs import csv_text, script
+    from twinmill.experiment.wheel_signs import csv_text, drive_of, script
     from twinmill.export.script import TwistScript, write_publisher
     from twinmill.files import replacing_folder
 
@@ -131,7 +133,7 @@ class Have:
 
     poses: str
     robot: str
-    drive: str
+    drive: CommandKind
     wheels: str
     clocks: str
     number: int
@@ -176,7 +178,7 @@ def _guide(
     return have
 
 
-def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
+def _have(given: Mapping[str, StrEnum | None], number: int, asks: bool) -> Have:
     """Collects the equipment from options, from what follows from them, and from questions.
 
     Raises:
@@ -201,7 +203,8 @@ def _have(given: dict[str, StrEnum | None], number: int, asks: bool) -> Have:
             "--poses vicon: our robot's drives are recorded with poses live on the bus, and of "
             "Vicon exports are read alone; bring its poses to ROS or to a table (--poses ros, csv)."
         )
-    return Have(**{name: answer.value for name, answer in known.items()}, number=number)
+    chosen: dict[str, Any] = {name: answer.value for name, answer in known.items()}
+    return Have(**chosen, number=number)
 
 
 def _following(known: dict[str, StrEnum]) -> dict[str, StrEnum]:
@@ -257,7 +260,7 @@ def _wrapped(text: str) -> str:
     return "".join(parts)
 
 
-def _filled(paragraph: re.Match) -> str:
+def _filled(paragraph: re.Match[str]) -> str:
     text = textwrap.fill(paragraph[0], WIDTH, break_long_words=False, break_on_hyphens=False)
     return text + "\n"
 
@@ -297,7 +300,7 @@ def _first_drive(model: native.Model) -> tuple[list[str], np.ndarray]:
         speeds = np.pad(speeds, ((0, 0), (0, 4 - speeds.shape[1])))
         top = np.abs(speeds).max()
         values = np.rint(100 * speeds / top) if model.drive == "duty" else speeds
-    names = [name for name in COLUMNS[model.drive] if name]
+    names = [name for name in COLUMNS[drive_of(model)] if name]
     still = np.zeros(len(names))
     rows = [np.append(at_s, row) for at_s, row in zip(t_s, [*values, still], strict=True)]
     return names, np.round(rows, 3)

@@ -7,7 +7,7 @@ import math
 import re
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,8 @@ from twinmill_cli.spelling import typed
 if working():  # not for --help
     from twinmill.counted import counted
     from twinmill.data.importers.columns import Guess, is_usual, to_toml
-    from twinmill.data.importers.import_log import ImportOptions, explain_columns, import_log
+    from twinmill.data.importers.import_log import explain_columns, import_log
+    from twinmill.data.importers.options import ImportOptions
     from twinmill.data.importers.plain import KNOWN
     from twinmill.data.importers.robot_files import files_of
     from twinmill.data.importers.ros_bag import Topic, guess_pairs, list_topics, numbering
@@ -75,24 +76,28 @@ def _flips(given: list[str]) -> dict[int | None, frozenset[str]]:
     return columns
 
 
-def _renames(given: list[str]) -> dict[int | None, dict[str, str]]:
-    """New names of columns by robot; None stands for all of them."""
-    names: dict[int | None, dict[str, str]] = {}
+def _renames(given: list[str]) -> tuple[dict[str, str], dict[int, dict[str, str]]]:
+    """New names of columns of all robots, and those of single ones by number."""
+    of_all: dict[str, str] = {}
+    own_names: dict[int, dict[str, str]] = {}
     for text in given:
         old, new = _pair(text, "--rename OLD=NEW")
         robot, _, own = old.partition("=")
         key = _number_of(robot) if own else None
-        names.setdefault(key, {})[old if key is None else own] = new
-    return names
+        if key is None:
+            of_all[old] = new
+        else:
+            own_names.setdefault(key, {})[own] = new
+    return of_all, own_names
 
 
 def _two_robots(text: str) -> tuple[int, int]:
-    numbers = [_number_of(robot) for robot in text.split("=")]
-    if len(numbers) != 2 or None in numbers or numbers[0] == numbers[1]:
+    first, second = map(_number_of, text.partition("=")[::2])
+    if first is None or second is None or first == second:
         raise typer.BadParameter(
             f"{text} is no two robots, as R01=R02 is.", param_hint="'--exchange'"
         )
-    return numbers[0], numbers[1]
+    return first, second
 
 
 def register(app: typer.Typer) -> None:
@@ -289,7 +294,7 @@ def _command(
     shifts_s = _of_robots("--pose-shift-s", pose_shift_s)
     gains_ppm = _of_robots("--pose-clock-ppm", pose_clock_ppm)
     turns_deg = _of_robots("--heading-offset-deg", heading_offset_deg)
-    renames = _renames(rename or [])
+    renames, own_renames = _renames(rename or [])
     if beside:
         raise LogError(
             f"{beside[0]}: stands alone; write the option before each file, or quote the "
@@ -302,7 +307,8 @@ def _command(
             "commands": files_of(commands, "commands"),
         }
         explained = explain_columns(
-            *(paths[0] if paths else None for paths in asked.values()),
+            next(iter(asked["poses"]), None),
+            next(iter(asked["commands"]), None),
             topics=(pose[0] if pose else None, command[0] if command else None),
         )
         log = str(out or "run.lcmlog")
@@ -326,8 +332,8 @@ def _command(
         wheel_factor=wheel_factor,
         command_timeout_s=command_timeout_s,
         robot_id=robot_id,
-        rename=renames.pop(None, {}),
-        own_renames=renames,
+        rename=renames,
+        own_renames=own_renames,
         exchange=tuple(_two_robots(text) for text in exchange or []),
         robots={
             name: _number(number)
@@ -484,7 +490,7 @@ def _number(text: str) -> int:
     return int(text)
 
 
-def _print(summary: dict) -> None:
+def _print(summary: dict[str, Any]) -> None:
     columns = {
         "robot_id": "robot",
         "command_kind": "driven by",

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -155,12 +155,12 @@ def inferred(
 
             progress("what the new model still misses in these logs")
             written = better(results[0], given.model_file, output, source.command)
-    if keep is not None:
-        with_kept(given.model_file, results[0].always, keep, source.command).write(force)
+    if keep is not None and (always := results[0].always):
+        with_kept(given.model_file, always, keep, source.command).write(force)
     if written:
         written.file.write(force)
     each = [{"sentence": sentence(result.answer), **result.to_json()} for result in results]
-    data = each[0] if len(each) == 1 else {"robots": each}
+    data: dict[str, Any] = each[0] if len(each) == 1 else {"robots": each}
     answer = results[0].answer if len(results) == 1 else None
     writes = with_own("explain" if verb == "diagnose" else verb, own)
     mending = _mending(answer, writes, given) if answer and not written else []

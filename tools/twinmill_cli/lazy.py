@@ -9,13 +9,16 @@ import gc
 import os
 import sys
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill_cli import early
+
+if TYPE_CHECKING:  # the bases of what Typer exports
+    from typer._click.core import Command, Context
 
 HELP = {"-h", "--help"}
 
@@ -55,7 +58,7 @@ class LazyCommand(TyperCommand):
         self.registered, self.renamed = registered or name, renamed
         self.below: dict[str, LazyCommand] = {}  # commands whose first word is this one's name
 
-    def command(self) -> TyperCommand | TyperGroup:
+    def command(self) -> "Command":
         """The subcommand itself."""
         app = typer.Typer()
         gc.disable()  # see __init__.py
@@ -71,9 +74,9 @@ class LazyCommand(TyperCommand):
         gc.freeze()
         gc.enable()
         module.register(app)
-        for command in app.registered_commands:
+        for told in app.registered_commands:
             # Typer reads all annotations; what a command returns is a type of the library.
-            command.callback.__annotations__.pop("return", None)
+            told.callback.__annotations__.pop("return", None)
         command = typer.main.get_group(app).commands[self.registered]
         if not working():
             for leaf in command.commands.values() if isinstance(command, TyperGroup) else [command]:
@@ -87,7 +90,7 @@ class LazyCommand(TyperCommand):
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **options: Any
-    ) -> typer.Context:
+    ) -> "Context":
         """That of the subcommand, which is then what runs.
 
         Raises:

@@ -267,16 +267,16 @@ class Commands(TyperGroup):
                 for new, old in BELOW.get(name, {}).items()
             }
             if name in GROUPS:
-                summary = GROUPS[name]
+                summary, own = GROUPS[name], [*below.values()]
                 self.add_command(
-                    TyperGroup(name=name, help=summary, commands=below, no_args_is_help=True)
+                    TyperGroup(name=name, help=summary, commands=own, no_args_is_help=True)
                 )
             else:
                 command = LazyCommand(name, *told[name])
                 command.below = below
                 self.add_command(command)
-        for first, below in BELOW.items():
-            for new, old in below.items():
+        for first, words in BELOW.items():
+            for new, old in words.items():
                 if old not in self.commands:
                     self.add_command(LazyCommand(old, *told[old], renamed=f"{first} {new}"))
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -147,8 +147,10 @@ def _matters(
                 name: phase_of(asked, _table(asked, folder, progress), wanted)
                 for name, asked in asked_maps.items()
             }
-    section = present.section(found, maps) if out else None
-    report = write_report(out, section.title, source, [section], note=present.NOTE) if out else None
+    report = None
+    if out:
+        section = present.section(found, maps)
+        report = write_report(out, section.title, source, [section], note=present.NOTE)
     data = {**to_json(found), **source.to_json(), "report": str(report) if report else None}
     deliver(data, _terminal(found, report), as_json)
     return found
@@ -200,7 +202,7 @@ def _table(request: Request, folder: Path, progress: Progress) -> pa.Table:
     return read_sweep(place)[1]
 
 
-def _command_line(given: dict) -> str:
+def _command_line(given: dict[str, Any]) -> str:
     """The command that does this again."""
     words = ["twinmill", "swarm", "matters", *map(str, given["logs"] or [])]
     for name in ("model", "behavior", "goal", "n"):

@@ -67,10 +67,10 @@ def _metrics(
     if live and out:
         raise ValueError("--out: a report is of a log; record the bus with lcm-logger.")
     model_file = open_model(model, out)
-    scale = tuple(model_file.model.get(n) for n in ("sensor.range_m", "robot.body_radius_m"))
+    range_m, radius_m = map(model_file.model.get, ("sensor.range_m", "robot.body_radius_m"))
     not_of_ring = ["--odd", odd] if odd else []
-    if live:
-        question = Question(channel_prefix, *scale, robot_ids(odd))
+    if log is None:
+        question = Question(channel_prefix, range_m, radius_m, robot_ids(odd))
         swarm = ["--channel-prefix", channel_prefix] if channel_prefix else []
         verb = shlex.join(["metrics", "--live", *swarm, *not_of_ring])
         source = provenance(command_line(verb, [], model), model_file)
@@ -78,7 +78,7 @@ def _metrics(
     verb = shlex.join(["metrics", *not_of_ring])
     source = provenance(command_line(verb, [log], model), model_file)
     with busy(f"reading {log}"):
-        series = swarm_metrics(read_log(log), *scale, robot_ids(odd))
+        series = swarm_metrics(read_log(log), range_m, radius_m, robot_ids(odd))
     section = present.section(series)
     report = write_report(out, section.title, source, [section], note=present.NOTE) if out else None
     data = {**series.to_json(), **source.to_json(), "report": str(report) if report else None}

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from typing import Any
 
 from twinmill_cli.lazy import working
 from twinmill_cli.output import print_object
@@ -32,7 +33,9 @@ ROWS = {  # name: what people read, format
 }
 
 
-def follow(url: str, duration_s: float, question: Question, *, source: dict, as_json: bool) -> int:
+def follow(
+    url: str, duration_s: float, question: Question, *, source: dict[str, Any], as_json: bool
+) -> int:
     """Shows what is heard until Ctrl-C, or for some time.
 
     Returns:
@@ -85,7 +88,10 @@ def _column(series: SwarmSeries | None, names: list[str]) -> list[tuple[str | Te
     if series is None:
         return [("-", "")] * (len(names) + 3)
     last_s = min(series.t_s[-1] - series.t_s[0], WINDOW_S)
-    cells = [(f"{last_s:.0f} s", "now"), (Text(series.final, COLORS[series.final]), "")]
+    cells: list[tuple[str | Text, str]] = [
+        (f"{last_s:.0f} s", "now"),
+        (Text(series.final, COLORS[series.final]), ""),
+    ]
     for name in names:
         k, form = native.METRICS.index(name), ROWS[name][1]
         cells.append((format(series.mean[k], form), format(series.values[-1, k], form)))

@@ -125,9 +125,15 @@ def _next(
     if is_mjcf(model):
         from twinmill_cli.joints import designed  # MuJoCo's Python is slow to import
 
-        how_long = {"duration_s": duration_s, "times_speed": times_speed}
-        told_too = {"own": own or [], "force": force, "as_json": as_json, "out": out}
-        return designed(logs, model, output, **how_long, **told_too)
+        return designed(
+            *(logs, model, output),
+            own=own or [],
+            duration_s=duration_s,
+            times_speed=times_speed,
+            force=force,
+            as_json=as_json,
+            out=out,
+        )
     if own and behavior:
         raise ValueError(
             "next: --for draws models from the uncertainty of the fits, to which --own adds "

@@ -24,7 +24,7 @@ if working():  # not for --help
     from twinmill.data.natnet_stream import Stream, StreamError, find_server
     from twinmill.data.optitrack import Check, Robots, View
     from twinmill.report import show
-    from twinmill.report.tables import Cell, Table
+    from twinmill.report.tables import Cell, Table, Tone
     from twinmill.terminal import PlainConsole
 
 PATIENCE_S = 3.0  # without a frame: something is wrong
@@ -143,5 +143,5 @@ def _mark(check: Check) -> str:
     return {True: "well", False: "wrong", None: "-"}[check.ok]
 
 
-def _tone(check: Check) -> str:
-    return {True: "good", False: "bad", None: "dim"}[check.ok]
+def _tone(check: Check) -> Tone:
+    return "dim" if check.ok is None else "good" if check.ok else "bad"

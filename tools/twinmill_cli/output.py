@@ -9,7 +9,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Annotated, TextIO
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
@@ -70,7 +70,7 @@ def has_told() -> bool:
     return any(stream is sys.stdout for stream in _told_on)
 
 
-def print_object(data: dict) -> None:
+def print_object(data: dict[str, Any]) -> None:
     """One JSON object on stdout, in one line."""
     from twinmill.files import plain  # not for --help
 
@@ -86,7 +86,7 @@ def say(sentence: str, program: str = "twinmill") -> None:
         print(f"{program}: {plain_line(sentence, MESSAGE_MAX)}", file=sys.stderr, flush=True)
 
 
-def deliver(data: dict, text: RenderableType | None, as_json: bool) -> None:
+def deliver(data: dict[str, Any], text: RenderableType | None, as_json: bool) -> None:
     """Prints the one or the other on stdout; text that must not wrap is not cut either."""
     with unstopped():
         if as_json:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -26,7 +26,7 @@ if working():  # not for --help
         slider_figure,
         thumbnail_figure,
     )
-    from twinmill.report.tables import Cell, Table, number
+    from twinmill.report.tables import Cell, Table, Tone, number
     from twinmill.swarm.axes import ALIASES
     from twinmill.swarm.classes import check_goal, goal_of
     from twinmill.swarm.experiments import Experiment, agreement, next_cells, read_experiments
@@ -69,7 +69,7 @@ def _phase(
         typer.Option("--out", metavar="DIR", help="Folder of the report; default: SWEEP/phase."),
     ] = None,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Draw the phase diagram of a sweep, and where to experiment next.
 
     Example: twinmill swarm phase sweep --experiments floor.csv
@@ -140,15 +140,15 @@ def _section(
     phase: Phase,
     place: dict[str, float],
     runs: list[Experiment],
-    match: dict | None,
+    match: dict[str, Any] | None,
     *,
-    worth: list[dict],
+    worth: list[dict[str, Any]],
     has_rival: bool,
 ) -> Section:
     best = int((phase.hits / phase.seeds).argmax())
     low, high = phase.intervals()[best]
     share = phase.hits[best] / phase.seeds
-    score = [(f"best '{phase.goal}'", f"{100 * share:.0f} %", "")]
+    score: list[tuple[str, str, Tone]] = [(f"best '{phase.goal}'", f"{100 * share:.0f} %", "")]
     verdict = (
         f"'{phase.goal}' is most probable at {phase.where(best)}: {100 * share:.0f} % of "
         f"{phase.seeds} runs (95 % interval {100 * low:.0f} to {100 * high:.0f} %)"
@@ -179,7 +179,7 @@ def _section(
     )
 
 
-def _agreement(match: dict) -> str:
+def _agreement(match: dict[str, Any]) -> str:
     """How many experiments ended as predicted, and how many cannot tell, in words."""
     told = ""
     if match["of"]:
@@ -216,7 +216,7 @@ def _run_table(phase: Phase, runs: list[Experiment]) -> Table:
     )
 
 
-def _next_table(phase: Phase, worth: list[dict], has_rival: bool) -> Table:
+def _next_table(phase: Phase, worth: list[dict[str, Any]], has_rival: bool) -> Table:
     names = [axis.name for axis in phase.axes if len(axis.values) > 1]
     rows = [
         [

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,6 +15,7 @@ from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
     import matplotlib
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
     from twinmill.data.log import LogError
@@ -24,6 +26,8 @@ if working():  # not for --help
     from twinmill.report.canvas import STYLE, draw
     from twinmill.report.log_figures import Drawing
     from twinmill.version import __version__
+
+    Panel = tuple[Callable[[Axes], None], float, str, str]
 
 SUFFIXES = (".png", ".svg", ".html")
 WIDTH_IN, DPI = 8.0, 150
@@ -44,7 +48,7 @@ def _plot(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what exists.")] = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Draw paths, speeds, bits and wheel commands of all robots in a log.
 
     Speeds come from the poses. Twins on channels TWIN_... are dashed.
@@ -74,11 +78,11 @@ def _plot(
     return data
 
 
-def _panels(multi_log: MultiLog, log: Path) -> list[tuple]:
+def _panels(multi_log: MultiLog, log: Path) -> list[Panel]:
     """(painter, height_in, title, caption) of all that the log can show."""
     drawing = Drawing(multi_log.robots, multi_log.bodies)
     rows = len(drawing.driven)
-    panels = []
+    panels: list[Panel] = []
     if drawing.tracked:
         panels += [
             (drawing.paths, 4.6, "Paths", "Seen from above; dots are the ends, lines the front."),
@@ -97,7 +101,7 @@ def _panels(multi_log: MultiLog, log: Path) -> list[tuple]:
     return panels
 
 
-def _sheet(log: Path, panels: list[tuple], path: Path, kind: str) -> None:
+def _sheet(log: Path, panels: list[Panel], path: Path, kind: str) -> None:
     """All panels below each other in one picture."""
     heights = [height_in for _, height_in, _, _ in panels]
     with matplotlib.rc_context(STYLE):
@@ -111,7 +115,7 @@ def _sheet(log: Path, panels: list[tuple], path: Path, kind: str) -> None:
         canvas.savefig(path, format=kind, metadata=metadata[kind])
 
 
-def _page(log: Path, multi_log: MultiLog, panels: list[tuple], source: Provenance) -> str:
+def _page(log: Path, multi_log: MultiLog, panels: list[Panel], source: Provenance) -> str:
     figures = [
         Figure(draw(height_in + 0.2, paint), title, caption)
         for paint, height_in, title, caption in panels

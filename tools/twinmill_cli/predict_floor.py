@@ -92,6 +92,8 @@ def _predict_floor(
         seed=seed,
     )
     digest = write_plan(plan, output)
+    knows = knows_errors(request)
+    anew, truncated = out_of_bounds(request, draws, seed) if knows else (0, [])
     data = {
         "plan": str(output / PLAN),
         "sealed": str(output / SEALED),
@@ -105,12 +107,10 @@ def _predict_floor(
             for cell, bit, point in zip(numbers, bits, plan.expected.points.tolist(), strict=True)
         ],
         "runs": len(order),
-        "draws": len(expected.draws) if knows_errors(request) else 0,
-        "draws_out_of_bounds": 0,
-        "truncated": [],
+        "draws": len(expected.draws) if knows else 0,
+        "draws_out_of_bounds": anew,
+        "truncated": truncated,
     }
-    if data["draws"]:
-        data["draws_out_of_bounds"], data["truncated"] = out_of_bounds(request, draws, seed)
     lines = [
         f"Planned: {counted(len(order), 'run')} of {counted(cells, 'cell')}, together worth "
         f"{bits[-1]:.1f} bit.",
@@ -121,8 +121,8 @@ def _predict_floor(
             f"{request.model_name} says nothing of the errors of its numbers, so that the "
             "probabilities count chance alone; fit the model first (twinmill fit), sweep again."
         )
-    if anew := data["draws_out_of_bounds"]:
-        names = f" ({', '.join(data['truncated'])})" if data["truncated"] else ""
+    if anew:
+        names = f" ({', '.join(truncated)})" if truncated else ""
         lines.append(
             f"{anew} of {anew + draws} models drawn were out of bounds{names} and drawn anew: the "
             "predictions are of what is within."

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shlex
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -37,7 +37,7 @@ def _set(
     model: Model = DEFAULT_MODEL,
     force: Force = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Set parameters of a model by hand, into a new model file.
 
     What fits told of these numbers is taken out of the new file.

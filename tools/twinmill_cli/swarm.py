@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -174,12 +174,12 @@ def _drive(
     behavior: str,
     voice: Voice,
     *,
-    data: dict,
+    data: dict[str, Any],
     as_json: bool,
     heard: str,
     ends: Callable[[], str],
     signals: Sequence[int],
-    **options,
+    **options: Any,
 ) -> Verdict:
     """Starts robots and holds them. Whatever ends that stops them before a word is said of it.
 
@@ -346,18 +346,18 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     """Prints the table once. Returns the exit code."""
     fleet.listen(1.0)
     known = fleet.robots
-    fleet.listen(RUN_PERIOD_S - 1, lambda: known and all(r.run for r in known.values()))
+    fleet.listen(RUN_PERIOD_S - 1, lambda: bool(known) and all(r.run for r in known.values()))
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
-    heard = f"Heard: {names(fleet.robots)}." if robots else "No robot is heard."
-    heard = Verdict(bool(robots), heard)
+    told = f"Heard: {names(fleet.robots)}." if robots else "No robot is heard."
+    heard = Verdict(bool(robots), told)
     tell.ask_clocks(fleet, set(fleet.robots))
     odd = clocks(fleet, fleet.robots)
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
-        known = [r.to_json() for r in robots]
-        print_object({**data, "robots": known, "key_fault": key_fault or None})
+        of_each = [r.to_json() for r in robots]
+        print_object({**data, "robots": of_each, "key_fault": key_fault or None})
     else:
         PlainConsole().print(status_table(robots, has_key=fleet.has_key))
         if odd:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 
@@ -44,7 +44,9 @@ def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
     return " ".join(filter(None, [odd, of_late(known)]))
 
 
-def finish(verb: str, given: list[Answer], verdict: Verdict, data: dict, *, as_json: bool) -> int:
+def finish(
+    verb: str, given: list[Answer], verdict: Verdict, data: dict[str, Any], *, as_json: bool
+) -> int:
     """Prints what came of a command. Returns its exit code.
 
     If need be on stderr alone; there, too, what is wrong where stdout leads nowhere.

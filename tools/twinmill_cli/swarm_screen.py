@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 from rich import box
 from rich.table import Table
@@ -102,7 +103,7 @@ def _link(robot: Robot) -> Text:
     return Text({None: "armed", True: "held", False: "untethered"}[robot.is_tethered])
 
 
-def _battery(telemetry) -> Text:
+def _battery(telemetry: Any) -> Text:
     if telemetry is None or telemetry.battery_V != telemetry.battery_V:
         return Text("?")
     low = telemetry.status_flags & telemetry.STATUS_BATTERY_LOW

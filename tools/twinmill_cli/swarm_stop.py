@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperCommand
@@ -37,6 +37,9 @@ if working():  # not for --help
     from twinmill_cli.swarm_end import driving, finish
     from twinmill_cli.swarm_verdict import Saying, Verdict, of_dry_run, of_stop
     from twinmill_cli.voice import Voice
+
+if TYPE_CHECKING:  # the base of what Typer exports
+    from typer._click.core import Context
 
 WRONG_COMMAND_LINE = 2
 MISREAD = "twinmill_cli.misread"  # in a context: why not all of its command line was read
@@ -82,7 +85,7 @@ class StopCommand(TyperCommand):
 
     def make_context(
         self, info_name: str | None, args: list[str], *rest: Any, **options: Any
-    ) -> typer.Context:
+    ) -> Context:
         """Typer's; where it would refuse, that of what is left without the words on robots.
 
         Raises:

@@ -10,12 +10,11 @@ from datetime import datetime
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
 from twinmill.robots.countdown import NONE_BEGUN, STOPPED
-from twinmill.robots.fleet import DRY_RUN, Robot
+from twinmill.robots.fleet import DRIVING, DRY_RUN, Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
     AHEAD_S,
     CLOCK_WARN_S,
-    DRIVING,
     LATE_S,
     NEVER_HEARD,
     NO_KEY,

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -40,7 +40,7 @@ def _tags(
     board: Annotated[bool, typer.Option("--board", help="The board for the lens, too.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace PDF if it exists.")] = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Print tags for robots, to scale, for `twinmill track`.
 
     A sheet has the robot's number, a line that goes to its front, and a ruler

@@ -6,7 +6,7 @@ from __future__ import annotations
 import itertools
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -30,6 +30,7 @@ if working():  # not for --help
         KEYS,
         Ball,
         Fitted,
+        PictureResult,
         ball_pixels,
         evaluate,
         find_ball,
@@ -132,7 +133,7 @@ def _threshold(
     good = not _problem(found)
     if good and config:
         write_settings(config, settings)
-    if good and write:
+    if good and write and remote:
         remote.run("configure", *(f"{key}={value}" for key, value in settings.items()))
         remote.run("restart")
         decide(0)
@@ -213,9 +214,9 @@ def _take(
 ) -> list[Picture]:
     if images:
         return source.read_pictures(images, size_px)
-    if camera:
-        return source.from_camera(camera, count, size_px)
-    return source.from_robot(remote, count, size_px)
+    if remote:
+        return source.from_robot(remote, count, size_px)
+    return source.from_camera(camera, count, size_px)
 
 
 def _balls(pictures: list[Picture], colours: list[str], given: list[str]) -> list[Ball]:
@@ -257,11 +258,11 @@ def _tell(
     balls: list[Ball],
     found: dict[str, Fitted],
     *,
-    before: list,
-    after: list,
+    before: list[PictureResult],
+    after: list[PictureResult],
     as_json: bool,
 ) -> None:
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "name": picture.name,
             "ball_px": [ball.x_px, ball.y_px, ball.radius_px],

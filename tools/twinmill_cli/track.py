@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -30,7 +30,7 @@ if working():  # not for --help
     from twinmill.numbers_typed import typed_float, typed_int
     from twinmill.terminal import Fitting, PlainConsole, progress_bar
     from twinmill.track.align import align
-    from twinmill.track.boards import Board
+    from twinmill.track.boards import KINDS, Board
     from twinmill.track.camera import Camera, read_camera
     from twinmill.track.detect import ROBOTS, Detector, Sightings, gather
     from twinmill.track.film import Film, LiveCamera
@@ -144,7 +144,7 @@ def _track(
     lcm_url: LcmUrl = "",
     force: Force = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Find tagged robots in films of cameras over the floor, and write their poses.
 
     The CSV is what `twinmill import --poses` reads. Several films of one run are
@@ -237,7 +237,7 @@ class _Found:
     pairs: list[Pair | None]
     paths: list[RobotPath]
 
-    def to_json(self) -> list[dict]:
+    def to_json(self) -> list[dict[str, Any]]:
         """One object for each camera."""
         return [
             {
@@ -296,7 +296,7 @@ def _found(
     stamps_s, seen = zip(*(_looked(film, tags.family) for film in films), strict=True)
     views = [look(*row) for row in zip(eyes, measured, seen, strict=True)]
     numbers = {n for tagged in seen for n in tagged.number.tolist()}
-    if len(films) > 1 and (missing := (tags.robots or set()) - numbers):
+    if len(films) > 1 and (missing := (tags.robots or frozenset()) - numbers):
         raise ValueError(
             f"--robots: tag {min(missing)} is in none of the films; see which tag is on which "
             "robot."
@@ -421,7 +421,7 @@ def _live(
     duration_s: float | None,
     port: int,
     as_json: bool,
-) -> dict:
+) -> dict[str, Any]:
     """Publishes until the time is over, the cameras end, or Ctrl-C."""
     measured, bus = [read_floor(floor) for floor in floors], open_bus(lcm_url)
     page, sources = Page(len(names), port), []
@@ -481,7 +481,7 @@ def _calibrate(
     line_delay_us: LineDelayUs = None,
     force: Force = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Calibrate a camera's lens from a film of a board that is moved in front of it.
 
     The board is that of `twinmill track tags --board`, or a checkerboard. Show
@@ -502,10 +502,11 @@ def _calibrate(
     return data
 
 
-def _board(kind: str, squares: str, square_m: float) -> Board:
+def _board(name: str, squares: str, square_m: float) -> Board:
     across, _, down = squares.partition("x")
-    if kind not in ("charuco", "checkerboard"):
-        raise ValueError(f"--board {kind}: must be charuco or checkerboard.")
+    kind = next((k for k in KINDS if k == name), None)
+    if kind is None:
+        raise ValueError(f"--board {name}: must be charuco or checkerboard.")
     try:
         fits = min(typed_int(across), typed_int(down)) >= 4
     except ValueError:

@@ -3,7 +3,7 @@
 
 import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -25,7 +25,7 @@ app = typer.Typer(
 )
 
 
-def _text(data: dict) -> str:
+def _text(data: dict[str, Any]) -> str:
     classes = ", ".join(f"{name} {count}" for name, count in data["classes"].items())
     worlds = f"{counted(data['worlds'], 'world')} in {counted(data['cells'], 'cell')}"
     lines = [f"{worlds}, {data['wall_s']:.1f} s: {classes}"]

@@ -3,15 +3,20 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
-from typer.core import TyperArgument, TyperCommand, TyperOption
+from typer._coercion import RuntimeParam
+from typer.core import TyperArgument, TyperCommand, TyperOption, _TyperParameter
 
 from twinmill.numbers_typed import REAL
 from twinmill_cli.meant import meant, refuse_one_dash
+
+if TYPE_CHECKING:  # the base of what Typer exports
+    from typer._click.core import Context
 
 OF_PYDANTIC = "Input should be "  # how its messages on a value begin
 
@@ -42,20 +47,17 @@ def _plain(shown: str | None) -> str | None:
     return shown and re.sub(r"<list\[(.*)\]>|<(\w+) range>", r"<\1\2>", shown).lower()
 
 
-class _Word:
+@dataclass(frozen=True)
+class _Word(RuntimeParam):
     """Type of a word of the command line where any word will do, as a text or path; or a flag.
 
     Typer asks pydantic, which takes twice as long to import as NumPy.
     """
 
-    def __init__(self, kind: type) -> None:
-        self.kind = kind
+    kind: Callable[[Any], Any]
 
-    def coerce(self, value: Any, param: TyperOption | TyperArgument, ctx: typer.Context) -> Any:
-        """The value, or all of several; None, or an empty tuple, where none is given."""
+    def _coerce_value(self, value: Any, param: _TyperParameter, ctx: "Context") -> Any:
         many = param.multiple or param.nargs == -1
-        if value is None:
-            return () if many else None
         return [self.kind(one) for one in value] if many else self.kind(value)
 
 
@@ -66,10 +68,11 @@ WORDS = {bool: bool, str: str, Path: Path, list[str]: str, list[Path]: Path}
 
 def _without_pydantic(param: TyperOption | TyperArgument) -> None:
     """Before its first value: parameters of which any word will do."""
-    kind, info = WORDS.get(param.type_descriptor.annotation), param.type_descriptor.parameter_info
+    told, info = param.type_descriptor.annotation, param.type_descriptor.parameter_info
+    kind = WORDS.get(told)
     checked = info.parser or info.exists or info.resolve_path or not info.file_okay
     if kind and not (checked or not info.dir_okay or info.writable):
-        param._runtime_param = _Word(kind)
+        param._runtime_param = _Word(info, told, kind)
 
 
 def _given(argument: TyperArgument, ctx: typer.Context, value: Any) -> Any:
@@ -114,7 +117,7 @@ def _quoting(message: str, value: Any) -> str:
     return f"{given}: must be {why}; give another value."
 
 
-def _each(value: Any) -> list:
+def _each(value: Any) -> list[Any]:
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
@@ -153,15 +156,19 @@ def _each_once(command: TyperCommand, ctx: typer.Context, args: list[str]) -> li
     """Typer's, but an option for one value is refused the second time: it takes the last."""
     _, _, given = command.make_parser(ctx).parse_args(args=[*args])
     for option in given:
-        single = isinstance(option, TyperOption) and not (option.multiple or option.is_flag)
-        if single and given.count(option) > 1:
+        if not isinstance(option, TyperOption) or option.multiple or option.is_flag:
+            continue
+        if given.count(option) > 1:
             raise typer.BadParameter("is given twice, and takes one value.", ctx=ctx, param=option)
     return _parse_args(command, ctx, args)
 
 
-TyperCommand.parse_args = _as_meant
-TyperOption.display_type_rich = _type_shown
-TyperArgument.display_type_rich = _of_argument
-TyperArgument.get_usage_pieces = _usage
-TyperOption.process_value = _finite
-TyperArgument.process_value = _given
+for _changed, _method, _ours in (
+    (TyperCommand, "parse_args", _as_meant),
+    (TyperOption, "display_type_rich", _type_shown),
+    (TyperArgument, "display_type_rich", _of_argument),
+    (TyperArgument, "get_usage_pieces", _usage),
+    (TyperOption, "process_value", _finite),
+    (TyperArgument, "process_value", _given),
+):
+    setattr(_changed, _method, _ours)

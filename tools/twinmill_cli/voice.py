@@ -87,7 +87,7 @@ class Voice:
 
     def __init__(self, *, as_json: bool = False) -> None:
         self.failure: Exception | None = None
-        self._waiting: Queue[Callable[[], None] | None] = Queue()
+        self._waiting: Queue[Callable[[], object] | None] = Queue()
         self._console = PlainConsole(stderr=as_json or not leads_nowhere(STDERR))
         self._live: Live | None = None
         self._newest: RenderableType = ""
@@ -95,7 +95,7 @@ class Voice:
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
-    def tell(self, write: Callable[[], None]) -> None:
+    def tell(self, write: Callable[[], object]) -> None:
         """Has a function called that writes."""
         self._waiting.put(write)
 

@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,7 +21,7 @@ if working():  # not for --help
     from rich.progress import track
 
     from twinmill.data.multi_log import PREFIXES
-    from twinmill.data.stream import from_bus, from_log
+    from twinmill.data.stream import Batch, from_bus, from_log
     from twinmill.extras import needing
     from twinmill.files import check_new_file, replacing
     from twinmill.model.model_file import ModelFile
@@ -28,6 +29,9 @@ if working():  # not for --help
     from twinmill.version import __version__
     from twinmill.watch.live_score import WINDOW_S
     from twinmill_cli.frame import open_model
+
+if TYPE_CHECKING:  # it needs the extra `watch`
+    from twinmill.watch.show import Show
 
 
 def register(app: typer.Typer) -> None:
@@ -56,7 +60,7 @@ def _watch(
     duration_s: DurationS = FOREVER_S,
     force: Annotated[bool, typer.Option("--force", help="Replace FILE if it exists.")] = False,
     as_json: AsJson = False,
-) -> dict:
+) -> dict[str, Any]:
     """Show robots and their twins (channels TWIN_...) side by side in the viewer Rerun.
 
     From above: paths, headings, what each camera looks over, green while it
@@ -69,7 +73,8 @@ def _watch(
         raise ValueError("--save, --connect and --spawn: give one of them.")
     with needing("watch"):
         import rerun  # noqa: F401
-    model_file, warnings = open_model(model, None), []
+    model_file = open_model(model, None)
+    warnings: list[str] = []
     if save:
         check_new_file(save, force, [log, model_file.path])
     batches = from_log(log, warnings) if log else from_bus(lcm_url, duration_s, say)
@@ -92,11 +97,18 @@ def _watch(
     return data
 
 
-def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | None, *, url: str):
+def _show(
+    batches: Iterable[tuple[int, Batch]],
+    model_file: ModelFile,
+    log_name: str | None,
+    file: Path | None,
+    *,
+    url: str,
+) -> Show:
     """Shows all batches, with progress for a log, until they end or Ctrl-C."""
     from twinmill.watch.show import Show, open_stream
 
-    prefixes = PREFIXES
+    prefixes: Sequence[str] = PREFIXES
     if log_name:
         names = {name for _, batch in batches for name in batch.by_channel}
         prefixes = [p for p in PREFIXES if any(name.startswith(f"{p}R") for name in names)]
@@ -115,7 +127,7 @@ def _show(batches, model_file: ModelFile, log_name: str | None, file: Path | Non
     return show
 
 
-def _text(show, save: Path | None, warnings: list[str]) -> str:
+def _text(show: Show, save: Path | None, warnings: list[str]) -> str:
     scores = ", ".join(f"{name} {score:.2f}" for name, score in sorted(show.scores.items()))
     told = f"score of the last {WINDOW_S:g} s: {scores}"
     return "\n".join(

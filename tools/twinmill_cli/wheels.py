@@ -17,7 +17,7 @@ from twinmill_cli.output import AsJson, deliver
 if working():  # not for --help
     import numpy as np
     import twinmill_native as native
-    from rich.console import Group
+    from rich.console import Group, RenderableType
     from rich.text import Text
 
     from twinmill.data.log import read_log
@@ -27,6 +27,7 @@ if working():  # not for --help
         WheelSigns,
         columns_that_act,
         csv_text,
+        drive_of,
         read_signs,
         script,
     )
@@ -93,7 +94,7 @@ def _write(
         with replacing(output, force) as temporary:
             temporary.write_text(csv_text(names, rows))
     data = {"script": str(output), "columns": names, "duration_s": float(rows[-1, 0])}
-    each = ", ".join(columns_that_act(model, model.drive))
+    each = ", ".join(columns_that_act(model, drive_of(model)))
     text = f"Written: {output}, {rows[-1, 0]:g} s, one of {each} at a time."
     deliver(data, text, as_json)
     return 0
@@ -106,7 +107,7 @@ def _twists(model: native.Model, t_s: np.ndarray, values: np.ndarray, end_s: flo
     return TwistScript.of(model, Rows(t_s, values / 100, end_s))
 
 
-def _shown(signs: WheelSigns) -> list:
+def _shown(signs: WheelSigns) -> list[RenderableType]:
     rows = [
         [Cell(c.name), *map(Cell, _speeds(c)), Cell(c.verdict, "good" if c.right else "bad")]
         for c in signs.columns

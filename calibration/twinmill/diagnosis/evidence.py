@@ -221,7 +221,7 @@ class Sums:
         left = 2 * moments[..., None] - grams @ numbers
         return np.einsum("stki,stki->t", numbers, left)
 
-    def some(self, wanted: Sequence[int]) -> "Sums":
+    def some(self, wanted: Sequence[int] | np.ndarray) -> "Sums":
         """Those of the forms of these numbers."""
         return Sums(self.grams[:, wanted], self.moments[:, wanted])
 
@@ -237,7 +237,7 @@ class Pool:
     forms: Sequence[Form]
     raw: np.ndarray
 
-    def some(self, wanted: Sequence[int]) -> "Pool":
+    def some(self, wanted: Sequence[int] | np.ndarray) -> "Pool":
         """Those of these numbers."""
         place = np.cumsum([0, *(len(f.shapes) for f in self.forms)])
         own = np.concatenate([np.arange(place[k], place[k + 1]) for k in wanted])

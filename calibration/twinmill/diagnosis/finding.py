@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from twinmill.defaults import Certainty
 from twinmill.diagnosis.term import TIME
@@ -58,7 +59,7 @@ class Finding:
         """The share in words."""
         return "< 1 %" if self.share < HARDLY else f"{100 * self.share:.0f} %"
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         parameters = [e.to_json() for e in self.parameters]
         group = list(self.group) if self.group else None
@@ -85,7 +86,7 @@ class Ranked:
     parameters: list[ParameterEstimate]
     group: int | None
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return {**vars(self), "parameters": [e.to_json() for e in self.parameters]}
 
@@ -110,7 +111,7 @@ class Late:
     parted: bool
     spread_s: float = 0.0
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return vars(self)
 

@@ -232,11 +232,11 @@ class Form:
         """Form with another value of its constant."""
         return replace(self, constant=float(f"{constant:.4g}"), sizes=())
 
-    def near(self, name: str, parts: Sequence[float]) -> list["Form"]:
+    def near(self, name: str, parts: np.ndarray) -> list["Form"]:
         """Forms with the constant further off, by parts of the step to a better one."""
         if name == "constant":
             return [self.at(self.constant * (1 + self.spread * part)) for part in parts]
-        tried = np.clip(self.damping * DAMPED ** np.array(parts), LEAST_DAMPED, MOST_DAMPED)
+        tried = np.clip(self.damping * DAMPED**parts, LEAST_DAMPED, MOST_DAMPED)
         return [replace(self, damping=float(f"{d:.3g}"), sizes=()) for d in np.unique(tried)]
 
     def filled(self, text: str, names: Mapping[str, str] = MappingProxyType({})) -> str:

@@ -237,7 +237,7 @@ def _that_swings(
     rows.weighed(np.full(len(rows.stretch), HEAVY))
     swinging = np.flatnonzero([f.damping > 0 for f in pool.forms])
     sums = alone.some(swinging).of_rows_that_weigh(HEAVY)
-    net = _promised(sums, [pool.forms[k] for k in swinging], half)
+    net = _promised(sums, [pool.forms[k] for k in swinging.tolist()], half)
     best = np.argsort(-net)[:SHORTLIST]
     left = rows.left[half[rows.stretch]]
     if net[best[0]] <= SETTINGS.formula_takes * left @ left:
@@ -358,8 +358,8 @@ def _best(rows: Evidence, pool: Pool, half: np.ndarray, found: Chosen) -> Chosen
     if net.max() <= 0:
         return None
     near = np.flatnonzero(net >= net.max() - _alike(net.max()))
-    simplest = min(near, key=lambda k: (_complexity(pool.forms[k]), -net[k]))
-    tops = dict.fromkeys([int(simplest), int(np.argmax(net))])
+    simplest = min(near.tolist(), key=lambda k: (_complexity(pool.forms[k]), -net[k]))
+    tops = dict.fromkeys([simplest, int(np.argmax(net))])
     polished = [_polished(rows, pool.some([k]), half, found) for k in tops]
     plainer = [f for c in polished if (f := c.forms[-1].plainer)]
     for form in sized(plainer, rows.motion):

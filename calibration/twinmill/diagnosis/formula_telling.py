@@ -11,8 +11,6 @@ from twinmill.chance import t_quantile
 from twinmill.diagnosis.evidence import Chosen, Evidence, Pool, Proof, Sums, best_of, made
 from twinmill.diagnosis.forms import (
     ANGLES,
-    CHANNELS,
-    SPEEDS,
     USUAL,
     Form,
     names_in,
@@ -21,6 +19,7 @@ from twinmill.diagnosis.forms import (
 from twinmill.diagnosis.formula import Curve, Formula, Number
 from twinmill.diagnosis.recurring import comes_again
 from twinmill.diagnosis.settings import SETTINGS
+from twinmill.diagnosis.term import CHANNELS, SPEEDS
 from twinmill.diagnosis.units import units_of
 
 TRIED = np.linspace(-1, 1, 9)  # constants within a form's spread, and again within a fourth

@@ -107,7 +107,9 @@ def _judged_together(
         ]
         return [body @ parts, *swells, *(f.columns(own, velocity) for f in families)]
 
-    return [*of_all, *(t for some in (*waves, *families) for t in some.terms)], changes
+    of_waves = (t for wave in waves for t in wave.terms)
+    of_families = (t for family in families for t in family.terms)
+    return [*of_all, *of_waves, *of_families], changes
 
 
 def _across(group: str, formula: str, to: str) -> str:
@@ -193,9 +195,9 @@ def _way_m(own: Opened, velocity: np.ndarray) -> np.ndarray:
     return np.cumsum(np.hypot(velocity[:, 0], velocity[:, 1]) * own.response.step_s)
 
 
-def _sizes(values: list[dict]) -> dict[tuple[str, str], float]:
+def _sizes(values: list[dict[tuple[str, str], np.ndarray]]) -> dict[tuple[str, str], float]:
     """One size of each term for all logs."""
-    sizes = {}
+    sizes: dict[tuple[str, str], float] = {}
     step = 1 + sum(len(next(iter(v.values()))) for v in values) // MOST_POINTS
     for key in [k for k in values[0] if all(k in v for v in values)]:
         every = np.concatenate([v[key][::step] for v in values])
@@ -210,7 +212,7 @@ BENDS = (0.3, 0.6, 0.85)  # quantiles of a speed at which its curve may bend
 
 def _bends(velocities: Sequence[np.ndarray]) -> dict[str, float]:
     """Speeds over all logs at which curves may bend: `vx0` to `omega2`, to three digits."""
-    found = {}
+    found: dict[str, float] = {}
     for name, still, speed in zip(SPEEDS, STILL, np.abs(np.concatenate(velocities)).T, strict=True):
         if (speed > still).any():
             bends = np.quantile(speed[speed > still], BENDS)
@@ -236,7 +238,12 @@ def _middles(opened: Sequence[Opened]) -> dict[str, float]:
     return {name: float(f"{value:.4g}") for name, value in found.items()}
 
 
-def _body_columns(own: Opened, velocity: np.ndarray, terms: dict, sizes: dict) -> np.ndarray:
+def _body_columns(
+    own: Opened,
+    velocity: np.ndarray,
+    terms: dict[tuple[str, str], np.ndarray],
+    sizes: dict[tuple[str, str], float],
+) -> np.ndarray:
     """(R, 3 T) change of the rows by each term in each body axis, at (N, 3) `velocity`."""
     response = own.response
     values = np.stack([terms[key] / sizes[key] for key in sizes], axis=-1)

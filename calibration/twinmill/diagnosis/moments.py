@@ -9,7 +9,7 @@ by one, since no effect that acts all the time is like that.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import twinmill_native as native
@@ -78,7 +78,7 @@ class Moment:
     what: What
     at_change: bool = False
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of JSON output."""
         return vars(self)
 
@@ -144,11 +144,11 @@ def events_of(opened: Sequence[Opened], models: Sequence[native.Model]) -> Event
 
 def _several(own: Opened, errors: np.ndarray) -> list[np.ndarray]:
     """Windows of each event, where these are so many that they are no accident; else none."""
-    data = own.trajectory
+    data, floor = own.trajectory, own.known_floor
     moved = data.measured - errors
     missed = np.flatnonzero(
         is_far(errors, data.floor, SETTINGS.far, moved)
-        & (is_far(own.floor.across, data.floor, SETTINGS.far, moved) | ~own.floor.keep)
+        & (is_far(floor.across, data.floor, SETTINGS.far, moved) | ~floor.keep)
     )
     events = _events(missed, data.start_s)
     return events if _weight(events, data.start_s) >= SETTINGS.several else []
@@ -185,7 +185,7 @@ def _at_changes(own: Opened, begins_s: np.ndarray) -> bool:
         return way[last.clip(0)] - way[first.clip(0)] > CHANGES
 
     usual = near(np.arange(track.command_t_s[0], track.command_t_s[-1], NEAR_S / 2)).mean()
-    at = near(begins_s - own.floor.offset_s)
+    at = near(begins_s - own.known_floor.offset_s)
     return bool(at.all() and usual ** len(begins_s) < SETTINGS.dependence_chance)
 
 
@@ -257,7 +257,7 @@ def _lasts(event: np.ndarray, start_s: np.ndarray) -> bool:
 
 def left_out(own: Opened) -> list[Stretch]:
     """Stretches of a second or more that the floor left out as disturbed, and the model misses."""
-    gone = np.flatnonzero(~own.floor.keep)
+    gone = np.flatnonzero(~own.known_floor.keep)
     if not len(gone):
         return []
     data = own.trajectory

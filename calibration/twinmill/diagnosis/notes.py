@@ -98,11 +98,11 @@ def _no_more_than_left(own: Opened) -> Opened:
     and has it for noise. What a model explains is none, nor what reaches into a stretch that is
     left out.
     """
-    seen = own.trajectory.keep
+    seen, floor = own.trajectory.keep, own.known_floor
     if not seen.all():
         seen = seen & ~overlapping(own.trajectory, ~seen)
     left = np.where(seen[:, None, None], own.trajectory.errors(own.model), np.nan)
-    return replace(own, floor=replace(own.floor, rms=np.fmin(own.floor.rms, rms(left))))
+    return replace(own, floor=replace(floor, rms=np.fmin(floor.rms, rms(left))))
 
 
 def is_random(scatters: Sequence[float], score: float) -> bool:
@@ -313,7 +313,7 @@ def irregularity(own: Opened, noise: Noise, model: native.Model, known_mps: floa
     led = along[:, None] + turn[:, None] * _ahead_m2(own.trajectory.measured)[:, ::-1]
     usual = np.sqrt(np.column_stack([led, turn]))
     with np.errstate(invalid="ignore"):
-        over = np.log(own.floor.rms / usual)
+        over = np.log(own.known_floor.rms / usual)
     known = np.isfinite(over).any(axis=0)
     if not known.any():
         return 0.0

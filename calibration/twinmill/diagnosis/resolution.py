@@ -3,13 +3,14 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import twinmill_native as native
 
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import State
 from twinmill.fitting.opening import Opened, wide_gains
-from twinmill.model.parameters import BASE_GAINS, GAINS, drives_sideways
+from twinmill.model.parameters import BASE_GAINS, GAINS, Parameter, drives_sideways
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Resolution:
     ahead: float | None
     sideways: float | None
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """All fields."""
         return asdict(self)
 
@@ -62,7 +63,7 @@ def _shown(
 ) -> tuple[float | None, ...]:
     """Smallest difference of each gain that would be beyond doubt, as a share of it."""
     free = wide_gains(models[0], names)
-    data = [replace(o.data, own=_clock(o)) for o in logs]
+    data = [replace(o.trajectory, own=_clock(o)) for o in logs]
     own = [m.copy() for m in models]
     fit = State(data, own, free).fit_of(free).fit()
     estimates = {e.name: e for e in fit.estimates}
@@ -72,6 +73,6 @@ def _shown(
     )
 
 
-def _clock(own: Opened) -> tuple:
+def _clock(own: Opened) -> tuple[Parameter, ...]:
     """Clock that its log leaves free beside the gains, begun where it is."""
-    return tuple(p.at(own.model.get(p.name)) for p in own.data.own if p.name not in GAINS)
+    return tuple(p.at(own.model.get(p.name)) for p in own.trajectory.own if p.name not in GAINS)

@@ -428,18 +428,18 @@ class VerdictInputs:
             own = of_all(self.findings, self.rest.share)
             effects = [_named(f) for f in own if f.effect != REFIT]
             also += f" It was found in place of {_in_turn(effects)}."
-        depends = self.rest.depends_on and not self.rest.likely
+        is_told = self.rest.depends_on and not self.rest.likely
         taken = sum(f.share for f in self.findings) > self.rest.share
-        if self.noises and not (events or depends or self.rest.firm or taken):
+        if self.noises and not (events or is_told or self.rest.firm or taken):
             what = "Something random disturbs the motion that no effect of the catalogue describes."
             return f"{what}{self._most_likely}{also}"
         by_itself = "it wanders by itself, or " if self.rest.wanders else ""
         depends = f"it depends {on}" if on else f"{by_itself}no formula that was tried describes it"
         what = f": {proven.equals}" if proven else ""
         if taken and named and not proven:
-            own = _in_turn([_named(f) for f in of_all(self.findings, self.rest.share)])
+            most = _in_turn([_named(f) for f in of_all(self.findings, self.rest.share)])
             return (
-                f"Most of the squared error is taken by {own}. Something outside the catalogue is "
+                f"Most of the squared error is taken by {most}. Something outside the catalogue is "
                 f"left; {depends}. {events}"
             ).rstrip()
         return f"Something outside the catalogue is there{what}; {depends}.{also} {events}".rstrip()

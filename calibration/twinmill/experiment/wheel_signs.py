@@ -105,6 +105,11 @@ class WheelSigns:
         }
 
 
+def drive_of(model: native.Model) -> CommandKind:
+    """Kind of the commands that a model's robot takes."""
+    return next(k for k in COLUMNS if k == model.drive)
+
+
 def columns_that_act(model: native.Model, kind: CommandKind) -> dict[str, tuple[int, ...]]:
     """Columns of commands that move this robot, by name; plain wheels as sides.
 
@@ -136,7 +141,7 @@ def script(model: native.Model, duty_pct: int) -> tuple[list[str], np.ndarray]:
         raise ValueError(
             "wheels: this robot steers; drive a curve to the left and see that it goes there."
         )
-    kind = next(k for k in COLUMNS if k == model.drive)
+    kind = drive_of(model)
     names = [name for name in COLUMNS[kind] if name]
     if kind == "twist":
         size = np.array([RIM_MPS, RIM_MPS, TURN_RADPS])

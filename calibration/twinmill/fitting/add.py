@@ -63,7 +63,7 @@ from twinmill.model.parameters import (
     with_role,
 )
 from twinmill.predict.datasets import Trajectory
-from twinmill.predict.detection_errors import DetectionComparison, compare_detections
+from twinmill.predict.detection_errors import DetectionComparison, compared
 from twinmill.predict.detections import all_detections
 
 WORSE = 1.02  # times the held-out score; less is chance ...
@@ -139,7 +139,7 @@ class AddResult:
         gains = GAINS if self.effect == OWN_GAINS else ()
         return [p for p in self.parameters if p.name in gains or _is_of(p.name, self.effect)]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         return {
             "effect": self.effect,
@@ -236,8 +236,8 @@ def add_to_model(
     enlarged = [o.with_model(richer) for o in opened]
     if texts:
         fresh = with_time_constants(fresh, texts, enlarged)
-        for own in judged(enlarged):
-            check_states(own.data, _begun(own.model, fresh))
+        for one in judged(enlarged):
+            check_states(one.data, _begun(one.model, fresh))
         fresh = sized(fresh, enlarged)
     known = {f"{name}.{own}": prior for own, prior in (priors or {}).items()}
     fresh = Choice(priors=known).of(fresh, richer)
@@ -247,7 +247,7 @@ def add_to_model(
     else:
         moved, found = fitted(with_own(enlarged, robot_id, fresh), old, fresh)
     _check_acts(found, fresh, texts or {})
-    held = [HeldOut.of(f) for f in (fitted(opened, [])[1], without, found)]
+    given, refit, kept_out = map(HeldOut.of, (fitted(opened, [])[1], without, found))
     before = comparison(model_file, opened)
     after = comparison(model_file, [o.realigned() for o in moved], path.name)
     after = replace(after, about=robot_id)
@@ -265,12 +265,20 @@ def add_to_model(
         base_told=bool(told),
         robots={} if robot_id is None else {robot_id: own},
         covariance=found.shared_covariance(),
-        shares={name: _takes(*held)},
+        shares={name: _takes(given, refit, kept_out)},
     )
     child = child_of(model_file, news, path, command)
     estimates += own
     return AddResult(
-        *(name, before.model_name, before, after, estimates, *held, child),
+        name,
+        before.model_name,
+        before,
+        after,
+        estimates,
+        given,
+        refit,
+        kept_out,
+        child,
         blocks_t=found.against(without)[2],
         robot_id=robot_id,
         time_notes=time_notes(judged(opened), unsteady_clocks(found), kept),
@@ -316,21 +324,31 @@ def _add_to_camera(
     model = model_file.model
     richer, _, fresh = with_effect(model, effect, {}, None)
     old = [p for p in all_effect_parameters(model, CAMERA_STAGES) if p.name not in held]
-    given, without, found = (
+    as_given, without, found = (
         DetectionFit(cameras, [m.for_robot(c.robot_id) for c in cameras], free)
         for m, free in ((model, []), (model, old), (richer, [*old, *fresh]))
     )
     found.begin_at_best(fresh)
-    heldout = [HeldOut.of(fit.fit()) for fit in (given, without, found)]
+    given, refit, kept_out = (HeldOut.of(fit.fit()) for fit in (as_given, without, found))
     fitted_model = with_estimates(richer, found.estimates)
-    before, after = (compare_detections(cameras, m) for m in (model, fitted_model))
+    before, after = (compared(cameras, m) for m in (model, fitted_model))
     logs = {m.log_name: m.log_sha256 for m in measurements}
-    shares = {effect: _takes(*heldout)}
+    shares = {effect: _takes(given, refit, kept_out)}
     told = Fitted(fitted_model, found.estimates, logs, before.score, after.score, shares=shares)
     child = child_of(model_file, told, path, command)
     name = model_file.path.name
-    blocks_t = found.against(without)[2]
-    return AddResult(effect, name, before, after, found.estimates, *heldout, child, blocks_t)
+    return AddResult(
+        effect,
+        name,
+        before,
+        after,
+        found.estimates,
+        given,
+        refit,
+        kept_out,
+        child,
+        blocks_t=found.against(without)[2],
+    )
 
 
 def with_effect(
@@ -372,10 +390,8 @@ def begun_at_best(
     searched = effect == LEVER_EFFECT or any(with_role(effect, role) for role in WHERE_OR_WHEN)
     if not members or not searched:
         return list(fresh)
-    rows, models, datasets = (
-        [of[i] for i in members] for of in (without.state[0], without.models, without.datasets)
-    )
-    starts = starts_of(effect, models, datasets, rows)
+    models, datasets = [without.models[i] for i in members], [without.datasets[i] for i in members]
+    starts = starts_of(effect, models, datasets, [without.state[0][i] for i in members])
     if starts is None:
         return list(fresh)
     return begun_at(fresh, starts.best(Left.of(without, *projected(without)).at(members)))

@@ -108,8 +108,8 @@ class _Alike:
     def joined(cls, some: Sequence[tuple[np.ndarray, ...]]) -> "_Alike":
         """Joins the products of all batches of features."""
         numbers, columns, *products = zip(*some, strict=True)
-        products = (np.concatenate(own, axis=1) for own in products)
-        return cls(np.concatenate(numbers), np.concatenate(columns), *products)
+        gathered = [np.concatenate(own, axis=1) for own in products]
+        return cls(np.concatenate(numbers), np.concatenate(columns), *gathered)
 
     def gains(self, push: np.ndarray, pull: np.ndarray) -> np.ndarray:
         """(L, ridges) by how much each lowers the squared error on left-out parts.
@@ -152,15 +152,16 @@ class Learners:
     def __init__(
         self, batches: Iterable[tuple[np.ndarray, Sequence[np.ndarray]]], parts: Parts
     ) -> None:
-        self.parts, self._rows = parts, []
+        self.parts = parts
+        self._rows: list[np.ndarray] = []
         self._places: list[tuple[int, np.ndarray]] = []  # of each group: its batch, columns there
-        found: dict[int, list[tuple]] = {}
+        found: dict[int, list[tuple[np.ndarray, ...]]] = {}
         first = 0
         for x, groups in batches:
             grams = parts.summed(squares(x, parts.cells))
             for width in dict.fromkeys(map(len, groups)):
                 alike = np.flatnonzero([len(own) == width for own in groups])
-                own = np.array([groups[k] for k in alike])
+                own = np.array([groups[k] for k in alike.tolist()])
                 products = (gram[:, own[:, :, None], own[:, None]] for gram in grams)
                 found.setdefault(width, []).append((len(self) + alike, first + own, *products))
             self._places += [(len(self._rows), own) for own in groups]
@@ -181,7 +182,7 @@ class Learners:
         gains = [own.gains(push, pull) for own in self._alike]
         own, falls = max(zip(self._alike, gains, strict=True), key=lambda pair: pair[1].max())
         k, ridge = np.unravel_index(int(np.argmax(falls)), falls.shape)
-        each = own.fitted(k, pull, LADDER[ridge])
+        each = own.fitted(int(k), pull, LADDER[ridge])
         return float(falls[k, ridge]), int(own.numbers[k]), float(LADDER[ridge]), each
 
     def rows_of(self, number: int) -> np.ndarray:

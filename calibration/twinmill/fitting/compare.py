@@ -4,6 +4,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -105,7 +106,7 @@ class RobotComparison:
         least = TELLING * max(uneven.values(), default=0.0)
         return {w: a for w, a in angles_rad.items() if uneven[w] >= least} or None
 
-    def error_rows(self) -> list[dict]:
+    def error_rows(self) -> list[dict[str, Any]]:
         """errors[] of the interface: one row per channel and horizon."""
         found = rms(self.errors)
         return [
@@ -121,14 +122,14 @@ class RobotComparison:
             for h, horizon_s in enumerate(HORIZONS_S)
         ]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """One entry of robots[]."""
         return {
             "robot_id": self.robot_id,
             "log": self.measurement.log_name,
             "score": self.score,
             "floor_kind": self.floor.kind,
-            "noise": self.modelled.noise.to_json(),
+            "noise": self.modelled.known_noise.to_json(),
             "errors": self.error_rows(),
             "where": [r.to_json() for r in self.where],
             "time_offset_s": self.time_offset_s,
@@ -210,12 +211,12 @@ class Comparison:
         rest = of_others(len(others), _meaning(total_score(others), nothing))
         return f"Missed: {', '.join(named)}. {rest}"
 
-    def error_rows(self) -> list[dict]:
+    def error_rows(self) -> list[dict[str, Any]]:
         """errors[] of the interface, of all that the score is of: root mean squares over robots.
 
         Each robot of each log counts by its predictions; one without a floor has no score.
         """
-        cells: dict[tuple, list[tuple[int, dict]]] = {}
+        cells: dict[tuple[str, str, float], list[tuple[int, dict[str, Any]]]] = {}
         scored = [r for r in self.robots if np.isfinite(r.score)] or self.robots
         for robot in scored:
             for row in robot.error_rows():
@@ -223,7 +224,7 @@ class Comparison:
                 cells.setdefault(key, []).append((robot.size, row))
         return [_together(own) for own in cells.values()]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object; what is of one robot is of the one that it misses most."""
         return {
             "model": self.model_name,
@@ -237,7 +238,7 @@ class Comparison:
         }
 
 
-def _together(rows: Sequence[tuple[int, dict]]) -> dict:
+def _together(rows: Sequence[tuple[int, dict[str, Any]]]) -> dict[str, Any]:
     """One row of errors in the place of several, each of so many predictions."""
     (_, first), *others = rows
     if not others:
@@ -282,13 +283,13 @@ def compare_robot(own: Opened) -> RobotComparison | SteadyComparison:
     modelled = own.modelled()
     if isinstance(modelled, SteadyStates):
         return compare_steady(modelled)
-    windows = Windows.of(own.track)
-    errors = np.where(own.floor.keep[:, None, None], windows.errors(modelled), np.nan)
-    regimes = where_it_fails(modelled, windows, errors, own.floor.rms) if own.data else []
+    windows, floor = Windows.of(own.track), own.known_floor
+    errors = np.where(floor.keep[:, None, None], windows.errors(modelled), np.nan)
+    regimes = where_it_fails(modelled, windows, errors, floor.rms) if own.data else []
     gone = tuple(unseen(own.data, own.model)) if own.data else ()
     phases = tuple(replace(p, seen=p.seen and _of(p) not in gone) for p in own.phases)
     return RobotComparison(
-        modelled, windows, errors, own.floor, own.score, regimes, phases=phases, unseen=gone
+        modelled, windows, errors, floor, own.score, regimes, phases=phases, unseen=gone
     )
 
 
@@ -303,8 +304,8 @@ def comparison(
     """Comparison of measurements as they stand; a model fitted to them goes by its new name."""
     warnings = _warnings([o.measurement for o in opened])
     warnings += [f"{o.floor.reason}." for o in opened if o.floor and o.floor.reason]
-    known = [o for o in opened if o.data is not None]
-    warnings += idle([o.data for o in known], [o.model for o in known])
+    known = [(o.model, o.data) for o in opened if o.data is not None]
+    warnings += idle([data for _, data in known], [model for model, _ in known])
     robots = [compare_robot(o) for o in opened]
     logs = [r for r in robots if isinstance(r, RobotComparison)]
     warnings += [said for r in logs for said in said_of_unseen(r.measurement.label, r.unseen)]

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -191,7 +192,7 @@ def known_physics(
             yield [(forward, left, turning)]
 
 
-def _is_everywhere(card: dict) -> bool:
+def _is_everywhere(card: dict[str, Any]) -> bool:
     roles = {p["role"] for p in card["parameters"]}
     return not roles & set(WHERE_OR_WHEN) and card["stage"] in MOTION_STAGES
 
@@ -272,7 +273,7 @@ def _drifts(motion: Motion, gain: np.ndarray) -> Iterator[Features]:
     yield none, none, Product(gain, motion.speed_mps[:, None])
 
 
-def _pushes(motion: Motion, gain: np.ndarray) -> Features:
+def _pushes(motion: Motion, gain: np.ndarray) -> tuple[Product, Product, np.ndarray]:
     """Motion along the room's axes while the robot moves, times (N, k) gains."""
     drift, (along, aside) = gain * motion.moves[:, None], motion.room
     return Product(drift, along), Product(drift, aside), np.zeros((len(gain), 0))

@@ -182,7 +182,9 @@ class DetectionFit:
         pairs = zip(self.datasets, self.models, strict=True)
         return float(np.mean(np.concatenate([d.view(m)[d.usable] for d, m in pairs])))
 
-    def _beside(self, other: "DetectionFit") -> Iterable[tuple]:
+    def _beside(
+        self, other: "DetectionFit"
+    ) -> Iterable[tuple[Detections, native.Model, native.Model]]:
         """Each data set with its model here and there."""
         return zip(self.datasets, self.models, other.models, strict=True)
 

@@ -174,7 +174,7 @@ def scale_speeds(data: Trajectory, base: native.Model) -> None:
     ]
     if min(ways_m) > 0:
         for name in table:
-            base.set(name, base.get(name) * ways_m[0] / ways_m[1])
+            base.set(name, float(base.get(name) * ways_m[0] / ways_m[1]))
 
 
 def body_velocity_at(

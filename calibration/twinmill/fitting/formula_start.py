@@ -12,10 +12,10 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.fitting.equations import finite
-from twinmill.fitting.opening import Opened, judged
+from twinmill.fitting.opening import Judged, Opened, judged
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import EFFECT_STEP, UNKNOWN, Parameter, words
-from twinmill.predict.datasets import Trajectory
+from twinmill.predict.datasets import ErrorDataset
 
 RATES = ("state_rate", "second_rate")
 TIMES_S = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
@@ -70,7 +70,7 @@ def _begun_at(p: Parameter, value: float) -> Parameter:
 
 
 def _cost(
-    known: Sequence[Opened], begun: Sequence[Parameter], others: Sequence[Parameter]
+    known: Sequence[Judged], begun: Sequence[Parameter], others: Sequence[Parameter]
 ) -> float:
     """Cost of the data at these numbers, others fitted; infinite where a state grows."""
     models = [o.model.copy() for o in known]
@@ -95,13 +95,14 @@ def sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Paramete
 
 
 def _sized(
-    data: Sequence[Trajectory], models: Sequence[native.Model], fresh: Sequence[Parameter]
+    data: Sequence[ErrorDataset], models: Sequence[native.Model], fresh: Sequence[Parameter]
 ) -> list[Parameter]:
     fit = ScoreFit(data, models, fresh)
     rows, slopes = fit.state
     errors = np.linalg.norm(np.concatenate(rows))
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        reaches = [errors / np.linalg.norm(_slopes_by(fit, slopes, p.name)) for p in fresh]
+        slopes_of = [np.linalg.norm(_slopes_by(fit, slopes, p.name)) for p in fresh]
+        reaches = [float(errors / slope) for slope in slopes_of]
     return [
         replace(
             p,

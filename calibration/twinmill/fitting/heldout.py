@@ -3,6 +3,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class HeldOut:
     @property
     def score(self) -> float:
         """Held-out score of all data sets together, as `total_score`."""
-        return total_score(self.scores)
+        return total_score(self.scores.tolist())
 
     @property
     def rms(self) -> np.ndarray:
@@ -48,7 +49,7 @@ class HeldOut:
             return np.full((len(HORIZONS_S), len(CHANNELS)), np.nan)
         return rms(np.concatenate(list(self.errors)))
 
-    def rows(self) -> list[dict]:
+    def rows(self) -> list[dict[str, Any]]:
         """One row per channel and horizon, over all logs; none without a log."""
         if not self.errors:
             return []

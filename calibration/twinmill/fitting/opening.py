@@ -65,11 +65,16 @@ class Opened:
     phases: tuple[ParameterEstimate, ...] = ()
 
     @property
-    def track(self) -> Track:
-        """Cleaned poses and commands of a log; a table has none."""
+    def run(self) -> Measurement:
+        """A robot in a log; a table has none."""
         if isinstance(self.measurement, SteadyTable):
             raise TypeError(f"{self.measurement.log_name}: a steady table has no track.")
-        return self.measurement.track
+        return self.measurement
+
+    @property
+    def track(self) -> Track:
+        """Cleaned poses and commands of a log; a table has none."""
+        return self.run.track
 
     @property
     def trajectory(self) -> Trajectory:
@@ -77,6 +82,13 @@ class Opened:
         if not isinstance(self.data, Trajectory):
             raise TypeError(f"{self.measurement.log_name}: has no predictions of poses.")
         return self.data
+
+    @property
+    def known_floor(self) -> NoiseFloor:
+        """Floor of a log; a table has none."""
+        if self.floor is None:
+            raise TypeError(f"{self.measurement.log_name}: a steady table has no floor.")
+        return self.floor
 
     @property
     def response(self) -> Response:
@@ -93,18 +105,18 @@ class Opened:
     @property
     def one_clock(self) -> bool:
         """True if the log or the model file declares that one clock stamped all."""
-        return self.floor is not None and (self.measurement.same_clock or self.model.clock_same)
+        return self.floor is not None and (self.run.same_clock or self.model.clock_same)
 
     @property
     def heading_held(self) -> bool:
         """True if the heading was not recorded, so that the robot is taken to hold one."""
-        return self.floor is not None and not self.measurement.track.has_heading
+        return self.floor is not None and not self.track.has_heading
 
     def modelled(self) -> ModelledLog | SteadyStates:
         """Measurement, model and noise, as reports and other tests look at them."""
         if isinstance(self.data, SteadyStates):
             return self.data.with_model(self.model)
-        return ModelledLog.on_clock(self.measurement, self.model, clock_free=not self.same_clock)
+        return ModelledLog.on_clock(self.run, self.model, clock_free=not self.same_clock)
 
     def aligned(
         self,
@@ -152,11 +164,11 @@ class Opened:
 
     def with_model(self, model: native.Model) -> "Opened":
         """Log under another model, on an unchanged clock."""
-        if self.floor is None:
+        if isinstance(self.measurement, SteadyTable):
             return replace(self, model=model.for_robot(self.measurement.robot_id))
-        own = model.for_robot(self.measurement.track.robot_id)
+        own = model.for_robot(self.track.robot_id)
         take_alignment(own, self.model)
-        data = self.data and self.data.with_own_start(own)
+        data = self.data and self.trajectory.with_own_start(own)
         return replace(self, model=own, data=data)
 
 
@@ -183,7 +195,7 @@ def _open(measurement: Measurement | SteadyTable, model_file: ModelFile, number:
     data = Trajectory.of(measurement)
     check_states(data, model)
     floor = noise_floor(data, model, same_clock)
-    if floor.kind is None:
+    if floor.kind is None or floor.response is None:
         return Opened(measurement, None, model, floor, same_clock)
     ratio = floor.response.radius_ratio
     data = replace(
@@ -223,7 +235,8 @@ def open_roughly(measurement: Measurement, model_file: ModelFile) -> Opened | No
     errors = rms(data.errors(model))
     floor = replace(no_floor(data, ""), rms=errors, offset_s=model.get(CLOCK))
     rough = Opened(measurement, data.over(errors), model, floor, same_clock).aligned(model)
-    return replace(rough, data=rough.data.over(rms(rough.data.errors(rough.model))))
+    over = rms(rough.trajectory.errors(rough.model))
+    return replace(rough, data=rough.trajectory.over(over))
 
 
 def _clock(model: native.Model) -> list[Parameter]:
@@ -259,7 +272,7 @@ def on_clock_of_others(own: Opened, opened: Sequence[Opened]) -> Opened:
 
 def lateness_changes(opened: Sequence[Opened]) -> list[str]:
     """Labels of logs where each has a lateness that changes, so that none tells one; else empty."""
-    logs = [o.measurement for o in opened if o.floor and o.data is not None]
+    logs = [o.run for o in opened if o.floor and o.data is not None]
     return [m.label for m in logs] if all(m.lateness_changes for m in logs) else []
 
 
@@ -269,7 +282,7 @@ def lag_is_kept(opened: Sequence[Opened], told: Collection[str]) -> bool:
     It does where other logs told it (`told` has names), and where it is not known how lateness
     changes; else how quickly the robot follows tells it, once the change is taken into account.
     """
-    logs = [o.measurement for o in opened if o.floor and o.data is not None]
+    logs = [o.run for o in opened if o.floor and o.data is not None]
     unknown = any(m.lateness is None for m in logs)
     return bool(lateness_changes(opened)) and (bool(told) or unknown)
 
@@ -332,7 +345,7 @@ def thinned(opened: Sequence[Opened], every: int) -> list[Opened]:
     if every < 2:
         return list(opened)
     return [
-        replace(o, data=o.data.thinned(every), floor=o.floor.thinned(every)) if o.floor else o
+        replace(o, data=o.trajectory.thinned(every), floor=o.floor.thinned(every)) if o.floor else o
         for o in opened
     ]
 
@@ -370,8 +383,8 @@ def _with_own_of_run(own: Opened, stds: Mapping[str, float] | None) -> Opened:
         usual = p.value if p.name == LAG else 1.0
         std = stds.get(p.name, 0.0) if stds else p.std
         free += [replace(p, usual=usual, std=std)] if std else []
-    others = tuple(p for p in own.data.own if p.name not in OWN)
-    return replace(own, data=replace(own.data, own=(*others, *free), by_run=True))
+    others = tuple(p for p in own.trajectory.own if p.name not in OWN)
+    return replace(own, data=replace(own.trajectory, own=(*others, *free), by_run=True))
 
 
 def with_own_lags(opened: Sequence[Opened], spread_s: float) -> list[Opened]:
@@ -387,7 +400,7 @@ def with_own_lags(opened: Sequence[Opened], spread_s: float) -> list[Opened]:
 def _with_lag(own: Opened, spread_s: float) -> Opened:
     (lag,) = base_parameters(own.model, [LAG])
     lag = replace(lag, usual=lag.value, std=spread_s)
-    return replace(own, data=replace(own.data, own=(*own.data.own, lag)))
+    return replace(own, data=replace(own.trajectory, own=(*own.trajectory.own, lag)))
 
 
 def _with_gains(own: Opened) -> Opened:
@@ -396,4 +409,5 @@ def _with_gains(own: Opened) -> Opened:
     for p in base_parameters(own.model, names):
         spread = own.model.get(f"idiosyncrasy.{p.name}_std") or SPREAD
         gains.append(replace(p, usual=1.0, std=spread))
-    return replace(own, data=replace(own.data, own=(*own.data.own, *gains)))
+    data = own.trajectory
+    return replace(own, data=replace(data, own=(*data.own, *gains)))

@@ -118,7 +118,8 @@ class Equations:
         sums = (rows.parts.summed(m) for m in (squares(x, cells), moments))
         inside, others = zip(*sums, strict=True)
         square = float(rows.wanted @ rows.wanted)
-        return cls(*(m.sum(axis=0) for m in inside), others, inside, square)
+        gram, moment = (m.sum(axis=0) for m in inside)
+        return cls(gram, moment, others, inside, square)
 
 
 class Response:
@@ -229,8 +230,8 @@ class Response:
         used = np.flatnonzero(command.any(axis=0))
         linear = command[:, used] / np.maximum(np.abs(command[:, used]).max(axis=0), 1e-9)
         shapes = np.stack([linear * np.abs(linear), np.tanh(6 * linear), np.abs(linear)], -1)
-        axes = [int(k) for k in used] if track.command_kind == "twist" else [None] * len(used)
-        return linear, shapes, axes
+        is_twist = track.command_kind == "twist"
+        return linear, shapes, [int(k) if is_twist else None for k in used]
 
     @cached_property
     def ahead(self) -> np.ndarray:
@@ -398,7 +399,7 @@ class Response:
     # -- regression -----------------------------------------------------------------------------
 
     def _fit(
-        self, scale: np.ndarray, ridges: list[np.ndarray | None], parts: Sequence[int] = (0, 1)
+        self, scale: np.ndarray, ridges: Sequence[np.ndarray | None], parts: Sequence[int] = (0, 1)
     ) -> None:
         """Velocities with the errors (H, 3) of another fit as weights; 0 where nothing tells them.
 
@@ -451,7 +452,7 @@ class Response:
 
     def find_beat(self) -> None:
         """At what rate errors of its gains, pushes along its axes or along the room's swing."""
-        there = (self.ends[:, BEAT_HORIZONS] >= 0).all(axis=1)
+        there = np.all(self.ends[:, BEAT_HORIZONS] >= 0, axis=1)
         at = self.starts[there]
         errors, made = zip(*(self._at_horizon(h, there) for h in BEAT_HORIZONS), strict=True)
         swings = [
@@ -532,7 +533,7 @@ class Response:
         for part in range(len(AXES)):
             rows = self._rows(part, scale, left)
             if rows is not None:
-                led = self._led(part, rows, [self.velocities])
+                led = self._led(part, rows, [[*self.velocities]])
                 of_axes = led.reshape(len(led), -1, self.velocities.shape[2])
                 made = of_axes[np.arange(len(led)), :, 1 + rows.parts.inside].sum(axis=1)
                 left[tuple(rows.at)] -= made / rows.weight
@@ -610,7 +611,8 @@ def _only(axes: Sequence[int], group: Group) -> Features:
 
 def _batches(groups: Sequence[Group], axes: Sequence[int]) -> Iterator[Sequence[Group]]:
     """Groups that together have about WIDE features: sums over time are quicker side by side."""
-    some, width = [], 0
+    some: list[Group] = []
+    width = 0
     for group in groups:
         known = {id(f) for other in some for f in other}
         width += sum(f[axis].shape[1] for f in group if id(f) not in known for axis in axes)
@@ -749,7 +751,7 @@ class _LeftOut:
 
     def _let_in(self, own: np.ndarray, values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         """Criterion and (K, g, V) coefficients once a group that is out comes in."""
-        across = self.grams[np.ix_(range(len(self.grams)), self.used, own)]
+        across = self.grams[np.ix_(np.arange(len(self.grams)), self.used, own)]
         made = self.inverse @ across
         within = self.grams[:, own[:, None], own] - across.swapaxes(1, 2) @ made
         left = self.moments[:, own, None] - across.swapaxes(1, 2) @ self.beta[:, self.used]

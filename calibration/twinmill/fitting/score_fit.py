@@ -8,7 +8,7 @@ set has a scale of its own: what the model lacks in one must not drown what the 
 Levenberg and Marquardt, bounded; weights n_i / S_i^2 are renewed in each step.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -65,7 +65,17 @@ class Unknown:
 
 
 class _LeftOut:
-    """A data set of which some rows count and others do not."""
+    """A data set of which some rows count and others do not; all else is the whole's."""
+
+    label: str
+    robot_id: int
+    stages: Collection[str]
+    block: np.ndarray
+    own: Sequence[Parameter]
+    by_run: bool
+    part: np.ndarray
+    channel: np.ndarray
+    rows_by_part: Callable[[native.Model, list[str], np.ndarray], np.ndarray]
 
     def __init__(self, whole: ErrorDataset, kept: np.ndarray) -> None:
         self._whole, self._kept = whole, kept
@@ -148,10 +158,10 @@ class ScoreFit:
                     by_owner.setdefault(owner, []).append(i)
                 else:
                     unknowns.append(Unknown(p, frozenset([i])))
-        for (*_, name), members in by_owner.items():
-            first = self.datasets[members[0]]
+        for (*_, name), owned in by_owner.items():
+            first = self.datasets[owned[0]]
             p = next(p for p in first.own if p.name == name)
-            unknowns.append(Unknown(p, frozenset(members)))
+            unknowns.append(Unknown(p, frozenset(owned)))
         return unknowns
 
     def _held_angles(self) -> set[int]:
@@ -174,6 +184,11 @@ class ScoreFit:
                 counted.add(whose)
         return held
 
+    @property
+    def trajectories(self) -> list[Trajectory]:
+        """Data sets that are logs."""
+        return [d for d in self.datasets if isinstance(d, Trajectory)]
+
     # -- errors ---------------------------------------------------------------------------------
 
     def batch(self, i: int, x: np.ndarray) -> np.ndarray:
@@ -195,7 +210,7 @@ class ScoreFit:
 
     def _slopes(self, x: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Rows of each data set, and (R, P_i) slopes by its own columns."""
-        at, known = self._known or (None, [])
+        at, known = self._known or (np.zeros(0), [])
         known = known if np.array_equal(at, x) else []
         up = np.where(x + self.step <= self.high, self.step, -self.step)
         both = self.central & (x + self.step <= self.high) & (x - self.step >= self.low)
@@ -689,7 +704,8 @@ class ScoreFit:
         wider = np.ones(len(members))
         if max(members, default=0) < FEWEST_BLOCKS:
             return wider
-        square = sum(self._alone(i) ** 2 for i in range(len(self.datasets)))
+        alone = (self._alone(i) ** 2 for i in range(len(self.datasets)))
+        square = sum(alone, np.zeros(len(members)))
         for c in np.flatnonzero(members >= FEWEST_BLOCKS):
             count = int(members[c])
             ratio = square[c] / (count * (count - 1)) / max(within[c], 1e-300)

@@ -24,7 +24,7 @@ from twinmill.model.parameters import (
     lasts_for_a_while,
     with_role,
 )
-from twinmill.predict.datasets import Dataset, Trajectory
+from twinmill.predict.datasets import Dataset, ErrorDataset, Trajectory
 from twinmill.predict.windows import CHANNELS, HORIZONS_S
 
 PLACES = 9  # along each side of the floor that was driven
@@ -43,7 +43,7 @@ class Candidate:
     """An effect that might be added, and the data sets and models that it might be added to."""
 
     name: str
-    datasets: Sequence[Dataset]
+    datasets: Sequence[ErrorDataset]
     models: Sequence[native.Model]
 
     @property
@@ -113,7 +113,7 @@ class Left:
         Args:
             columns: (S, k, R) of each data set.
         """
-        moment, gram, free = 0.0, 0.0, 0.0
+        moment = gram = free = np.asarray(0.0)
         for w, rest, basis, c in zip(self.weights, self.rests, self.bases, columns, strict=True):
             whitened = w * c
             moment = moment + whitened @ rest
@@ -132,7 +132,7 @@ class Left:
             changes: (k, R) of each data set.
             shares: (S, W, H) of each data set.
         """
-        moment, gram, free = 0.0, 0.0, 0.0
+        moment = gram = free = np.asarray(0.0)
         parts = zip(self.weights, self.rests, self.bases, changes, shares, strict=True)
         for w, rest, basis, change, share in parts:
             share = share.reshape(len(share), -1).astype(float)
@@ -178,7 +178,7 @@ class Starts(Protocol):
 def starts_of(
     name: str,
     models: Sequence[native.Model],
-    datasets: Sequence[Dataset],
+    datasets: Sequence[ErrorDataset],
     rows: Sequence[np.ndarray],
 ) -> Starts | None:
     """Starts of an effect; None if it has no place, moment or limit.

@@ -7,6 +7,7 @@ the angle stays right over a log: if the errors swing about a turn of a wheel, t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -60,14 +61,14 @@ def wheels_of(model: native.Model) -> list[Wheel]:
     wheels = model.wheels()
     gains = np.array([model.get(name) for name in BASE_GAINS])  # of the body over its rims
     rates = np.array([model.wheel_speeds(*axis) for axis in np.eye(3)]).T / gains
-    bodies = [gains * model.body_velocity(one) for one in np.eye(len(wheels))]
+    bodies = [gains * np.array(model.body_velocity(one)) for one in np.eye(len(wheels)).tolist()]
     sides = model.wheel_kind == "differential"
     named = [f"{_side(w)} wheels" if sides else w["words"] for w in wheels]
     every = {n: Wheel(n, r, b) for n, r, b in zip(named, rates, bodies, strict=True)}
     return list(every.values())
 
 
-def _side(wheel: dict) -> str:
+def _side(wheel: dict[str, Any]) -> str:
     return "left" if wheel["y_m"] > 0 else "right"
 
 

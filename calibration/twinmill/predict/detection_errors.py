@@ -139,7 +139,12 @@ def brier_ratio(chance: np.ndarray, bit: np.ndarray) -> float:
 def compare_detections(
     cameras: list[Detections], model: native.Model
 ) -> DetectionComparison | None:
-    """Compares a model's detections with those of all robots; None if no robot reported any.
+    """Compares a model's detections with those of all robots; None if no robot reported any."""
+    return compared(cameras, model) if cameras else None
+
+
+def compared(cameras: list[Detections], model: native.Model) -> DetectionComparison:
+    """Compares a model's detections with those of all robots, one of which reported some.
 
     Raw detections are compared where every log has them, else voted ones with the vote predicted.
 
@@ -147,8 +152,6 @@ def compare_detections(
         cameras: frames with poses.
         model: of all robots; each takes its own overrides.
     """
-    if not cameras:
-        return None
     raw = all(s.frames.has_raw for s in cameras)
     parts = [_of_robot(s, model.for_robot(s.robot_id), raw) for s in cameras]
     predicted, in_view, measured, range_m, bearing_rad, votes = (

@@ -8,17 +8,18 @@ that could draw print numbers alone.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.typing import RcKeyType
 
     from twinmill.report.picture import Picture
 
 # Colours of Okabe and Ito (2008), told apart by colour-blind readers.
 MEASURED, PREDICTED, BEFORE, FLOOR = "#3c3c3c", "#d55e00", "#0072b2", "#009e73"
 WIDTH_IN = 5.0  # a phone's width at the size the text is made for
-STYLE = {
+STYLE: dict[RcKeyType, Any] = {
     "svg.hashsalt": "twinmill",
     "svg.fonttype": "path",
     "font.family": "DejaVu Sans",

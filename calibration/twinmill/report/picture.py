@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """A matplotlib figure whose SVG text is the same for the same data."""
 
+from __future__ import annotations
+
 import io
 import re
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.typing import RcKeyType
 
 
 class Picture(Figure):
@@ -16,15 +22,15 @@ class Picture(Figure):
         look: settings of matplotlib, when it is drawn.
     """
 
-    look: Mapping[str, object]
+    look: Mapping[RcKeyType, Any]
 
     @classmethod
     def of(
         cls,
-        look: Mapping[str, object],
+        look: Mapping[RcKeyType, Any],
         size_in: tuple[float, float],
-        paint: Callable[["Picture"], None],
-    ) -> "Picture":
+        paint: Callable[[Picture], None],
+    ) -> Picture:
         """Painted in a look."""
         with matplotlib.rc_context(dict(look)):
             picture = cls(figsize=size_in, layout="constrained")

@@ -317,7 +317,7 @@ def _rounded(values: np.ndarray, digits: int) -> list[float | None]:
 
 def _errors(opened: Opened, result: RunComparison, run: int) -> np.ndarray:
     """(W, 4) t_s, and what the first run's numbers predict wrongly of a run: m, m, rad."""
-    data = result.whole.fit.datasets[run]
+    data = result.whole.fit.trajectories[run]
     errors = data.errors(_model(result, run, changed=False))[:, HORIZON]
     return np.column_stack([data.start_s, np.where(data.keep[:, None], errors, np.nan)])
 
@@ -343,7 +343,7 @@ def _marks(result: RunComparison) -> np.ndarray:
     """(M, 2) s: the shortest stretches of the second run that hold half of the evidence."""
     if not result.changed:
         return np.zeros((0, 2))
-    data = result.whole.fit.datasets[1]
+    data = result.whole.fit.trajectories[1]
     without, with_it = (
         data.errors(_model(result, 1, changed=c))[:, HORIZON] for c in (False, True)
     )

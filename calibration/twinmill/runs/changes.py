@@ -8,6 +8,7 @@ squares); its score is that size over its standard error.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -66,7 +67,7 @@ class Change:
         reach = t_quantile(SHARE_95, self.free) * self.std
         return self.value - reach, self.value + reach
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         low, high = self.interval
         return {
@@ -183,7 +184,9 @@ def kinds_of(model: native.Model, keys: Sequence[str]) -> list[Kind]:
     return found
 
 
-def _groups(wheels: list[dict], one_to_a_side: bool) -> list[tuple[str, str, list[dict]]]:
+def _groups(
+    wheels: list[dict[str, Any]], one_to_a_side: bool
+) -> list[tuple[str, str, list[dict[str, Any]]]]:
     """Wheels alone, by side and end, and all: name, words with their verb, wheels.
 
     Args:
@@ -199,6 +202,9 @@ def _groups(wheels: list[dict], one_to_a_side: bool) -> list[tuple[str, str, lis
     }
     several = {n: own for n, own in sides.items() if 1 < len(own) < len(wheels)}
     if one_to_a_side:
-        found, several = found * (len(wheels) < 3), {n: several.get(n) for n in ("left", "right")}
+        found, several = (
+            found * (len(wheels) < 3),
+            {n: several.get(n, []) for n in ("left", "right")},
+        )
     found += [(n, f"the {n} wheels are", own) for n, own in several.items() if own]
     return [*found, ("all", "all wheels are", wheels)] if wheels else found

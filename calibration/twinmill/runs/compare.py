@@ -3,6 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ class Named:
     rivals: tuple[Change, ...]
     onset: Onset
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Fields of the interface."""
         return {
             **self.change.to_json(),
@@ -89,7 +90,7 @@ class RunComparison:
         reach = t_quantile(SHARE_95, self.alarm.tested.free) * np.sqrt(own.covariance[0, 0])
         return float(own.values[0]), float(reach)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         marker = [k for k in self.whole.keys if k.startswith("marker.")]
         return {
@@ -117,17 +118,17 @@ class RunComparison:
         value, reach = self.size_of(key)
         return {"value": value, "low": value - reach, "high": value + reach}
 
-    def _number(self, change: Change) -> dict:
+    def _number(self, change: Change) -> dict[str, Any]:
         sizes = [self.alarm.shown(change, share) for share in (0.5, MOSTLY)]
         return {**change.to_json(), "smallest_shown": sizes[0], "shown_9_of_10": sizes[1]}
 
 
-def _run_json(opened: Opened) -> dict:
+def _run_json(opened: Opened) -> dict[str, Any]:
     run = opened.measurement
     return {
         "log": run.log_name,
         "log_sha256": run.log_sha256,
-        "robot_id": run.track.robot_id,
+        "robot_id": opened.track.robot_id,
         "recorded_utime_us": run.recorded_utime_us,
     }
 
@@ -224,12 +225,12 @@ def both_ways(pair: Difference) -> tuple[Difference, Difference]:
 
 def second_half(opened: Opened) -> Opened:
     """The second half of a run; what changes within a run looks like scatter of the whole."""
-    return _since(opened, float(np.ptp(opened.data.start_s)) / 2)
+    return _since(opened, float(np.ptp(opened.trajectory.start_s)) / 2)
 
 
 def _since(opened: Opened, at_s: float) -> Opened:
     """A run from a moment on, s since its start."""
-    data = opened.data
+    data = opened.trajectory
     late = data.start_s >= data.start_s[0] + at_s
     return replace(opened, data=replace(data, keep=data.keep & late))
 
@@ -258,7 +259,7 @@ def open_run(run: Measurement, model_file: ModelFile) -> Opened:
         LogError: it has none.
     """
     (opened,) = open_measurements([run], model_file)
-    if opened.data is None:
+    if opened.floor and opened.data is None:
         raise LogError(f"{run.label}: cannot be compared: {opened.floor.reason}.")
     return opened
 

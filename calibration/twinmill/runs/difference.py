@@ -26,6 +26,7 @@ from twinmill.model.parameters import (
     effect_parameters,
     newest_instance,
 )
+from twinmill.predict.datasets import Trajectory
 from twinmill.runs.white_step import white_step
 
 MOUNTING = ("marker_offset", "heading_bias")  # effects of how the marker sits on the robot
@@ -120,7 +121,7 @@ def difference(first: Opened, second: Opened) -> Difference:
     own = [[_wide(p) for p in base_parameters(o.model, of_each)] for o in opened]
     own[1] += [*changed, *late]
     data = [
-        replace(o.data, own=(*o.data.own, *more), by_run=True)
+        replace(o.trajectory, own=(*o.trajectory.own, *more), by_run=True)
         for o, more in zip(opened, own, strict=True)
     ]
     names = [n for n in base_names(first.model, opened) if n not in of_each]
@@ -136,7 +137,7 @@ def charge_is_known(*runs: Opened) -> bool:
 
 def mean_V(opened: Opened) -> float:
     """Mean voltage of the battery in a run; NaN where it was not recorded."""
-    volts = opened.measurement.track.battery_V
+    volts = opened.track.battery_V
     known = volts[np.isfinite(volts) & (volts > 0)]
     return float(known.mean()) if known.size else float("nan")
 
@@ -196,7 +197,7 @@ def _quantities(model: native.Model, fresh: dict[str, str], first: Opened) -> tu
 
 
 def _clock_is_free(opened: Opened) -> bool:
-    return any(p.name == CLOCK for p in opened.data.own)
+    return any(p.name == CLOCK for p in opened.trajectory.own)
 
 
 def _wide(p: Parameter) -> Parameter:
@@ -205,7 +206,7 @@ def _wide(p: Parameter) -> Parameter:
 
 
 def _fitted(
-    data: Sequence, models: Sequence[native.Model], shared: Sequence[Parameter]
+    data: Sequence[Trajectory], models: Sequence[native.Model], shared: Sequence[Parameter]
 ) -> ScoreFit:
     near = ScoreFit(data, models, shared).nearer()
     return ScoreFit(data, models, begun_about(shared, near)).fit()

@@ -9,6 +9,7 @@ band follows, shows as a trend (Mann 1945).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -82,7 +83,7 @@ class Drift:
         """Numbers that left their band or drift."""
         return [s for s in self.series if s.left]
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The interface's object."""
         return {
             "verdict": "changed" if self.left else "unchanged",
@@ -93,7 +94,7 @@ class Drift:
             "numbers": [self._series(s) for s in self.series],
         }
 
-    def _series(self, s: Series) -> dict:
+    def _series(self, s: Series) -> dict[str, Any]:
         dates = [f"{self.calibrations[k].date:%Y-%m-%dT%H:%M:%SZ}" for k in s.days]
         rows = zip(dates, s.values, s.stds, s.low, s.high, s.outside, strict=True)
         keys = ("date", "value", "std", "low", "high", "outside")

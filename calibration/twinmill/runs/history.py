@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from twinmill.arguments import option
-from twinmill.data.measurement import Measurement
+from twinmill.data.measurement import Measurement, of_one_robot
+from twinmill.data.steady_table import SteadyTable
 from twinmill.files import plain
 from twinmill.fitting.fit import FitResult
 
@@ -62,7 +63,7 @@ class Calibration:
         """When it was recorded."""
         return datetime.fromtimestamp(self.recorded_utime_us / 1e6, UTC)
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """The line's object."""
         return {
             "date": f"{self.date:%Y-%m-%dT%H:%M:%SZ}",
@@ -118,28 +119,28 @@ def read_history(path: Path) -> list[Calibration]:
     return sorted(found.values(), key=lambda c: c.recorded_utime_us)
 
 
-def check_history(path: Path, measurements: Sequence[Measurement]) -> None:
-    """Tried before the long work: whether a calibration can be appended.
+def check_history(
+    path: Path, measurements: Sequence[Measurement | SteadyTable]
+) -> list[Measurement]:
+    """The runs whose calibration can be appended: tried before the long work.
 
     Raises:
-        ValueError: what is there is no history, or one of another robot; or these are several
-            robots.
+        ValueError: what is there is no history, or one of another robot.
+        LogError: these are several robots, or tables.
     """
-    ids = sorted({m.track.robot_id for m in measurements})
-    if len(ids) != 1:
-        raise ValueError(
-            f"{path}: a history is of one robot, and these logs have {len(ids)}; fit each by "
-            "itself."
-        )
+    of = f"{path}: a history is of one robot's logs, and these hold"
+    runs = of_one_robot(measurements, of, "fit each robot's logs by themselves")
     if not path.exists():
-        return
-    if other := next((c for c in read_history(path) if c.robot_id != ids[0]), None):
+        return runs
+    robot = runs[0].track.robot_id
+    if other := next((c for c in read_history(path) if c.robot_id != robot), None):
         raise ValueError(
             f"{path}: is the history of robot {other.robot_id}, and these logs are of robot "
-            f"{ids[0]}; give each robot a file of its own."
+            f"{robot}; give each robot a file of its own."
         )
     if path.stat().st_size and not path.read_bytes().endswith(b"\n"):
         raise ValueError(f"{path}: its last line has no end; put a line feed behind it.")
+    return runs
 
 
 def calibration(

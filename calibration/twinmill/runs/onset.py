@@ -6,6 +6,7 @@ To first order about the fit to both runs, everything else is fitted anew for ea
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ class Onset:
         """It is there all the time, as far as the run tells."""
         return self.at_s == 0.0
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Its moments."""
         return {"from_start": self.from_start, **vars(self)}
 
@@ -46,7 +47,7 @@ def onset(change: Change, beside: Sequence[Change], tested: Difference, rate: fl
         tested: differences that its direction is of; those that it does not name are taken for 0.
         rate: chance of a moment within a run all of which is changed, over all blocks.
     """
-    start_s = tested.fit.datasets[1].start_s
+    start_s = tested.fit.trajectories[1].start_s
     gain = _gain_by_moment(change, beside, tested)
     best = int(np.argmax(gain))
     begin_s = float(start_s[0])
@@ -69,7 +70,7 @@ def _gain_by_moment(change: Change, beside: Sequence[Change], tested: Difference
     prior = np.diag(1 / fit.std)
     constant = np.concatenate([constant, (held - fit.usual) / fit.std])
     others = np.concatenate([slopes @ free, prior @ free])
-    count = len(fit.datasets[1].start_s)
+    count = len(fit.trajectories[1].start_s)
     own = slice(len(rows) - len(column), len(rows))
     base = np.linalg.lstsq(others, -constant, rcond=None)[0]
     left = (constant + others @ base)[own]

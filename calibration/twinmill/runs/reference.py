@@ -48,7 +48,7 @@ def day_of(pair: Difference, run: int) -> Day:
         pair: differences of the second run from the first.
         run: 0 of the first, 1 of the second.
     """
-    own, other = (pair.fit.datasets[k] for k in (run, 1 - run))
+    own, other = (pair.fit.trajectories[k] for k in (run, 1 - run))
     share = other.covered_s / (own.covered_s + other.covered_s)
     return Day(
         run * pair.values,

@@ -56,7 +56,7 @@ def white_step(fit: ScoreFit) -> WhiteStep:
 
 def _blocks(fit: ScoreFit, i: int) -> list[_Block]:
     """Blocks of one run."""
-    data, own = fit.datasets[i], fit.columns[i]
+    data, own = fit.trajectories[i], fit.columns[i]
     steps = Steps([StepsOfLog(data.measurement)])
     kept = _kept(steps, data)
     up = np.where(fit.x + fit.step <= fit.high, fit.step, -fit.step)[own]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds the ball, and limits of colour that hold it and nothing else."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,7 +133,7 @@ def _where(blob: tuple[slice, slice, np.ndarray]) -> str:
     return f"{(columns.start + columns.stop) // 2},{(rows.start + rows.stop) // 2}"
 
 
-def evaluate(picture: Picture, ball: Ball, box: Box) -> PictureResult:
+def evaluate(picture: Picture, ball: Ball, box: Sequence[int]) -> PictureResult:
     """Judges limits on one picture, by the firmware's own code."""
     mask = native.inside(picture.yuyv, box)
     distance = ball.distance(mask.shape)

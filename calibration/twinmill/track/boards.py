@@ -9,6 +9,8 @@ import numpy as np
 
 FAMILY = cv2.aruco.DICT_5X5_100  # other than the robots'
 MARKER_SHARE = 0.75  # of a square's side
+Kind = Literal["charuco", "checkerboard"]
+KINDS: tuple[Kind, ...] = ("charuco", "checkerboard")
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class Board:
         square_m: side of a square.
     """
 
-    kind: Literal["charuco", "checkerboard"] = "charuco"
+    kind: Kind = "charuco"
     squares: tuple[int, int] = (7, 5)
     square_m: float = 0.036
 

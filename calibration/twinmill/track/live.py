@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from queue import Empty, Queue
 from typing import Any
@@ -55,7 +55,7 @@ class FrameDetections:
     lost: list[int]
 
 
-@dataclass
+@dataclass(frozen=True)
 class LiveCount:
     """Counts of a live run so far.
 
@@ -65,9 +65,9 @@ class LiveCount:
         sight: the last picture's.
     """
 
-    frames: int = 0
-    poses: dict[int, int] = field(default_factory=dict)
-    sight: FrameDetections | None = None
+    frames: int
+    poses: dict[int, int]
+    sight: FrameDetections
 
 
 @dataclass
@@ -109,9 +109,10 @@ def publish(
     Raises:
         ValueError: two tags of one number are in a picture.
     """
-    count = LiveCount()
+    published: dict[int, int] = {}
     last: dict[int, _Held] = {}
-    for k, stamp_s, picture, (numbers, corners) in _detected(_merged(cameras), tags.family):
+    for frame, detected in enumerate(_detected(_merged(cameras), tags.family)):
+        k, stamp_s, picture, (numbers, corners) = detected
         seen = _seen(k, stamp_s, views[k], tags, found=(numbers, corners), last=last)
         camera = views[k].camera
         middle_s = stamp_s + camera.exposure_s / 2 + camera.line_delay_s * camera.size_px[1] / 2
@@ -120,14 +121,13 @@ def publish(
         for robot_id in mine:
             held = seen.get(robot_id)
             at_s, pose = (held.t_s, held.pose) if held else (middle_s, None)
-            message = _message(robot_id, count.frames, at_s, pose, height_m=tags.height_m)
+            message = _message(robot_id, frame, at_s, pose, height_m=tags.height_m)
             say(f"R{robot_id:02d}_POSE", message.encode())
             if held:
-                count.poses[robot_id] = count.poses.get(robot_id, 0) + 1
-        count.frames += 1
+                published[robot_id] = published.get(robot_id, 0) + 1
         poses = {n: held.pose for n, held in seen.items()}
         lost = [n for n in mine if n not in seen]
-        count.sight = FrameDetections(
+        sight = FrameDetections(
             camera=k,
             stamp_s=stamp_s,
             picture=picture,
@@ -136,7 +136,7 @@ def publish(
             poses=poses,
             lost=lost,
         )
-        yield count
+        yield LiveCount(frame + 1, published, sight)
 
 
 def _merged(cameras: Sequence[Frames]) -> Iterator[tuple[int, float, np.ndarray]]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sheets to print, to scale: tags for robots and floor, and the board for the lens."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -88,7 +88,7 @@ def board_sheet(board: Board, paper: str) -> Figure:
     return page.figure
 
 
-def write_sheets(path: Path, sheets: Iterator[Figure]) -> int:
+def write_sheets(path: Path, sheets: Iterable[Figure]) -> int:
     """One page each; says how many. The same sheets give the same bytes."""
     count = 0
     with PdfPages(path, metadata={"CreationDate": None, "Title": "Twinmill tags"}) as pages:

@@ -220,6 +220,16 @@ def test_a_fit_appends_its_numbers_and_their_logs_are_healthy_runs(twinmill, sam
     assert code == 1 and "robot 7" in err and not (tmp_path / "other.toml").exists()
 
 
+def test_a_history_takes_no_table_of_steady_speeds(twinmill, tmp_path):
+    header = "robot_id,speed_input,direction_deg,turn_input,run,speed_mps,turn_radps,note\n"
+    rows = [f"1,{speed},90,0,1,{speed / 300},0," for speed in (30, 60, 90)]
+    (tmp_path / "table.csv").write_text(header + "\n".join(rows) + "\n")
+    words = ("fit", tmp_path / "table.csv", "--model", "turbopi_nominal.toml", "-o", tmp_path / "m")
+    code, _, err = twinmill(*words, "--history", tmp_path / "robot.jsonl")
+    assert code == 1 and "these hold a table of steady speeds; fit each robot's logs" in err
+    assert [path.name for path in tmp_path.iterdir()] == ["table.csv"]
+
+
 def test_a_log_that_is_gone_or_another_one_is_left_out_of_the_healthy_runs(tmp_path):
     path = _history(tmp_path / "robot.jsonl", [0.9, 0.91])
     (tmp_path / "1.lcmlog").write_text("another")
