@@ -88,7 +88,7 @@ def load(logs: list[Path], model_file: ModelFile) -> Measurements:
 
 @dataclass(frozen=True)
 class Given:
-    """What a command judges, as it was typed and as it was read.
+    """Logs and model that a command judges, as they were typed and as they were read.
 
     Attributes:
         logs: files.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a nameless dependence looks like: gain and push along what it depends on.
+"""Picture of a nameless dependence: gain and push along what it depends on.
 
 The posterior of its likeliest form is a function of the motion. In bins of time, heading, speed,
 rate of turn, or cells of the floor, its displacements are fitted by a share of the base's own, and

@@ -231,7 +231,7 @@ def _tables(result: Inference) -> list[Table]:
 
 
 def _known(result: Inference) -> list[str]:
-    """What is known of errors that are not new, in sentences."""
+    """Errors that are not new, as far as they are known, in sentences."""
     always = result.always
     if always is None:
         return [
