@@ -249,6 +249,13 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict | None]:
     return f"The swarm as a whole, {done}: {found.verdict} {LOOK.capitalize()}", found.to_json()
 
 
+def _refuse_formula(asked: bool | None, where: str) -> None:
+    """Raises ValueError if a formula is asked for, or none, where none is ever proposed."""
+    if asked is not None:
+        given = "--formula" if asked else "--no-formula"
+        raise ValueError(f"explain: no formula is proposed {where}; leave {given} away.")
+
+
 def _explain(
     logs: Logs,
     output: NewModel,
@@ -256,12 +263,13 @@ def _explain(
     model: Model = DEFAULT_MODEL,
     own: Own = None,
     formula: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--formula/--no-formula",
-            help="Add a validated formula for what no effect explains.",
+            show_default=False,
+            help="Add a validated formula for what no effect explains, as is done by default.",
         ),
-    ] = True,
+    ] = None,
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
@@ -274,12 +282,13 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 
-    With --own the likeliest effects are written, without a formula. Of an MJCF:
+    With --own the likeliest effects are written, never a formula. Of an MJCF:
     twinmill explain run.csv --model arm.xml -o better.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import explained as of_joints  # as in diagnose
 
+        _refuse_formula(formula, "for jointed robots")
         return of_joints(
             *(logs, model, output), own=own or [], force=force, as_json=as_json, out=out
         )
@@ -287,11 +296,13 @@ def _explain(
         from twinmill_cli.infer import inferred  # as in diagnose
 
         refuse_report("explain", WITH_OWN, out)
+        _refuse_formula(formula, "with --own, which weighs effects by name")
         return inferred(
             "explain", logs, model, own=own, output=output, force=force, as_json=as_json
         )
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
+    formula = formula is not False
     verb = "explain" if formula else "explain --no-formula"
     native.keep_memory()  # what the work frees it wants again
     source = provenance(
