@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A mill of robots that see two bits, as `twinmill discover` finds it, told nothing of mills."""
+"""A mill of robots that see two bits, as `twinmill lab discover` found, told nothing of mills."""
 
 import json
 import subprocess
@@ -41,7 +41,7 @@ def swarm_words(found: Path, name: str, behaviors: Path) -> tuple[str, ...]:
 
 
 def metrics_of(log: Path, found: Path) -> dict:
-    """Output of `twinmill metrics` for a log."""
+    """Output of `twinmill swarm metrics` for a log."""
     words = ("metrics", log, "--model", found / "model.toml", "--json")
     done = subprocess.run([TWINMILL, *words], capture_output=True, text=True, check=True)
     return json.loads(done.stdout)

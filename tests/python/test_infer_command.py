@@ -58,6 +58,18 @@ def test_diagnose_and_explain_with_the_models_own_log_find_what_came_since(
     assert code == 0 and json.loads(out)["probability"]["nothing"] > 0.5
 
 
+@pytest.mark.parametrize("asked", ["--no-formula", "--formula"])
+@pytest.mark.parametrize("model", ["turbopi.toml", "arm.xml"])
+def test_where_no_formula_is_proposed_its_options_are_refused(twinmill, tmp_path, asked, model):
+    """As the log is not there, too: nothing is read before."""
+    own = ["--own", tmp_path / "own.lcmlog"] if model == "turbopi.toml" else []
+    new = ["-o", tmp_path / f"new.{model.rpartition('.')[2]}"]
+    code, _, err = twinmill("explain", tmp_path / "r.lcmlog", "--model", model, *own, *new, asked)
+    assert code == 1 and len(err.splitlines()) == 1
+    assert f"leave {asked} away" in err and ("--own" if own else "jointed") in err
+    assert not [*tmp_path.iterdir()]
+
+
 def test_the_page_of_a_diagnosis_shows_its_probabilities(
     twinmill, brief_coasting_robot, brief_log_without_coasting, tmp_path
 ):

@@ -65,6 +65,15 @@ def test_what_is_the_users_alone_is_found_behind_all_else(tmp_path):
     assert done.stdout == "7\n"
 
 
+@pytest.mark.parametrize("program", [MODULE, None], ids=["module", "script"])
+def test_in_the_root_folder_the_interpreters_own_modules_stay(program, script):
+    """They have no file, so they do not lie there."""
+    line = [*(program or script), "--version"]
+    environment = {**os.environ, "PYTHONPATH": "/"}
+    done = subprocess.run(line, cwd="/", env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout.startswith("twinmill ")
+
+
 @pytest.mark.parametrize("module", ["typer", "twinmill.robots.tell"])
 def test_a_part_that_cannot_be_imported_is_one_sentence_and_an_object(module):
     """One that every command needs, and one of this command alone."""

@@ -156,6 +156,23 @@ def test_pages_name_commands_by_their_place_in_the_tree():
     assert {word for word in named if word[0].isalpha()} <= {*cli.TOP}
 
 
+FLAT = {old for below in cli.BELOW.values() for old in below.values()} - {*cli.TOP}
+TYPED_FLAT = re.compile(rf"\btwinmill (?:{'|'.join(FLAT)})\b(?!-)")
+# Of two words with a dash: where it is not the string that registers it.
+DASHED = "|".join(name for name in FLAT if "-" in name)
+NAMED_FLAT = re.compile(rf"(?<![\w\"-])(?:{DASHED})(?![\w\"-])")
+
+
+def test_nothing_printed_names_a_command_by_its_flat_name():
+    texts = {path: path.read_text() for path in (*PAGES, *SOURCES)}
+    assert not {path: found for path, text in texts.items() if (found := _flat(text))}
+    assert _flat("`twinmill effects`, compare-runs") == ["twinmill effects", "compare-runs"]
+
+
+def _flat(text: str) -> list[str]:
+    return [*TYPED_FLAT.findall(text), *NAMED_FLAT.findall(text)]
+
+
 def test_options_that_the_library_names_exist():
     """It names them as arguments; the commands write them with dashes."""
     named = {

@@ -52,6 +52,7 @@ if TYPE_CHECKING:
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
+OF_PROBABILITIES = "by probabilities (--own, or a model that keeps its error), which weigh names"
 
 
 def register(app: typer.Typer) -> None:
@@ -250,6 +251,13 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict[str, Any] | N
     return f"The swarm as a whole, {done}: {found.verdict} {LOOK.capitalize()}", found.to_json()
 
 
+def _refuse_formula(asked: bool | None, where: str) -> None:
+    """Raises ValueError if a formula is asked for, or none, where none is ever proposed."""
+    if asked is not None:
+        given = "--formula" if asked else "--no-formula"
+        raise ValueError(f"explain: no formula is proposed {where}; leave {given} away.")
+
+
 def _explain(
     logs: Logs,
     output: NewModel,
@@ -257,12 +265,13 @@ def _explain(
     model: Model = DEFAULT_MODEL,
     own: Own = None,
     formula: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--formula/--no-formula",
-            help="Add a validated formula for what no effect explains.",
+            show_default=False,
+            help="Add a validated formula for what no effect explains, as is done by default.",
         ),
-    ] = True,
+    ] = None,
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
@@ -275,17 +284,20 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 
-    With --own the likeliest effects are written, without a formula. Of an MJCF:
+    With --own the likeliest effects are written, never a formula. Of an MJCF:
     twinmill explain run.csv --model arm.xml -o better.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import explained as of_joints  # as in diagnose
 
+        _refuse_formula(formula, "for jointed robots")
         return of_joints(
             *(logs, model, output), own=own or [], force=force, as_json=as_json, out=out
         )
+    if own:
+        _refuse_formula(formula, OF_PROBABILITIES)
+    verb = "explain --no-formula" if formula is False else "explain"
     native.keep_memory()  # what the work frees it wants again
-    verb = "explain" if formula else "explain --no-formula"
     source = provenance(
         command_line(verb, logs, model, output), model_file := open_model(model, out)
     )
@@ -295,6 +307,7 @@ def _explain(
     if own or keeps_its_error(given.measurements, model_file):
         from twinmill_cli.infer import inferred  # as in diagnose
 
+        _refuse_formula(formula, OF_PROBABILITIES)
         return inferred(
             *("explain", given),
             own=own or [],
@@ -314,7 +327,7 @@ def _explain(
             out=output,
             command=source.command,
             progress=progress,
-            formula=formula,
+            formula=formula is not False,
             stoppable=True,
             force=force,
         )

@@ -318,7 +318,7 @@ def _options(
     `twinmill --install-completion` lets the shell complete commands and options.
 
     Exit codes: 0 done, 1 failed (one sentence on stderr), 2 wrong command line, 3 something
-    changed (compare-runs, drift), 130 stopped.
+    changed (robot compare, robot drift), 130 stopped.
     """
     context.with_resource(spelled(typed))
 

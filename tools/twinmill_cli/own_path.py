@@ -34,12 +34,14 @@ def _taken_from(folders: set[str]) -> list[str]:
     return [
         name
         for name, module in sys.modules.items()
-        if name in sys.stdlib_module_names and _folder_of(module) in folders
+        if name in sys.stdlib_module_names
+        and (file := getattr(module, "__file__", None))  # none has what the interpreter brings
+        and _folder_of(file) in folders
     ]
 
 
-def _folder_of(module: object) -> str:
-    file = os.path.abspath(getattr(module, "__file__", None) or os.sep)
+def _folder_of(file: str) -> str:
+    file = os.path.abspath(file)
     if os.path.basename(file).startswith("__init__."):
         file = os.path.dirname(file)
     return os.path.dirname(file)

@@ -126,7 +126,7 @@ CHANGING = (
 ANSWERED = "the commands answer how the robot strayed, and noise may look like it then"
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
 ONE_LOG = "it begins at a moment of one run, and these are several; diagnose one robot's log alone"
-CONTACTS = "predictions of one robot have no contacts; twinmill compare-swarm looks at whole swarms"
+CONTACTS = "predictions of one robot have no contacts; `twinmill swarm compare` looks at swarms"
 NO_VOLTAGE = (
     "the log has no voltage of the battery; tables have no column for it, the telemetry of our "
     "program has one"
@@ -685,7 +685,7 @@ def _next(
     if hidden:
         words, shown = drives
         names = shown or [name for name, _ in hidden]
-        ask = f"drive {words}" if words else "`twinmill effects NAME` says what shows one"
+        ask = f"drive {words}" if words else "`twinmill twin effects NAME` says what shows one"
         leave = "leaves" if len(names) == 1 else "leave"
         return {
             "script": None,

@@ -50,7 +50,7 @@ def rows_of(moves: list[Move], kind: CommandKind = "duty") -> Rows:
 
 
 def csv_text(rows: Rows) -> str:
-    """The script as firmware and twin read it, or `characterise --script-as`.
+    """The script as firmware and twin read it, or `robot characterise --script-as`.
 
     Rows `t_s,fl_pct,fr_pct,rl_pct,rr_pct` or `t_s,vx_mps,vy_mps,omega_radps`, each held until the
     next; the last one stops.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sealed predictions against a hundred simulated laboratories whose robots are another plant's.
 
-What is predicted comes from a model whose gains are known to a fifth, by `predict-floor`'s steps. A
+What is predicted comes from a model whose gains are known to a fifth, as `lab predict` does it. A
 laboratory's robots have gains of its own, drawn from the same errors. They are points that move by
 forward Euler, in NumPy; or bodies in MuJoCo, with mass, wheels that slip and hulls.
 """
@@ -138,7 +138,7 @@ def laboratories_in_mujoco(
 
 
 def sealed_prediction(folder: Path, model: str = MODEL) -> tuple[Request, Forecast]:
-    """Sweeps and predicts in a folder of its own, by predict-floor's steps."""
+    """Sweeps and predicts in a folder of its own, by the steps of `lab predict`."""
     (folder / "m.toml").write_text(model)
     request = make_request("milling", str(folder / "m.toml"), AXES, seeds=40, duration_s=SECONDS)
     run_missing(request, folder / "sweep", lambda worlds: None)

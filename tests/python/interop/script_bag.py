@@ -16,7 +16,7 @@ END_S, LONGEST_S = 3.0, 0.1  # of the script; a controller of ros2_control waits
 
 
 def _write(folder: Path) -> None:
-    """By `twinmill characterise --script-as bag`."""
+    """By `twinmill robot characterise --script-as bag`."""
     from twinmill_cli.main import run
 
     (folder / "m.toml").write_text(TEXT)

@@ -149,7 +149,7 @@ def _log_of(
     warnings += [w for own in (*pose_series, *command_series, *seen) for w in own.warnings]
     if not command_series:
         warnings.append(
-            "no commands are given: metrics, plot, compare-swarm and export need none; "
+            "no commands are given: swarm metrics, swarm plot, swarm compare and export need none; "
             "compare, diagnose, fit and explain do: import anew with "
             f"{option('commands')} (of a bag with {option('command')})."
         )

@@ -340,7 +340,7 @@ In this order, which is random, so that the battery, the floor and the day fall 
 
 ## The class of a run
 
-`score-floor` tells it from the log, with the view range of the run's cell:
+`twinmill lab score` tells it from the log, with the view range of the run's cell:
 
 {CLASSES}
 ## Afterwards
