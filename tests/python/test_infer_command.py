@@ -108,3 +108,16 @@ def test_a_run_for_a_swarm_takes_no_own_log(twinmill, brief_coasting_robot, tmp_
     code, _, err = twinmill("next", *given, *own)
     assert code == 1 and "leave --own away" in err
     assert not [*tmp_path.iterdir()]
+
+
+def test_effects_that_a_log_cannot_show_are_said_with_why(
+    twinmill, brief_coasting_robot, brief_log_without_coasting
+):
+    """Two logs of one robot: what begins at a moment of one is looked for in neither."""
+    logs = [brief_coasting_robot.log, brief_log_without_coasting]
+    code, out, _ = twinmill("lab", "infer", *logs, "--model", brief_coasting_robot.model, "--json")
+    found = json.loads(out)
+    assert code == 0
+    why = {row["effect"]: row["why"] for row in found["not_identifiable"]}
+    assert "moment of one run" in why["abrupt_loss"]
+    assert not {*why} & {*found["probability"]["effects"]}

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.arguments import option
 from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
 from twinmill.diagnosis import moments
@@ -83,6 +82,7 @@ from twinmill.diagnosis.trials import (
 from twinmill.diagnosis.verdict import VerdictInputs, drifted
 from twinmill.fitting.compare import GOOD, Comparison, comparison, of_others
 from twinmill.fitting.fit import base_names, effects_free
+from twinmill.fitting.not_shown import CANNOT, not_shown, robot_of
 from twinmill.fitting.opening import (
     Opened,
     judged,
@@ -99,7 +99,6 @@ from twinmill.model.parameters import (
     BASE_GAINS,
     LAG,
     base_parameters,
-    beginning_at_a_moment,
     catalogue,
     catalogue_of,
     is_local,
@@ -108,33 +107,11 @@ from twinmill.model.parameters import (
 )
 from twinmill.predict.datasets import thinning
 
-# What a measurement must have for an effect to show, and what to say where it has not.
-LACKS = {
-    "changes": "acts only while the speed changes, and a steady table has no starts and stops",
-    "clocks": "a steady table has no clocks",
-    "poses": "a steady table has no poses",
-    "heading": "a steady table has no poses",
-    "room": "a steady table does not say where and in which direction of the room the robot drove",
-    "battery": "a steady table does not say how full the battery was",
-    "history": "a steady table does not say how long the robot had been driving",
-    "wheel_angle": "a steady table gives means over many turns of the wheels",
-}
 CHANGING = (
     "how late the robot follows its commands changes within the log, so that no lag and no delay "
     "holds for all of it; look at what sent the commands, and log again"
 )
 ANSWERED = "the commands answer how the robot strayed, and noise may look like it then"
-NO_HEADING = "the heading was not recorded, and what the robot holds is found"
-ONE_LOG = "it begins at a moment of one run, and these are several; diagnose one robot's log alone"
-CONTACTS = "predictions of one robot have no contacts; `twinmill swarm compare` looks at swarms"
-NO_VOLTAGE = (
-    "the log has no voltage of the battery; tables have no column for it, the telemetry of our "
-    "program has one"
-)
-# What robots on these wheels cannot do.
-SIDEWAYS = {"strafe", "diagonal"}
-CANNOT = {"differential": SIDEWAYS, "ackermann": {*SIDEWAYS, "spin"}}
-NO_SIDEWAYS = "only driving sideways shows it, which these wheels do not do"
 
 
 def diagnose(
@@ -264,7 +241,7 @@ def _as_given(before: Comparison, opened: Sequence[Opened], known: Sequence[Open
 
 def _without(opened: Sequence[Opened], off: Sequence[Outlier]) -> list[Opened]:
     gone = {r.robot_id for r in off}
-    return [o for o in opened if _robot_of(o) not in gone]
+    return [o for o in opened if robot_of(o) not in gone]
 
 
 def _without_runs(opened: Sequence[Opened], off: Sequence[Outlier]) -> list[Opened]:
@@ -321,39 +298,6 @@ def _changing(opened: Sequence[Opened], model_file: ModelFile) -> dict[str, str]
     known = [o for o in opened if o.data is not None]
     told = model_file.known_from_other_logs([o.measurement.log_sha256 for o in known])
     return {name: CHANGING for part in untold_parts(known, told) for name in making_late(part)}
-
-
-def _robot_of(own: Opened) -> int:
-    return own.track.robot_id if own.floor else own.measurement.robot_id
-
-
-def not_shown(opened: Sequence[Opened]) -> dict[str, str]:
-    """Effects that these measurements cannot show by their kind, and why."""
-    tables = all(o.floor is None for o in opened)
-    found = {}
-    for name, entry in catalogue().items():
-        if tables and entry["needs"] in LACKS:
-            found[name] = LACKS[entry["needs"]]
-        elif opened[0].model.wheel_kind in CANNOT and set() < {*entry["identify"]} <= SIDEWAYS:
-            found[name] = NO_SIDEWAYS
-    if not tables:
-        shared = any(not o.same_clock for o in opened if o.floor)
-        if shared:
-            why = (
-                "commands and poses use different clocks, so a delay cannot be told from the "
-                f"offset; if both use one clock, say so ({option('same_clock', True)}), or fit a "
-                "calibration log on the same clocks first"
-            )
-            found |= dict.fromkeys(making_late("delay"), why)
-        if all(o.heading_held for o in opened if o.floor):
-            found |= dict.fromkeys(needing("heading"), NO_HEADING)
-        if sum(o.floor is not None for o in opened) > 1:
-            found |= dict.fromkeys(beginning_at_a_moment(), ONE_LOG)
-        if len({_robot_of(o) for o in opened}) > 1:
-            found |= dict.fromkeys(needing("contacts"), CONTACTS)
-        if all(np.isnan(o.track.battery_V).all() for o in opened if o.floor):
-            found |= dict.fromkeys(needing("battery"), NO_VOLTAGE)
-    return found
 
 
 def _concluded(

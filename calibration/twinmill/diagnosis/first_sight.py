@@ -9,10 +9,11 @@ from collections.abc import Sequence
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
-from twinmill.diagnosis.diagnose import first_state, not_shown
+from twinmill.diagnosis.diagnose import first_state
 from twinmill.diagnosis.screening import candidates, screen
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS, fitted
+from twinmill.fitting.not_shown import not_shown
 from twinmill.fitting.opening import open_roughly
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import WHERE_OR_WHEN, with_role

@@ -8,6 +8,7 @@ from typing import Any
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.not_shown import not_shown
 from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
@@ -44,6 +45,7 @@ class Inference:
         refitted: with the base's numbers where nothing is missing.
         after: with the likeliest set of effects.
         opened: these logs with the model of `refitted`.
+        not_shown: effects that these logs cannot show by their kind, and why.
     """
 
     answer: Answer
@@ -54,6 +56,7 @@ class Inference:
     refitted: Comparison
     after: Comparison
     opened: Sequence[Opened]
+    not_shown: dict[str, str]
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --json`."""
@@ -74,6 +77,7 @@ class Inference:
             "score": self.before.score,
             "score_refit": self.refitted.score,
             "score_after": self.after.score,
+            "not_identifiable": [{"effect": e, "why": w} for e, w in self.not_shown.items()],
             "robots_off": [],
             "next_experiment": None,
             "warnings": self.before.warnings,
@@ -139,6 +143,7 @@ def _scored(
         refitted=comparison(model_file, base),
         after=comparison(model_file, under(found.numbers, (*there, *found.added))),
         opened=base,
+        not_shown=not_shown(given),
     )
 
 

@@ -227,7 +227,17 @@ def _tables(result: Inference) -> list[Table]:
         *([_effects(answer.findings)] if answer.findings else []),
         *([_dependences(answer)] if answer.depends_on else []),
         *([others] if (others := _others(answer)) else []),
+        *([_unseen(result.not_shown)] if result.not_shown else []),
     ]
+
+
+def _unseen(not_shown: dict[str, str]) -> Table:
+    """Effects that these logs cannot show, those of one reason in a row."""
+    of_why: dict[str, list[str]] = {}
+    for effect, why in not_shown.items():
+        of_why.setdefault(why, []).append(effect)
+    rows = [[Cell(", ".join(effects)), Cell(why)] for why, effects in of_why.items()]
+    return Table("Not shown by these logs", ["effects", "why"], rows, words=(0, 1))
 
 
 def _known(result: Inference) -> list[str]:
