@@ -111,7 +111,8 @@ def _energy(candidate: Candidate, columns: np.ndarray) -> np.ndarray:
 
 
 def _smooth(entry: dict[str, Any], shown: np.ndarray | None = None) -> Candidate:
-    parameters = entry["parameters"]
+    # One whose usual value does nothing has no plausible strength, and no derivative is taken.
+    parameters = [p for p in entry["parameters"] if p["default"] != p["neutral"]]
     if shown is not None:
         parameters = [p for p, s in zip(parameters, shown, strict=True) if s]
     origin = tuple(p["neutral"] for p in parameters)

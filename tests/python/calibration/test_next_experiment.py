@@ -162,6 +162,7 @@ def designed(run_log, measure, model_file, tmp_path_factory) -> Designed:
     )
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_what_is_in_question_of_wheels_is_so_of_the_robots_own(measure, model_file):
     """A robot of two wheels has no rear ones, whatever effects of wheels may have elsewhere."""
     legs = np.random.default_rng(7).choice((-100, -50, 0, 50, 100), (25, 2))
