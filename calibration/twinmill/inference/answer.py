@@ -87,6 +87,12 @@ class Answer:
     refit: Numbers
 
     @property
+    def sure_words(self) -> list[str]:
+        """What the rest depends on for sure, else the likeliest such thing; none if nothing."""
+        sure = [word for word, p in self.depends_on.items() if p >= PRIORS.sure]
+        return sure or [*self.depends_on][:1]
+
+    @property
     def open(self) -> list[str]:
         """Effects that are neither sure nor ruled out, likeliest first."""
         return [name for name, p in self.effects.items() if PRIORS.member <= p < PRIORS.sure]

@@ -2,9 +2,10 @@
 """One model, and each robot by itself: what is missing, with probabilities."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from twinmill.arguments import option
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.fitting.compare import Comparison, comparison
@@ -38,18 +39,19 @@ class Inference:
 
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
-        left: what the likeliest dependence looks like; None without any.
+        left: what the dependences look like that are sure, or the likeliest.
         measurements: of the logs.
         always: what the model misses in its own logs, too; None where that is not known.
         before: these logs and the model as given.
         refitted: with the base's numbers where nothing is missing.
-        after: with the likeliest set of effects.
+        after: with the likeliest set of effects; as `refitted` if that is empty.
         opened: these logs with the model of `refitted`.
         not_shown: effects that these logs cannot show by their kind, and why.
+        strangers: sentences on own logs that are not the model's.
     """
 
     answer: Answer
-    left: Unnamed | None
+    left: tuple[Unnamed, ...]
     measurements: Sequence[Measurement]
     always: Always | None
     before: Comparison
@@ -57,13 +59,14 @@ class Inference:
     after: Comparison
     opened: Sequence[Opened]
     not_shown: dict[str, str]
+    strangers: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --json`."""
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
         told = self.answer.to_json()
-        told["rest"]["curve"] = self.left.to_json() if self.left else None
+        told["rest"]["curves"] = [one.to_json() for one in self.left]
         return {
             **told,
             "robot_id": self.measurements[0].track.robot_id,
@@ -80,7 +83,7 @@ class Inference:
             "not_identifiable": [{"effect": e, "why": w} for e, w in self.not_shown.items()],
             "robots_off": [],
             "next_experiment": None,
-            "warnings": self.before.warnings,
+            "warnings": [*self.strangers, *self.before.warnings],
             "settings": {name: value for name, value, _ in PRIORS.listed()},
         }
 
@@ -115,7 +118,8 @@ def infer(
     found = answer(table_of(search))
     progress("scores")
     left = unnamed(search, problem.motion, found)
-    return _scored(found, runs, model_file, left=left, always=always)
+    result = _scored(found, runs, model_file, left=left, always=always)
+    return replace(result, strangers=tuple(strangers(own, model_file)))
 
 
 def _scored(
@@ -123,7 +127,7 @@ def _scored(
     runs: Sequence[Measurement],
     model_file: ModelFile,
     *,
-    left: Unnamed | None,
+    left: tuple[Unnamed, ...],
     always: Always | None,
 ) -> Inference:
     given = open_measurements(runs, model_file)
@@ -134,6 +138,7 @@ def _scored(
         return [o.aligned(model) for o in given]
 
     base = under(found.refit, there)
+    after = under(found.numbers, (*there, *found.added)) if found.added else base
     return Inference(
         found,
         left,
@@ -141,10 +146,25 @@ def _scored(
         always,
         before=comparison(model_file, given),
         refitted=comparison(model_file, base),
-        after=comparison(model_file, under(found.numbers, (*there, *found.added))),
+        after=comparison(model_file, after),
         opened=base,
         not_shown=not_shown(given),
+        strangers=(),
     )
+
+
+def strangers(own: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> list[str]:
+    """Sentences on own logs to which the model was not fitted, as its file knows; one at most."""
+    hashes = [m.log_sha256 for m in own]
+    if not own or not model_file.known_from_other_logs(hashes):
+        return []
+    names = ", ".join(dict.fromkeys(m.log_name for m in own))
+    fitted = ", ".join(model_file.fit.get("logs", [])) or "others"
+    return [
+        f"{names}: {model_file.path.name} was fitted to {fitted}, not to this; if robot and clocks "
+        f"are not the same, what differs between them is told as new. Give {option('own')} the log "
+        "that the model was fitted to."
+    ]
 
 
 def keeps_its_error(

@@ -52,29 +52,37 @@ class Unnamed:
         return {"form": self.form} | {name: getattr(self, name).tolist() for name in rows}
 
 
-def unnamed(search: Search, motion: Motion, found: Answer) -> Unnamed | None:
-    """The likeliest dependence; None where it has no such picture, as moments, or there is none.
+def unnamed(search: Search, motion: Motion, found: Answer) -> tuple[Unnamed, ...]:
+    """Each dependence that is sure, or else the likeliest, all in one model.
+
+    Left out is one that has no such picture, as moments have none.
 
     Args:
         search: that was answered.
         motion: of its logs.
         found: the answer.
     """
-    p, word = search.problem, next(iter(found.depends_on), "")
-    forms = [f for f, kernel in enumerate(p.kernels) if kernel.depends_on == word]
-    wanted = {f.effect for f in found.findings}
+    kernels, wanted = search.problem.kernels, {f.effect for f in found.findings}
     sets = [s for s in search.likely() if {*map(catalogue_name, s)} == wanted]
-    axis = _axis(word, motion)
-    if not forms or not sets or axis is None:
-        return None
+    if not sets:
+        return ()
     own = search.fitted[sets[0]]
-    gains = own.gains[forms] + np.log(CHANCE)
-    which, s = np.unravel_index(gains.argmax(), gains.shape)
-    kernel, size = p.kernels[forms[which]], float(SIZES[s])
-    linear = own.with_kernel(search.view, forms[which], size)
-    count = len(kernel.columns)
-    mean, cov = size * linear.mean[-count:], size**2 * linear.covariance[-count:, -count:]
-    return _binned(kernel, motion, axis, mean=mean, cov=cov)
+    linear, told = own.linear, []
+    for word in found.sure_words:
+        forms = [f for f, kernel in enumerate(kernels) if kernel.depends_on == word]
+        if forms:
+            gains = own.gains[forms] + np.log(CHANCE)
+            which, s = np.unravel_index(gains.argmax(), gains.shape)
+            white = SIZES[s] * own.white(search.view, forms[which])
+            at = np.arange(len(linear.mean), len(linear.mean) + len(white))
+            told.append((kernels[forms[which]], float(SIZES[s]), at))
+            linear = linear.with_columns(white)
+    mean, cov = linear.mean, linear.covariance
+    return tuple(
+        _binned(kernel, motion, axis, mean=size * mean[at], cov=size**2 * cov[np.ix_(at, at)])
+        for kernel, size, at in told
+        if (axis := _axis(kernel.depends_on, motion)) is not None
+    )
 
 
 def _axis(word: str, m: Motion) -> np.ndarray | None:

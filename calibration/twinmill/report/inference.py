@@ -104,7 +104,7 @@ def section(
         comparisons.facts(before),
         [
             *([probabilities(one.answer)] if one else []),
-            *(unnamed.figures(one.left) if one else []),
+            *(figure for left in (one.left if one else ()) for figure in unnamed.figures(left)),
             waterfall(scores, "on the logs that were judged"),
             *robot_pictures(before, errors),
         ],
@@ -116,7 +116,7 @@ def section(
             *(_known(one) if one else [ONE_BY_ONE]),
             *([_new(written)] if written else []),
         ],
-        warnings=before.warnings,
+        warnings=[*results[0].strangers, *before.warnings],
         folded=[_priors()],
     )
 
@@ -217,7 +217,7 @@ def terminal(result: Inference) -> RenderableType:
         *map(show.table, _tables(result)),
         *map(Text, _known(result)),
         *([Text(step)] if (step := next_run(result.answer)) else []),
-        *show.warned(result.before.warnings),
+        *show.warned([*result.strangers, *result.before.warnings]),
     )
 
 
@@ -274,8 +274,8 @@ def _name(found: Named) -> str:
 def _on(answer: Answer) -> str:
     if not answer.depends_on:
         return ""
-    word, p = next(iter(answer.depends_on.items()))
-    return f"; what is left depends on {word} ({percent(p)})"
+    words = [f"{word} ({percent(answer.depends_on[word])})" for word in answer.sure_words]
+    return f"; what is left depends on {listed(words)}"
 
 
 def _effects(findings: list[Named]) -> Table:

@@ -27,10 +27,10 @@ FAINT = 0.2  # of the largest relative error: smaller ones are not drawn
 WIDEST = 0.5  # standard deviation of a gain: where the robot hardly moved it tells nothing
 
 
-def figures(left: Unnamed | None) -> list[Figure]:
+def figures(left: Unnamed) -> list[Figure]:
     """The dependence as curves, or as a map of the floor; none where no bin shows it."""
-    shown = _shown(left) if left else {}
-    if not left or not shown:
+    shown = _shown(left)
+    if not shown:
         return []
     return [_floor(left, shown) if left.at.shape[1] > 1 else _curves(left, shown)]
 
@@ -86,7 +86,8 @@ def _curves(left: Unnamed, shown: dict[str, list[int]]) -> Figure:
         draw(2.2 * len(shown), paint, nrows=len(shown), sharex=True),
         f"What is left, by {left.word}",
         f"The likeliest form ({left.form}): by how much the robot's motion exceeds the model's "
-        "with what was found, as a share of it and besides. Band: two standard deviations.",
+        "with what was found: as a share of it (gain), and what that leaves. Band: two standard "
+        "deviations.",
     )
 
 

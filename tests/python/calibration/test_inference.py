@@ -109,7 +109,7 @@ def test_a_gain_that_swings_with_the_heading_is_drawn_as_it_is(
 
     found = infer([measure(Turning(), 7)], one_clock_base, [own])
     assert next(iter(found.answer.depends_on)) == "heading"
-    curve = found.left
+    (curve,) = found.left
     known = np.isfinite(curve.gain[:, 2])
     off = curve.gain[known, 2] - 0.15 * np.sin(curve.at[known, 0])
     assert np.abs(off).max() < 0.05
