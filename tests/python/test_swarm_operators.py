@@ -49,7 +49,7 @@ def robot(robot_id: int, mode: int = TELEMETRY.MODE_STOPPED, link_timeout_ms: in
     """One that has just said all that it is."""
     link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
     link.session, link.mode, link.armed, link.link_timeout_ms = SESSION, mode, 1, link_timeout_ms
-    telemetry.mode = mode
+    telemetry.mode, link.utime_us = mode, time.time_ns() // 1000
     now_s = time.monotonic()
     return Robot(robot_id, telemetry=telemetry, heard_s=now_s + 60, link=link, link_s=now_s)
 
@@ -312,9 +312,12 @@ def test_a_clock_that_is_odd_is_told_by_status_and_at_both_ends_of_a_start(
         known.recent.append(Step(time.monotonic(), time.time(), known.telemetry))
     fleet = fleet_of(ahead, right)
     monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm, "RUN_PERIOD_S", 1.0)
     said = "R01's clock is 30.00 s ahead of this computer's, with which R02 agrees: set its (NTP)."
     code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file)
     assert code == 0 and said in " ".join(out.split())
+    for known in (ahead, right):  # both still sign
+        known.link.utime_us, known.link_s = time.time_ns() // 1000, time.monotonic()
     code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file, "--json")
     told = json.loads(out)
     assert code == 0 and told["ok"] and told["verb"] == "status"

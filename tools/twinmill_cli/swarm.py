@@ -51,9 +51,11 @@ if working():  # not for --help
         of_countdown,
         of_end,
         of_heard,
+        of_old_news,
         of_remarks,
         of_select,
         of_start,
+        of_status,
         of_stop,
     )
     from twinmill_cli.voice import Voice, refuse_deaf
@@ -338,6 +340,7 @@ def _show(fleet: Fleet) -> None:
     with Live(console=PlainConsole(), auto_refresh=False) as live:
         while True:
             fleet.listen(0.25)
+            tell.ask_once(fleet, {i for i, r in fleet.robots.items() if r.link})
             robots = [fleet.robots[i] for i in sorted(fleet.robots)]
             live.update(status_table(robots, has_key=fleet.has_key), refresh=True)
 
@@ -350,16 +353,14 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
-    told = f"Heard: {names(fleet.robots)}." if robots else "No robot is heard."
-    heard = Verdict(bool(robots), told)
     tell.ask_clocks(fleet, set(fleet.robots))
-    odd = clocks(fleet, fleet.robots)
+    heard, odd = of_status(robots), clocks(fleet, fleet.robots)
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
         of_each = [r.to_json() for r in robots]
         print_object({**data, "robots": of_each, "key_fault": key_fault or None})
     else:
         PlainConsole().print(status_table(robots, has_key=fleet.has_key))
-        if odd:
-            PlainConsole().print(odd, soft_wrap=True)
+        for words in filter(None, [of_old_news(robots), odd]):
+            PlainConsole().print(words, soft_wrap=True)
     return heard.code

@@ -215,6 +215,28 @@ def of_heard(robots: Iterable[int]) -> str:
     )
 
 
+def of_status(robots: Sequence[Robot]) -> Verdict:
+    """Who is heard; it went well where somebody is, and all of that is new."""
+    if not robots:
+        return Verdict(False, "No robot is heard.")
+    heard = f"Heard: {', '.join(f'R{r.robot_id:02d}' for r in robots)}."
+    old = of_old_news(robots)
+    return Verdict(not old, _joined(heard, old))
+
+
+def of_old_news(robots: Iterable[Robot]) -> str:
+    """Sentence on robots that are told by old words alone; empty if none is."""
+    old = [r for r in robots if r.is_old_news]
+    if not old:
+        return ""
+    each = "; ".join(f"R{r.robot_id:02d} {r.old_news}" for r in old)
+    return (
+        f"NOBODY KNOWS WHAT {', '.join(f'R{r.robot_id:02d}' for r in old)} "
+        f"{'DOES' if len(old) == 1 else 'DO'} NOW: {each}. It may be a recording that is played "
+        "while the robot is off or drives elsewhere."
+    )
+
+
 def _besides(given: list[Answer]) -> str:
     """Remarks on robots that have confirmed a stop."""
     lost_link = [a for a in given if a.lost_link]

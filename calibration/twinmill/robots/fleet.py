@@ -193,20 +193,62 @@ class Robot:
 
     @property
     def signs_that_it_stands(self) -> bool:
-        """It has signed just now that its board took zero.
+        """It has signed just now, by its own stamp, that its board took zero.
 
         What else it says, signed or not, may only contradict that.
         """
         link = self.link
         return bool(
             link
-            and time.monotonic() - self.link_s < SIGNED_S
+            and self.signed_ago_s < SIGNED_S
             and link.stands
             and not link.status_flags & MAY_MOVE
             and self.stands
             and self.is_here
             and not self.is_double
         )
+
+    @property
+    def answered_now(self) -> Answered | None:
+        """Its quickest answer in the session of its newest link; None: it gave none."""
+        link, answered = self.link, self.answered
+        return answered if link and answered and link.session == answered.session else None
+
+    @property
+    def signed_ago_s(self) -> float:
+        """How long ago it signed what is known of it; a recording that is played is no news.
+
+        At most, where it has answered in this session. Else by both clocks: one that is ahead for
+        so long that it could hide that leaves it open, as nothing signed does: infinite.
+        """
+        link, answered, now_s = self.link, self.answered_now, time.monotonic()
+        if not link:
+            return math.inf
+        if answered:
+            return now_s + answered.most_now_s - link.session_us / 1e6
+        stamped_s = time.time() - link.utime_us / 1e6
+        return max(stamped_s, now_s - self.link_s) if stamped_s > -SIGNED_S else math.inf
+
+    @property
+    def is_old_news(self) -> bool:
+        """It is heard, and nobody knows that it said so just now: it may be elsewhere, and drive.
+
+        Of a robot with another key its telemetry tells, which may be anybody's.
+        """
+        age_s = self.signed_ago_s if self.link else self.late_s
+        return self.is_here and age_s > SIGNED_S
+
+    @property
+    def old_news(self) -> str:
+        """Words on how old is what is known of it; empty where it is new."""
+        if not self.is_old_news:
+            return ""
+        if not self.link:
+            return f"by what it said {self.late_s:.0f} s ago, or its clock is behind"
+        if self.signed_ago_s == math.inf:
+            return "its clock is ahead, and it answers nothing: nobody knows when it said that"
+        how = "at most" if self.answered_now else "if its clock is right"
+        return f"by what it signed {self.signed_ago_s:.0f} s ago, {how}"
 
     def confirms(self, seq: int) -> bool:
         """It has signed that it obeyed this stop, and that its board took zero since.
@@ -291,6 +333,7 @@ class Robot:
         """Alarms about it that a person must know, loudest first."""
         hosts = ", ".join(self.senders.hosts)
         said = [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
+        said += [f"OLD NEWS: {self.old_news}"] if self.is_old_news else []
         flags = self.telemetry.status_flags if self.telemetry else 0
         flags |= self.link.status_flags if self.link else 0
         return said + [words for flag, words in ALARMS if flags & flag]
@@ -317,8 +360,8 @@ class Robot:
     @property
     def _clock_most_s(self) -> float:
         """Infinite where nothing was answered in this session."""
-        link, answered = self.link, self.answered
-        if not (link and answered and link.session == answered.session):
+        link, answered = self.link, self.answered_now
+        if not (link and answered):
             return math.inf
         set_to_s = (link.utime_us - link.session_us) / 1e6
         return answered.most_now_s + set_to_s - (time.time() - time.monotonic())
@@ -384,7 +427,8 @@ class Robot:
             "signed": self.link is not None,
             "armed": self.is_armed,
             "tethered": self.is_tethered,
-            "held": self.is_held,
+            "held": None if self.is_old_news else self.is_held,
+            "signed_ago_s": self.signed_ago_s if self.link else None,
             "link_timeout_s": self.link_timeout_s,
             "battery_V": t.battery_V if t else None,
             "camera": self.camera,

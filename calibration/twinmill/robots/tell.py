@@ -164,26 +164,35 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
 
 
 def ask_clocks(fleet: Fleet, robots: set[int]) -> None:
-    """Asks robots of which all comes late for an answer.
+    """Asks robots of which all comes late, or was signed long ago, for an answer.
 
-    By that a network that is late is told from a clock that is behind. Without the operator's key
-    no answer is believed, and none asked for.
+    By that a network that is late is told from a clock that is behind, and a robot that is there
+    from a recording of it. Without the operator's key no answer is believed, and none asked for.
     """
-
-    def waiting() -> set[int]:
-        here = robots & fleet.here() if fleet.has_key else set()
-        return {i for i in here if fleet.robots[i].age_s > CLOCK_WARN_S} - {
-            i for i in here if fleet.robots[i].has_answered
-        }
-
     end_s = time.monotonic() + ASK_S
-    while waiting() and time.monotonic() < end_s:
-        for robot_id in sorted(waiting()):
-            command = make_command(ASK)
-            command.robot_id = robot_id
-            with suppress(OSError):
-                fleet.send(command)
-        fleet.listen(REPEAT_S, lambda: not waiting())
+    while _unasked(fleet, robots) and time.monotonic() < end_s:
+        ask_once(fleet, robots)
+        fleet.listen(REPEAT_S, lambda: not _unasked(fleet, robots))
+
+
+def ask_once(fleet: Fleet, robots: set[int]) -> None:
+    """As ask_clocks(), and waits for nothing."""
+    for robot_id in sorted(_unasked(fleet, robots)):
+        command = make_command(ASK)
+        command.robot_id = robot_id
+        with suppress(OSError):
+            fleet.send(command)
+
+
+def _unasked(fleet: Fleet, robots: set[int]) -> set[int]:
+    """Those that are late or old news, and have not answered."""
+    here = [fleet.robots[i] for i in robots & fleet.here()] if fleet.has_key else []
+    return {
+        r.robot_id
+        for r in here
+        if (r.age_s > CLOCK_WARN_S and not r.has_answered)
+        or (r.link and r.is_old_news and not r.answered_now)
+    }
 
 
 def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
