@@ -15,7 +15,8 @@ from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_end import driving
 from twinmill_cli.swarm_screen import status_table
-from twinmill_cli.swarm_verdict import of_busy, of_countdown
+from twinmill_cli.swarm_verdict import of_busy, of_countdown, of_start
+from twinmill_cli.voice import Voice
 
 KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
 VERBS = turbopi.signed_command_t
@@ -198,6 +199,77 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R01 drives already, held by another operator" in said
     assert "R02 drives already, and no operator is heard who holds it" in said
     assert "R03 drives already, untethered" in said
+
+
+def drives_by_its_word(robot_id: int) -> Robot:
+    """A robot of another lab, with that lab's key."""
+    other = robot(robot_id, DRIVING)
+    other.link, now_s = None, time.monotonic()
+    other.recent.append(Step(now_s + 60, time.time(), other.telemetry))
+    return other
+
+
+@pytest.mark.parametrize("verb", ["arm", "select", "start"])
+def test_who_drives_by_a_word_that_nobody_can_check_is_told_first(
+    monkeypatch, key_file, twinmill, verb
+):
+    """A start said that it drives without having confirmed it, as if the start had moved it."""
+    fleet = fleet_of(robot(1), drives_by_its_word(2))
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm.tell, "arm", lambda *_: [])
+    monkeypatch.setattr(swarm.tell, "tell", lambda *_, **__: [])
+    more = {"arm": [], "select": ["milling"], "start": ["--partial", "--json"]}[verb]
+    _, out, err = twinmill("swarm", verb, *more, "--robots", "1,2", "--key", key_file)
+    assert "R02 drives already, by its word, which nobody can check" in err
+    assert "takes over" not in err and "may not play" not in err
+    assert verb != "start" or json.loads(out)["drove_before"] == [2]
+
+
+def test_a_start_is_not_said_to_have_moved_who_was_told_nothing():
+    """Robots of another key get no start from here."""
+    fleet, before = fleet_of(drives_by_its_word(2)), robot(1, DRIVING)
+    fleet.robots[1] = before
+    given = tell.answers(fleet, tell.make_command(VERBS_START), {1, 2})
+    untold = frozenset({2})
+    begun = tell.Start(0, given, {}, untold=untold)
+    said = of_start(begun, drove_before=[1, 2]).sentence
+    assert "R02 was told nothing by this start, and drives by somebody else's word" in said
+    assert "R01 drove before, and has not confirmed it" in said
+    alone = tell.Start(0, given[1:], {}, untold=untold)
+    assert of_start(alone).sentence.startswith("NOBODY STARTED") and alone.begun_utime_us is None
+
+
+@pytest.mark.parametrize("past_instant", [False, True])
+def test_a_countdown_that_is_ended_leaves_another_labs_robot_alone(monkeypatch, past_instant):
+    """Ctrl-C before any wheel had turned stopped it. Later all that may drive are stopped."""
+    fleet, stopped, told = fleet_of(robot(1), drives_by_its_word(2)), [], []
+    fleet.addressed = {1}
+
+    def interrupted(*_, **options):
+        time.sleep(2 * options["ahead_s"] * past_instant)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tell, "start", interrupted)
+    monkeypatch.setattr(tell, "stop", lambda _, robots, *__, **___: stopped.append(robots) or [])
+    monkeypatch.setattr(swarm, "finish", lambda *given, **_: told.append(given))
+    data, voice = {"drove_before": [2]}, Voice()
+    options = {"ahead_s": 0.1, "partial": True, "link_timeout_ms": 2000}
+    kept = {"data": data, "as_json": True, "heard": "", "ends": str, "signals": []}
+    ended = swarm._drive(fleet, {1, 2}, "", voice, **kept, **options)
+    voice.end(1, [])
+    assert stopped == [{1, 2} if past_instant else {1}]
+    assert data["left_alone"] == ([] if past_instant else [2])
+    left = "R02 was told nothing by this start and is left alone. R02 drives already, by its word"
+    assert (left in ended.sentence) != past_instant
+
+
+def test_a_start_that_is_called_off_tells_nobody_to_stop_who_was_told_nothing(monkeypatch):
+    fleet, stopped = fleet_of(robot(1), drives_by_its_word(2)), []
+    monkeypatch.setattr(Fleet, "send_signed", lambda *_, **__: None)
+    monkeypatch.setattr(tell, "stop", lambda _, robots, *__, **___: stopped.append(robots) or [])
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=0.4, partial=False)
+    assert begun.called_off and stopped == [{1}] and begun.untold == {2}
+    assert "R02 was told nothing by this start and is left alone" in of_start(begun).sentence
 
 
 def telemetry(mode: int) -> bytes:

@@ -29,6 +29,10 @@ OF_SEVERAL = {
     "the robot's configuration": "the robots' configurations",
     "and has forgotten": "and have forgotten",
     "and was not": "and were not",
+    "and is left alone": "and are left alone",
+    "and drives": "and drive",
+    "and has not confirmed": "and have not confirmed",
+    "and obeys": "and obey",
 }
 VERBS = {
     "was": "were",

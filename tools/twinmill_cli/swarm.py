@@ -45,6 +45,8 @@ if working():  # not for --help
     from twinmill_cli.swarm_end import clocks, driving, finish
     from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
+        LEFT_ALONE,
+        NOBODY_TOLD,
         Verdict,
         of_arm,
         of_busy,
@@ -57,6 +59,7 @@ if working():  # not for --help
         of_start,
         of_status,
         of_stop,
+        of_taking_over,
     )
     from twinmill_cli.voice import Voice, refuse_deaf
 
@@ -134,11 +137,12 @@ def _start(
         busy = tell.find_busy(fleet, asked)
         refuse_stopped(fleet, asked)
         if busy:
-            say(f"{of_busy(busy)}; this start takes over.")
+            say(of_taking_over(busy))
         if arm:
             tell.arm(fleet, asked)
         data = {
-            "drove_before": [robot.robot_id for robot in busy if robot.drives],
+            "drove_before": [robot.robot_id for robot in busy if robot.drives_by_any_word],
+            "left_alone": [],
             "link_timeout_s": timeout_ms / 1e3,
         }
         code, voice = 1, Voice(as_json=as_json)
@@ -198,13 +202,16 @@ def _drive(
         options: of tell.start().
     """
     begun, held, odd, halt = None, None, "", LastStop(voice, signals)
+    instant_s = time.monotonic() + options["ahead_s"]
     voice.show(lambda: countdown(asked, options["ahead_s"]))
     try:
         started = tell.start(fleet, asked, behavior, stopping=halt, **options)
         voice.clear()
         odd = clocks(fleet, asked)
-        begun, held = of_start(started, ends()).more(heard).more(odd), Held(fleet, started)
+        begun = of_start(started, ends(), drove_before=data["drove_before"]).more(heard).more(odd)
+        held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
+        data["left_alone"] = sorted(started.untold if started.called_off else ())
         voice.tell(lambda: finish("start", started.answers, begun, data, as_json=as_json))
         if started.called_off or not held.robots:
             return begun
@@ -218,11 +225,15 @@ def _drive(
     except BaseException as error:
         if held:
             held.settle()
-        given = halt(fleet, asked)
+        told = asked & fleet.addressed if time.monotonic() < instant_s else asked
+        given = halt(fleet, told) if told else []
         voice.clear()
-        states, known = held.ends() if held else {}, tell.have_confirmed(fleet, asked)
-        stopped = of_stop(given, halt.how)
+        states, known = held.ends() if held else {}, tell.have_confirmed(fleet, told)
+        stopped = of_stop(given, halt.how) if told else NOBODY_TOLD
         ended = of_end(begun, states, stopped, was_confirmed=known)
+        left = sorted(asked - told)
+        data["left_alone"] = left
+        ended = ended.beside([f"R{i:02d}" for i in left], LEFT_ALONE).more(_who_drives(fleet, left))
         ended = (
             ended.more(told_of_signals(signals))
             .more(of_remarks(given) if stopped.ok else "")
@@ -239,6 +250,12 @@ def _drive(
     if begun is not None:
         voice.say(ended.sentence)
     return ended
+
+
+def _who_drives(fleet: Fleet, left: list[int]) -> str:
+    """Sentence on robots that were left alone, and drive; empty if none does."""
+    busy = [r for i in left if (r := fleet.robots.get(i)) and r.drives_by_any_word]
+    return f"{of_busy(busy)}." if busy else ""
 
 
 def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:

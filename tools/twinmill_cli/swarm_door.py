@@ -21,7 +21,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.key import load, of_operator
-    from twinmill_cli.swarm_verdict import of_clocks, of_late
+    from twinmill_cli.swarm_verdict import of_busy, of_clocks, of_late
 
     PREFIX_MAX = CHANNEL_MAX - len("R00_SIGNED_ACK")  # the longest of robots' channels
 
@@ -172,7 +172,9 @@ def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
     strange = {i for i in robots if not fleet.robots[i].link}
     if strange:
         why = several.of(strange, tell.NO_SIGNATURE)
-        raise ValueError(f"nothing was started: {names(strange)} {why}")
+        driving = [fleet.robots[i] for i in sorted(strange) if fleet.robots[i].says_that_it_drives]
+        more = f" {of_busy(driving)}." if driving else ""
+        raise ValueError(f"nothing was started: {names(strange)} {why}{more}")
 
 
 def names(robots: Iterable[int]) -> str:

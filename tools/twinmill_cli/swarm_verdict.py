@@ -27,6 +27,8 @@ from twinmill_cli import exit_now, several
 from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
 BY_HAND = "SWITCH OFF BY HAND what still drives."
+BY_ITS_WORD = "by its word, which nobody can check"
+LEFT_ALONE = "was told nothing by this start and is left alone"
 
 
 @dataclass(frozen=True)
@@ -59,18 +61,21 @@ class Verdict:
         """
         return exit_now.STOPPED if self.ends_well and KEYS & {*signals} else self.code
 
-    def beside(self, driving: list[str]) -> Verdict:
-        """This outcome with a word on robots that were not asked, and that drive."""
-        if not driving:
+    def beside(self, others: list[str], words: str = "drives, and was not asked") -> Verdict:
+        """This outcome with a word on robots that were not told to stop, to go on behind names."""
+        if not others:
             return self
         told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
         return replace(self, sentence=told).more(
-            f"{', '.join(driving)} {several.of(driving, 'drives, and was not asked')}."
+            f"{', '.join(others)} {several.of(others, words)}."
         )
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""
         return replace(self, sentence=_joined(self.sentence, words))
+
+
+NOBODY_TOLD = Verdict(False, "The start was ended before a robot was told of it.", ends_well=True)
 
 
 @dataclass(frozen=True)
@@ -258,19 +263,21 @@ def of_busy(busy: list[Robot]) -> str:
     """That robots drive already or are about to, and by whom; empty where none does."""
     by: dict[tuple[str, str], list[str]] = {}
     for robot in busy:
-        who = {
-            None: "untethered",
-            True: "held by another operator",
-            False: "and no operator is heard who holds it",
-        }[robot.is_held]
+        who = BY_ITS_WORD
+        if robot.drives:
+            who = {
+                None: "untethered",
+                True: "held by another operator",
+                False: "and no operator is heard who holds it",
+            }[robot.is_held]
         in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
-        if not robot.drives:
+        if not robot.drives_by_any_word:
             who = f"still{in_fault}, held by another operator who may be counting down to a start"
         elif in_fault:
             who = f"still{in_fault}, was started, and drives once that is over: {who}"
         else:
             who = f"already, {who}"
-        moves = robot.drives and not in_fault
+        moves = robot.drives_by_any_word and not in_fault
         by.setdefault(("drive" if moves else "stand", who), []).append(f"R{robot.robot_id:02d}")
     return "; ".join(
         f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
@@ -278,12 +285,22 @@ def of_busy(busy: list[Robot]) -> str:
     )
 
 
+def of_taking_over(busy: list[Robot]) -> str:
+    """`of_busy`, and which of them a start from here takes over."""
+    ours, theirs = [r for r in busy if r.link], [r for r in busy if not r.link]
+    told = [f"{of_busy(ours)}; this start takes over."] if ours else []
+    if theirs:
+        words = several.of(theirs, "it signs nothing with this operator's key, and obeys no start")
+        told.append(f"{of_busy(theirs)}: {words} from here.")
+    return _joined(*told)
+
+
 def of_countdown(busy: list[Robot], behavior: str) -> str:
     """Sentence on robots that may not play what is chosen; empty where all will.
 
     What the start names that they may wait for was said before anybody listened here.
     """
-    waiting = [f"R{robot.robot_id:02d}" for robot in busy if not robot.drives]
+    waiting = [f"R{robot.robot_id:02d}" for robot in busy if not robot.drives_by_any_word]
     if not waiting:
         return ""
     return (
@@ -380,12 +397,15 @@ def _wrong(given: list[Answer]) -> str:
     return "; ".join(told)
 
 
-def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
+def of_start(
+    begun: Start, ends: str = BY_KEY, *, drove_before: Iterable[int] = frozenset()
+) -> Verdict:
     """Who drives.
 
     Args:
         begun: what became of it.
         ends: what stops those that are held.
+        drove_before: robots that did before anything was said from here.
     """
     given = begun.answers
     if begun.called_off:
@@ -396,7 +416,8 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     if len(standing) == len(given):
         return Verdict(False, _of_nobody(begun, at, ends))
     going = [a for a in given if a.accepted is False and a.mode in DRIVING]
-    if all(a.accepted is False for a in given):
+    if all(a.accepted is False or a.robot_id in begun.untold for a in given):
+        going = going or [a for a in given if a.robot_id in begun.untold and a.mode in DRIVING]
         words = f"NOBODY STARTED: {_why(given)}. {_as_before(going or faulty)}."
         return Verdict(False, words)
     late = {a.robot_id for a in begun.late}
@@ -404,6 +425,9 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     silent = [a for a in waiting if a.is_silent and a.accepted is not False]
     idle = [a for a in waiting if a not in silent]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
+    theirs = [a for a in unsure if a.robot_id in begun.untold]
+    before = [a for a in unsure if a.robot_id in drove_before and a not in theirs]
+    unsure = [a for a in unsure if a not in theirs and a not in before]
     told = [
         f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
         if faulty
@@ -413,7 +437,9 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
         f"{_unheard(begun.late)} in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
-        _unconfirmed(unsure) if unsure else "",
+        _unconfirmed(unsure, "drives without having confirmed it"),
+        _unconfirmed(before, "drove before, and has not confirmed it"),
+        _unconfirmed(theirs, "was told nothing by this start, and drives by somebody else's word"),
         _dry_run(given),
         _remarked(given),
         *_odd_links(begun),
@@ -427,9 +453,8 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     return Verdict(False, words)
 
 
-def _unconfirmed(given: list[Answer]) -> str:
-    words = several.of(given, "drives without having confirmed it")
-    return f"{_names(given)} {words}{_because(given)}"
+def _unconfirmed(given: list[Answer], words: str) -> str:
+    return f"{_names(given)} {several.of(given, words)}{_because(given)}" if given else ""
 
 
 def _unheard(given: list[Answer]) -> str:
@@ -469,7 +494,8 @@ def _going_on(begun: Start, ends: str) -> str:
     else:
         words = f"{ends}; they stop by themselves "
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
-    taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
+    told = [a for a in begun.answers if a.robot_id not in begun.untold]
+    taken = [a for a in told if a.mode in DRIVING and a.accepted is not False]
     waiting = [a for a in taken if a.link_timeout_s is None]
     verb = several.of(waiting, "has")
     return f"{words}{f', which {_names(waiting)} {verb} not signed yet' if waiting else ''}."
@@ -499,9 +525,12 @@ def _of_called_off(begun: Start) -> Verdict:
         words += f" {_names(taken)}: left to that operator."
     if STOPPED in begun.dropouts.words.values():
         words += f" {_who_stopped(begun)}"
+    untold = [a for a in begun.answers if a.robot_id in begun.untold]
+    if untold:
+        words += f" {_names(untold)} {several.of(untold, LEFT_ALONE)}."
     if begun.stopped:
-        whom = "The others" if taken else "All"
-        stopped = of_stop(begun.stopped, is_of_some=bool(taken)).sentence
+        whom = "The others" if taken or untold else "All"
+        stopped = of_stop(begun.stopped, is_of_some=bool(taken or untold)).sentence
         is_of_all = any(w.startswith((STOPPED, NONE_BEGUN)) for w in begun.dropouts.words.values())
         more = "" if is_of_all else "; --partial starts some"
         words += f" {whom} were told to stop: {stopped} They must be armed before they start"

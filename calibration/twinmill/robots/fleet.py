@@ -308,6 +308,11 @@ class Robot:
         return bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
 
     @property
+    def drives_by_any_word(self) -> bool:
+        """It has signed so, or says so unsigned, as a robot of another key: anybody may say it."""
+        return self.drives or self.says_that_it_drives
+
+    @property
     def is_held(self) -> bool | None:
         """An operator is heard who holds it; None if it needs none."""
         return self.hears_operator if self.is_tethered else None
@@ -482,6 +487,8 @@ class Fleet:
         # When commands were said from here first, by number, and the highest counter of those.
         self.said: dict[int, float] = {}
         self.counter = 0
+        # Robots that were told something from here that is signed, as to start.
+        self.addressed: set[int] = set()
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
         self._prefix, self.key, self._hold_s = channel_prefix, key, 0.0
