@@ -201,6 +201,40 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R03 drives already, untethered" in said
 
 
+@pytest.mark.parametrize("verb", ["status", "arm", "select"])
+def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb):
+    """Twins had stopped, "All stand." was said, and a real robot of the same number drove."""
+    twin, fleet, command = robot(1), fleet_of(), tell.make_command(VERBS_START)
+    twin.run = turbopi.run_t()
+    twin.run.source = "twin"
+    bus = {"lcm_url": "udpm://239.255.76.67:7668?ttl=1", "channel_prefix": "TWIN_"}
+    words = ["--robots", "1"] if verb != "status" else []
+    words += ["milling"] if verb == "select" else []
+
+    def said(run: list[str]) -> dict:
+        fleet.robots = {1: twin}
+        twin.link.utime_us, twin.link_s = time.time_ns() // 1000, time.monotonic()
+        return json.loads(twinmill("swarm", verb, *words, "--json", "--key", key_file, *run)[1])
+
+    def join(url, prefix="", **_):
+        fleet.url, fleet._prefix = url, prefix
+        return fleet
+
+    monkeypatch.setattr(swarm.tell, "tell", lambda *_, **__: tell.answers(fleet, command, {1}))
+    monkeypatch.setattr(swarm.tell, "arm", lambda *_: tell.answers(fleet, command, {1}))
+    monkeypatch.setattr(swarm, "Fleet", join)
+    monkeypatch.setattr(swarm_door, "Fleet", join)
+    told = said(["--lcm-url", bus["lcm_url"], "--channel-prefix", "TWIN_"])
+    assert told["addressed"] == {**bus, "twins": [1]}
+    first = (
+        "Only robots with --lcm-url 'udpm://239.255.76.67:7668?ttl=1' --channel-prefix TWIN_ are"
+    )
+    assert told["sentence"].startswith(first) and "R01 is a twin, no robot." in told["sentence"]
+    twin.run.source = "robot"
+    told = said([])
+    assert "addressed" not in told and "Only robots" not in told["sentence"]
+
+
 def drives_by_its_word(robot_id: int) -> Robot:
     """A robot of another lab, with that lab's key."""
     other = robot(robot_id, DRIVING)

@@ -42,7 +42,7 @@ if working():  # not for --help
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
     from twinmill_cli.room import refuse_deleted, refuse_full
-    from twinmill_cli.swarm_end import clocks, driving, finish
+    from twinmill_cli.swarm_end import addressed, clocks, driving, finish, placed
     from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
         LEFT_ALONE,
@@ -212,7 +212,9 @@ def _drive(
         held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
         data["left_alone"] = sorted(started.untold if started.called_off else ())
-        voice.tell(lambda: finish("start", started.answers, begun, data, as_json=as_json))
+        voice.tell(
+            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json)
+        )
         if started.called_off or not held.robots:
             return begun
         if options["link_timeout_ms"] == 0:
@@ -243,12 +245,12 @@ def _drive(
         )
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
-            voice.tell(lambda: finish("start", given, ended, data, as_json=as_json))
+            voice.tell(lambda: finish("start", given, ended, data, fleet=fleet, as_json=as_json))
         if not isinstance(error, KeyboardInterrupt):
-            voice.say(ended.sentence)
+            voice.say(placed(fleet, asked, ended).sentence)
             raise
     if begun is not None:
-        voice.say(ended.sentence)
+        voice.say(placed(fleet, asked, ended).sentence)
     return ended
 
 
@@ -294,7 +296,7 @@ def _arm(
             given = tell.arm(fleet, asked)
         verdict = of_arm(given)
         decide(verdict.code)
-        return finish("arm", given, verdict, {}, as_json=as_json)
+        return finish("arm", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
 def _select(
@@ -321,7 +323,7 @@ def _select(
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
         verdict = of_select(given, behavior)
         decide(verdict.code)
-        return finish("select", given, verdict, {}, as_json=as_json)
+        return finish("select", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
 def _status(
@@ -371,13 +373,15 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
     tell.ask_clocks(fleet, set(fleet.robots))
-    heard, odd = of_status(robots), clocks(fleet, fleet.robots)
+    heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
+        data |= addressed(fleet, fleet.robots)
         of_each = [r.to_json() for r in robots]
         print_object({**data, "robots": of_each, "key_fault": key_fault or None})
     else:
         PlainConsole().print(status_table(robots, has_key=fleet.has_key))
-        for words in filter(None, [of_old_news(robots), odd]):
+        where = placed(fleet, fleet.robots, Verdict(True, "")).sentence
+        for words in filter(None, [where, of_old_news(robots), odd]):
             PlainConsole().print(words, soft_wrap=True)
     return heard.code

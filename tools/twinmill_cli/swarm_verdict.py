@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import Any
 
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
@@ -69,6 +71,10 @@ class Verdict:
         return replace(self, sentence=told).more(
             f"{', '.join(others)} {several.of(others, words)}."
         )
+
+    def behind(self, words: str) -> Verdict:
+        """This outcome behind words without which it would be misread; they may be empty."""
+        return replace(self, sentence=_joined(words, self.sentence))
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""
@@ -240,6 +246,20 @@ def of_old_news(robots: Iterable[Robot]) -> str:
         f"{'DOES' if len(old) == 1 else 'DO'} NOW: {each}. It may be a recording that is played "
         "while the robot is off or drives elsewhere."
     )
+
+
+def of_addressed(where: dict[str, Any]) -> str:
+    """Sentences on whom a command was for: robots of a bus or prefix of their own, or twins.
+
+    Args:
+        where: as of swarm_end.addressed().
+    """
+    names = {"lcm_url": "--lcm-url", "channel_prefix": "--channel-prefix"}
+    options = [word for key, name in names.items() if key in where for word in (name, where[key])]
+    bus = f"Only robots with {shlex.join(options)} are meant; of others nothing is known."
+    twins = ", ".join(f"R{i:02d}" for i in where.get("twins", ()))
+    are = "is a twin, no robot" if len(where.get("twins", ())) == 1 else "are twins, no robots"
+    return _joined(bus if options else "", f"{twins} {are}." if twins else "")
 
 
 def _besides(given: list[Answer]) -> str:

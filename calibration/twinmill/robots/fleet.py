@@ -173,6 +173,11 @@ class Robot:
         return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
     @property
+    def is_twin(self) -> bool:
+        """It says that it is no robot."""
+        return bool(self.run) and self.run.source == "twin"
+
+    @property
     def is_here(self) -> bool:
         """It said something just now."""
         return time.monotonic() - self.heard_s < GONE_S
@@ -491,7 +496,7 @@ class Fleet:
         self.addressed: set[int] = set()
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
-        self._prefix, self.key, self._hold_s = channel_prefix, key, 0.0
+        self.url, self._prefix, self.key, self._hold_s = url, channel_prefix, key, 0.0
         self._hold_seq = secrets.randbelow(2**31)  # by it what is said from here is known
         self._looked_s = _time_passed_s()
         self._empty_s = time.monotonic()  # nothing waited here then
@@ -752,6 +757,12 @@ class Fleet:
             self.bus.publish(channel, command.encode())
         elif hasattr(self.bus, "tell"):  # other buses know no machines
             self.bus.tell(host, channel, command.encode())
+
+    @property
+    def addressed_by(self) -> dict[str, str]:
+        """What of its bus is not the default, by the names of its options."""
+        bus = {"lcm_url": "" if self.url == URL else self.url, "channel_prefix": self._prefix}
+        return {name: value for name, value in bus.items() if value}
 
     @property
     def has_key(self) -> bool:
