@@ -4,6 +4,7 @@
 import json
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import turbopi
@@ -233,6 +234,34 @@ def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb
     twin.run.source = "robot"
     told = said([])
     assert "addressed" not in told and "Only robots" not in told["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("hosts", "words"),
+    [
+        (("127.0.0.1", "10.9.0.2"), "127.0.0.1 is this computer: end what speaks here, a twin"),
+        (("198.51.100.1", "198.51.100.2"), "give one another number"),  # RFC 5737: nobody has these
+    ],
+)
+def test_a_twin_on_this_computer_is_not_to_be_flashed(hosts, words):
+    double = robot(1)
+    for host in (*hosts, *hosts):
+        double.senders.add((host, 7667))
+    with pytest.raises(ValueError, match=words):
+        swarm_door.refuse_doubles(fleet_of(double), {1})
+
+
+@pytest.mark.parametrize("verb", ["start", "arm", "select"])
+def test_a_stop_behind_another_verb_says_that_nothing_was_stopped(twinmill, verb):
+    words = ["milling"] if verb == "select" else []
+    code, _, err = twinmill("swarm", verb, *words, "stop")
+    assert code == 2 and "NOTHING WAS STOPPED; was `twinmill swarm stop` meant?" in err
+
+
+def test_a_home_folder_that_no_shell_has_put_in_is_named():
+    """`--key=~/.config/swarm.key` names a folder `~` in the working directory."""
+    with pytest.raises(ValueError, match=r"was .*key.*/swarm\.key.* meant\?"):
+        keys.load(Path("~/.config/swarm.key"))
 
 
 def drives_by_its_word(robot_id: int) -> Robot:

@@ -112,6 +112,7 @@ SENTENCES = [
     (of_select([GOOD], "milling"), "All chose milling.", 0),
     (of_select([DOUBLE, GOOD], "milling"), "Not all did: R07: two robots have this number", 1),
     (of_select([REFUSED, GOOD], "dance"), "Not all did: R03 did not obey", 1),
+    (of_select([replace(REFUSED, mode="running")], "dance"), "None did: R03 did not obey", 1),
     (
         of_start(begun(replace(GOOD, accepted=False, reason="no behaviour 'mlling'"), REFUSED)),
         "NOBODY STARTED: R01, R03 refused",
@@ -385,6 +386,11 @@ def test_a_start_that_turns_no_wheel_by_a_robots_own_word_has_not_gone_as_it_was
     still = replace(GOOD, reason="no wheel turns: duty_cap_pct is 0 in the robot's configuration")
     told = of_start(begun(still, GOOD))
     assert told.code == 1 and "R01 accepted it (no wheel turns: duty_cap_pct is 0" in told.sentence
+
+
+def test_who_refuses_a_behaviour_while_it_drives_is_said_to_go_on():
+    told = of_select([replace(REFUSED, mode="running")], "dance").sentence
+    assert told.endswith("R03 goes on with what it did.")
 
 
 def test_a_selection_that_a_countdown_overrides_has_not_gone_as_it_was_meant():

@@ -16,6 +16,7 @@ OF_SEVERAL = {
     "its link": "their link",
     "its operator": "their operator",
     "it had": "they had",
+    "it did": "they did",
     "it stood": "they stood",
     "it has": "they have",
     "has it": "have they",
@@ -41,6 +42,7 @@ VERBS = {
     "signs": "sign",
     "says": "say",
     "drives": "drive",
+    "goes": "go",
     "stands": "stand",
 }
 PATTERN = re.compile(rf"\b({'|'.join(OF_SEVERAL)})\b")

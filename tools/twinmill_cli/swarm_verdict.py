@@ -400,7 +400,11 @@ def of_select(given: list[Answer], behavior: str) -> Verdict:
     """Who does what was chosen."""
     wrong = _wrong(given)
     if wrong:
-        return Verdict(False, f"Not all did: {wrong}{_hint(given)}.")
+        did = "Not all" if any(a.accepted is not False for a in given) else "None"
+        driving = [a for a in given if a.accepted is False and a.mode in DRIVING]
+        words = several.of(driving, "goes on with what it did")
+        more = f" {_names(driving)} {words}." if driving else ""
+        return Verdict(False, f"{did} did: {wrong}{_hint(given)}.{more}")
     waiting = [a for a in given if a.reason]
     if waiting:
         words = f"{_names(waiting)} will not play {behavior}{_because(waiting)}"
