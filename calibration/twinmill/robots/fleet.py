@@ -760,7 +760,7 @@ class Fleet:
 
     @property
     def addressed_by(self) -> dict[str, str]:
-        """What of its bus is not the default, by the names of its options."""
+        """Parts of its address that are not the default, by the names of their options."""
         bus = {"lcm_url": "" if self.url == URL else self.url, "channel_prefix": self._prefix}
         return {name: value for name, value in bus.items() if value}
 
