@@ -257,7 +257,7 @@ def test_only_who_is_heard_and_is_one_is_said_to_stand(silent_s, double, stands)
     (unsigned,) = answers(fleet, command, {3})
     assert not unsigned.stands and not robot.to_json()["stands"]
     robot.link, robot.link_s = turbopi.link_t(), robot.heard_s
-    robot.link.stands = True
+    robot.link.stands, robot.link.utime_us = True, round(1e6 * (time.time() - silent_s))
     (answer,) = answers(fleet, command, {3})
     assert answer.stands == robot.to_json()["stands"] == stands
     assert answer.last_heard_s == pytest.approx(silent_s, abs=0.5)

@@ -15,15 +15,20 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill_cli.swarm_door import check_clocks
 from twinmill_cli.swarm_end import clocks
+from twinmill_cli.swarm_verdict import of_status
 
 KEY, SESSION, STEP_S = bytes(range(32)), 7, 0.03
+STOPPED = turbopi.telemetry_t.MODE_STOPPED
 NEAR_S = 0.06  # a robot answers in its next step, and this machine may be busy
 
 
 class Air:
     """A robot behind a network: what is said on either side is heard a while later."""
 
-    def __init__(self, delay_s: float, ahead_s: float, *, answers: bool = True):
+    def __init__(
+        self, delay_s: float, ahead_s: float, *, answers: bool = True, mode: int = STOPPED
+    ):
+        self.mode = mode
         self.delay_s, self.ahead_s, self.answers = delay_s, ahead_s, answers
         self.begin_s = self.next_s = time.monotonic()
         self.on_its_way: deque = deque()
@@ -55,8 +60,11 @@ class Air:
         end_s = time.monotonic() + timeout_ms / 1e3
         while True:
             while self.next_s <= time.monotonic():
-                self._say("R01_TELEMETRY", turbopi.telemetry_t(), self.next_s)
-                self._say("R01_LINK", turbopi.link_t(), self.next_s)
+                telemetry, link = turbopi.telemetry_t(), turbopi.link_t()
+                telemetry.mode = link.mode = self.mode
+                link.stands, link.link_timeout_ms = self.mode == STOPPED, 2000
+                self._say("R01_TELEMETRY", telemetry, self.next_s)
+                self._say("R01_LINK", link, self.next_s)
                 self.next_s += STEP_S
             due = [said for said in self.on_its_way if said[0] <= time.monotonic()]
             if due:
@@ -113,6 +121,43 @@ def test_where_nothing_is_answered_both_are_said_to_be_possible(monkeypatch):
         f"What is said comes late, {fleet.robots[1].late_s:.2f} s from R01: the network is late, "
         "or a clock is behind (NTP)."
     )
+
+
+@pytest.mark.parametrize("mode", [STOPPED, turbopi.telemetry_t.MODE_TABLE])
+@pytest.mark.parametrize("ahead_s", [-15.0, 15.0])
+def test_a_recording_tells_nothing_of_now(monkeypatch, ahead_s, mode):
+    """Its robots drove out of range, or were off, and were said to stand, or to be held.
+
+    Who plays it cannot answer what nobody had asked then; by its clock it may lie in the future.
+    """
+    monkeypatch.setattr(tell, "ASK_S", 0.2)
+    fleet = fleet_behind(delay_s=0.0, ahead_s=ahead_s, answers=False, mode=mode)
+    tell.ask_clocks(fleet, {1})
+    told, verdict = fleet.robots[1].to_json(), of_status([fleet.robots[1]])
+    assert not told["stands"] and told["held"] is None
+    assert not verdict.ok and verdict.sentence.startswith("Heard: R01. NOBODY KNOWS WHAT R01 DOES")
+    old = "by what it signed 15 s ago" if ahead_s < 0 else "nobody knows when it said that"
+    assert old in verdict.sentence and old in told["alarms"][0]
+
+
+@pytest.mark.parametrize("ahead_s", [-3600.0, 0.0, 3600.0])
+@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+def test_a_wrong_clock_makes_no_recording_of_a_robot_that_answers(delay_s, ahead_s):
+    """A computer without a battery for its clock begins where it was switched off."""
+    fleet = fleet_behind(delay_s=delay_s, ahead_s=ahead_s)
+    tell.ask_clocks(fleet, {1})
+    fleet.listen(2 * delay_s)
+    told, verdict = fleet.robots[1].to_json(), of_status([fleet.robots[1]])
+    assert told["stands"] and told["alarms"] == [] and verdict.ok
+    assert 0 <= told["signed_ago_s"] < 2 * delay_s + STEP_S + NEAR_S
+
+
+def test_what_a_robot_of_another_key_said_long_ago_is_told_as_that():
+    """Nobody can check that, and a recording of it is as old."""
+    fleet = Fleet("", connect=lambda _: Air(0.0, -15.0))
+    fleet.listen(0.2)
+    verdict = of_status([fleet.robots[1]])
+    assert not verdict.ok and "by what it said 15 s ago, or its clock is behind" in verdict.sentence
 
 
 def test_a_tool_that_was_halted_tells_neither():

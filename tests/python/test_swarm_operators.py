@@ -4,6 +4,7 @@
 import json
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 import turbopi
@@ -15,7 +16,8 @@ from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door
 from twinmill_cli.swarm_end import driving
 from twinmill_cli.swarm_screen import status_table
-from twinmill_cli.swarm_verdict import of_busy, of_countdown
+from twinmill_cli.swarm_verdict import of_busy, of_countdown, of_start
+from twinmill_cli.voice import Voice
 
 KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
 VERBS = turbopi.signed_command_t
@@ -49,7 +51,7 @@ def robot(robot_id: int, mode: int = TELEMETRY.MODE_STOPPED, link_timeout_ms: in
     """One that has just said all that it is."""
     link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
     link.session, link.mode, link.armed, link.link_timeout_ms = SESSION, mode, 1, link_timeout_ms
-    telemetry.mode = mode
+    telemetry.mode, link.utime_us = mode, time.time_ns() // 1000
     now_s = time.monotonic()
     return Robot(robot_id, telemetry=telemetry, heard_s=now_s + 60, link=link, link_s=now_s)
 
@@ -200,6 +202,139 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R03 drives already, untethered" in said
 
 
+@pytest.mark.parametrize("verb", ["status", "arm", "select"])
+def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb):
+    """Twins had stopped, "All stand." was said, and a real robot of the same number drove."""
+    twin, fleet, command = robot(1), fleet_of(), tell.make_command(VERBS_START)
+    twin.run = turbopi.run_t()
+    twin.run.source = "twin"
+    bus = {"lcm_url": "udpm://239.255.76.67:7668?ttl=1", "channel_prefix": "TWIN_"}
+    words = ["--robots", "1"] if verb != "status" else []
+    words += ["milling"] if verb == "select" else []
+
+    def said(run: list[str]) -> dict:
+        fleet.robots = {1: twin}
+        twin.link.utime_us, twin.link_s = time.time_ns() // 1000, time.monotonic()
+        return json.loads(twinmill("swarm", verb, *words, "--json", "--key", key_file, *run)[1])
+
+    def join(url, prefix="", **_):
+        fleet.url, fleet._prefix = url, prefix
+        return fleet
+
+    monkeypatch.setattr(swarm.tell, "tell", lambda *_, **__: tell.answers(fleet, command, {1}))
+    monkeypatch.setattr(swarm.tell, "arm", lambda *_: tell.answers(fleet, command, {1}))
+    monkeypatch.setattr(swarm, "Fleet", join)
+    monkeypatch.setattr(swarm_door, "Fleet", join)
+    told = said(["--lcm-url", bus["lcm_url"], "--channel-prefix", "TWIN_"])
+    assert told["addressed"] == {**bus, "twins": [1]}
+    first = (
+        "Only robots with --lcm-url 'udpm://239.255.76.67:7668?ttl=1' --channel-prefix TWIN_ are"
+    )
+    assert told["sentence"].startswith(first) and "R01 is a twin, no robot." in told["sentence"]
+    twin.run.source = "robot"
+    told = said([])
+    assert "addressed" not in told and "Only robots" not in told["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("hosts", "words"),
+    [
+        (("127.0.0.1", "10.9.0.2"), "127.0.0.1 is this computer: end what speaks here, a twin"),
+        (("198.51.100.1", "198.51.100.2"), "give one another number"),  # RFC 5737: nobody has these
+    ],
+)
+def test_a_twin_on_this_computer_is_not_to_be_flashed(hosts, words):
+    double = robot(1)
+    for host in (*hosts, *hosts):
+        double.senders.add((host, 7667))
+    with pytest.raises(ValueError, match=words):
+        swarm_door.refuse_doubles(fleet_of(double), {1})
+
+
+@pytest.mark.parametrize("verb", ["start", "arm", "select"])
+def test_a_stop_behind_another_verb_says_that_nothing_was_stopped(twinmill, verb):
+    words = ["milling"] if verb == "select" else []
+    code, _, err = twinmill("swarm", verb, *words, "stop")
+    assert code == 2 and "NOTHING WAS STOPPED; was `twinmill swarm stop` meant?" in err
+
+
+def test_a_home_folder_that_no_shell_has_put_in_is_named():
+    """`--key=~/.config/swarm.key` names a folder `~` in the working directory."""
+    with pytest.raises(ValueError, match=r"was .*key.*/swarm\.key.* meant\?"):
+        keys.load(Path("~/.config/swarm.key"))
+
+
+def drives_by_its_word(robot_id: int) -> Robot:
+    """A robot of another lab, with that lab's key."""
+    other = robot(robot_id, DRIVING)
+    other.link, now_s = None, time.monotonic()
+    other.recent.append(Step(now_s + 60, time.time(), other.telemetry))
+    return other
+
+
+@pytest.mark.parametrize("verb", ["arm", "select", "start"])
+def test_who_drives_by_a_word_that_nobody_can_check_is_told_first(
+    monkeypatch, key_file, twinmill, verb
+):
+    """A start said that it drives without having confirmed it, as if the start had moved it."""
+    fleet = fleet_of(robot(1), drives_by_its_word(2))
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm.tell, "arm", lambda *_: [])
+    monkeypatch.setattr(swarm.tell, "tell", lambda *_, **__: [])
+    more = {"arm": [], "select": ["milling"], "start": ["--partial", "--json"]}[verb]
+    _, out, err = twinmill("swarm", verb, *more, "--robots", "1,2", "--key", key_file)
+    assert "R02 drives already, by its word, which nobody can check" in err
+    assert "takes over" not in err and "may not play" not in err
+    assert verb != "start" or json.loads(out)["drove_before"] == [2]
+
+
+def test_a_start_is_not_said_to_have_moved_who_was_told_nothing():
+    """Robots of another key get no start from here."""
+    fleet, before = fleet_of(drives_by_its_word(2)), robot(1, DRIVING)
+    fleet.robots[1] = before
+    given = tell.answers(fleet, tell.make_command(VERBS_START), {1, 2})
+    untold = frozenset({2})
+    begun = tell.Start(0, given, {}, untold=untold)
+    said = of_start(begun, drove_before=[1, 2]).sentence
+    assert "R02 was told nothing by this start, and drives by somebody else's word" in said
+    assert "R01 drove before, and has not confirmed it" in said
+    alone = tell.Start(0, given[1:], {}, untold=untold)
+    assert of_start(alone).sentence.startswith("NOBODY STARTED") and alone.begun_utime_us is None
+
+
+@pytest.mark.parametrize("past_instant", [False, True])
+def test_a_countdown_that_is_ended_leaves_another_labs_robot_alone(monkeypatch, past_instant):
+    """Ctrl-C before any wheel had turned stopped it. Later all that may drive are stopped."""
+    fleet, stopped, told = fleet_of(robot(1), drives_by_its_word(2)), [], []
+    fleet.addressed = {1}
+
+    def interrupted(*_, **options):
+        time.sleep(2 * options["ahead_s"] * past_instant)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tell, "start", interrupted)
+    monkeypatch.setattr(tell, "stop", lambda _, robots, *__, **___: stopped.append(robots) or [])
+    monkeypatch.setattr(swarm, "finish", lambda *given, **_: told.append(given))
+    data, voice = {"drove_before": [2]}, Voice()
+    options = {"ahead_s": 0.1, "partial": True, "link_timeout_ms": 2000}
+    kept = {"data": data, "as_json": True, "heard": "", "ends": str, "signals": []}
+    ended = swarm._drive(fleet, {1, 2}, "", voice, **kept, **options)
+    voice.end(1, [])
+    assert stopped == [{1, 2} if past_instant else {1}]
+    assert data["left_alone"] == ([] if past_instant else [2])
+    left = "R02 was told nothing by this start and is left alone. R02 drives already, by its word"
+    assert (left in ended.sentence) != past_instant
+
+
+def test_a_start_that_is_called_off_tells_nobody_to_stop_who_was_told_nothing(monkeypatch):
+    fleet, stopped = fleet_of(robot(1), drives_by_its_word(2)), []
+    monkeypatch.setattr(Fleet, "send_signed", lambda *_, **__: None)
+    monkeypatch.setattr(tell, "stop", lambda _, robots, *__, **___: stopped.append(robots) or [])
+    begun = tell.start(fleet, {1, 2}, "", ahead_s=0.4, partial=False)
+    assert begun.called_off and stopped == [{1}] and begun.untold == {2}
+    assert "R02 was told nothing by this start and is left alone" in of_start(begun).sentence
+
+
 def telemetry(mode: int) -> bytes:
     said = turbopi.telemetry_t()
     said.mode = mode
@@ -312,9 +447,12 @@ def test_a_clock_that_is_odd_is_told_by_status_and_at_both_ends_of_a_start(
         known.recent.append(Step(time.monotonic(), time.time(), known.telemetry))
     fleet = fleet_of(ahead, right)
     monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm, "RUN_PERIOD_S", 1.0)
     said = "R01's clock is 30.00 s ahead of this computer's, with which R02 agrees: set its (NTP)."
     code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file)
     assert code == 0 and said in " ".join(out.split())
+    for known in (ahead, right):  # both still sign
+        known.link.utime_us, known.link_s = time.time_ns() // 1000, time.monotonic()
     code, out, _ = twinmill("swarm", "status", "--once", "--key", key_file, "--json")
     told = json.loads(out)
     assert code == 0 and told["ok"] and told["verb"] == "status"

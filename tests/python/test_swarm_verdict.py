@@ -4,6 +4,7 @@
 import json
 import signal
 from dataclasses import replace
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from twinmill.data.bus import Reach
 from twinmill.robots.countdown import NOT_BEGUN, STOPPED, Dropouts
-from twinmill.robots.fleet import DRY_RUN, Heard
+from twinmill.robots.fleet import DRY_RUN, Fleet, Heard
 from twinmill.robots.hold import (
     BY_BUTTON,
     BY_COMMAND,
@@ -111,6 +112,7 @@ SENTENCES = [
     (of_select([GOOD], "milling"), "All chose milling.", 0),
     (of_select([DOUBLE, GOOD], "milling"), "Not all did: R07: two robots have this number", 1),
     (of_select([REFUSED, GOOD], "dance"), "Not all did: R03 did not obey", 1),
+    (of_select([replace(REFUSED, mode="running")], "dance"), "None did: R03 did not obey", 1),
     (
         of_start(begun(replace(GOOD, accepted=False, reason="no behaviour 'mlling'"), REFUSED)),
         "NOBODY STARTED: R01, R03 refused",
@@ -363,12 +365,17 @@ def test_a_start_is_well_only_where_all_have_signed_it_and_drive(given):
 @pytest.mark.parametrize("last", [STANDS, REFUSED])
 def test_the_table_of_robots_changes_nothing_of_the_verdict(capsys, verdict, last):
     """The last robot of the table had decided."""
-    given = [REFUSED, UNSIGNED, last]
-    assert finish("stop", given, verdict, {}, as_json=True) == verdict.code
+    given, fleet = [REFUSED, UNSIGNED, last], Fleet("", connect=lambda _: Mock())
+    assert finish("stop", given, verdict, {}, fleet=fleet, as_json=True) == verdict.code
     data = json.loads(capsys.readouterr().out)
     assert (data["ok"], data["sentence"]) == (verdict.ok, verdict.sentence)
-    assert finish("stop", given, verdict, {}, as_json=False) == verdict.code
+    assert finish("stop", given, verdict, {}, fleet=fleet, as_json=False) == verdict.code
     assert verdict.sentence in capsys.readouterr().out
+    fleet._prefix = "TWIN_"
+    assert finish("stop", given, verdict, {}, fleet=fleet, as_json=True) == verdict.code
+    data = json.loads(capsys.readouterr().out)
+    assert data["addressed"] == {"channel_prefix": "TWIN_"} and data["ok"] == verdict.ok
+    assert data["sentence"].startswith("Only robots with --channel-prefix TWIN_ are meant; ")
 
 
 def test_a_silent_robot_keeps_the_others_held():
@@ -379,6 +386,11 @@ def test_a_start_that_turns_no_wheel_by_a_robots_own_word_has_not_gone_as_it_was
     still = replace(GOOD, reason="no wheel turns: duty_cap_pct is 0 in the robot's configuration")
     told = of_start(begun(still, GOOD))
     assert told.code == 1 and "R01 accepted it (no wheel turns: duty_cap_pct is 0" in told.sentence
+
+
+def test_who_refuses_a_behaviour_while_it_drives_is_said_to_go_on():
+    told = of_select([replace(REFUSED, mode="running")], "dance").sentence
+    assert told.endswith("R03 goes on with what it did.")
 
 
 def test_a_selection_that_a_countdown_overrides_has_not_gone_as_it_was_meant():

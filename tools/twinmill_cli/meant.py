@@ -31,10 +31,18 @@ def meant(
 ) -> str:
     """Question on what was meant, to go on behind the reason why it was refused; may be empty."""
     return (
-        _of_misspelled_dash(command, ctx, words)
+        _of_stop(ctx, words)
+        or _of_misspelled_dash(command, ctx, words)
         or _of_argument(command, ctx, words, error)
         or _of_bare_word(command, ctx, words)
     )
+
+
+def _of_stop(ctx: typer.Context, words: Sequence[str]) -> str:
+    """A stop behind another verb to the swarm: whoever says it believes that robots stand."""
+    group = ctx.parent.command_path if ctx.parent else ""
+    is_stop = group.endswith(" swarm") and "stop" in [word.lower() for word in words]
+    return f"NOTHING WAS STOPPED; was `{group} stop` meant?" if is_stop else ""
 
 
 def _of_misspelled_dash(command: TyperCommand, ctx: typer.Context, words: Sequence[str]) -> str:

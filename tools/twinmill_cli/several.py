@@ -16,6 +16,7 @@ OF_SEVERAL = {
     "its link": "their link",
     "its operator": "their operator",
     "it had": "they had",
+    "it did": "they did",
     "it stood": "they stood",
     "it has": "they have",
     "has it": "have they",
@@ -29,6 +30,10 @@ OF_SEVERAL = {
     "the robot's configuration": "the robots' configurations",
     "and has forgotten": "and have forgotten",
     "and was not": "and were not",
+    "and is left alone": "and are left alone",
+    "and drives": "and drive",
+    "and has not confirmed": "and have not confirmed",
+    "and obeys": "and obey",
 }
 VERBS = {
     "was": "were",
@@ -37,6 +42,7 @@ VERBS = {
     "signs": "sign",
     "says": "say",
     "drives": "drive",
+    "goes": "go",
     "stands": "stand",
 }
 PATTERN = re.compile(rf"\b({'|'.join(OF_SEVERAL)})\b")

@@ -42,19 +42,24 @@ if working():  # not for --help
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
     from twinmill_cli.room import refuse_deleted, refuse_full
-    from twinmill_cli.swarm_end import clocks, driving, finish
+    from twinmill_cli.swarm_end import addressed, clocks, driving, finish, placed
     from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
+        LEFT_ALONE,
+        NOBODY_TOLD,
         Verdict,
         of_arm,
         of_busy,
         of_countdown,
         of_end,
         of_heard,
+        of_old_news,
         of_remarks,
         of_select,
         of_start,
+        of_status,
         of_stop,
+        of_taking_over,
     )
     from twinmill_cli.voice import Voice, refuse_deaf
 
@@ -132,11 +137,12 @@ def _start(
         busy = tell.find_busy(fleet, asked)
         refuse_stopped(fleet, asked)
         if busy:
-            say(f"{of_busy(busy)}; this start takes over.")
+            say(of_taking_over(busy))
         if arm:
             tell.arm(fleet, asked)
         data = {
-            "drove_before": [robot.robot_id for robot in busy if robot.drives],
+            "drove_before": [robot.robot_id for robot in busy if robot.drives_by_any_word],
+            "left_alone": [],
             "link_timeout_s": timeout_ms / 1e3,
         }
         code, voice = 1, Voice(as_json=as_json)
@@ -196,14 +202,19 @@ def _drive(
         options: of tell.start().
     """
     begun, held, odd, halt = None, None, "", LastStop(voice, signals)
+    instant_s = time.monotonic() + options["ahead_s"]
     voice.show(lambda: countdown(asked, options["ahead_s"]))
     try:
         started = tell.start(fleet, asked, behavior, stopping=halt, **options)
         voice.clear()
         odd = clocks(fleet, asked)
-        begun, held = of_start(started, ends()).more(heard).more(odd), Held(fleet, started)
+        begun = of_start(started, ends(), drove_before=data["drove_before"]).more(heard).more(odd)
+        held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
-        voice.tell(lambda: finish("start", started.answers, begun, data, as_json=as_json))
+        data["left_alone"] = sorted(started.untold if started.called_off else ())
+        voice.tell(
+            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json)
+        )
         if started.called_off or not held.robots:
             return begun
         if options["link_timeout_ms"] == 0:
@@ -216,11 +227,15 @@ def _drive(
     except BaseException as error:
         if held:
             held.settle()
-        given = halt(fleet, asked)
+        told = asked & fleet.addressed if time.monotonic() < instant_s else asked
+        given = halt(fleet, told) if told else []
         voice.clear()
-        states, known = held.ends() if held else {}, tell.have_confirmed(fleet, asked)
-        stopped = of_stop(given, halt.how)
+        states, known = held.ends() if held else {}, tell.have_confirmed(fleet, told)
+        stopped = of_stop(given, halt.how) if told else NOBODY_TOLD
         ended = of_end(begun, states, stopped, was_confirmed=known)
+        left = sorted(asked - told)
+        data["left_alone"] = left
+        ended = ended.beside([f"R{i:02d}" for i in left], LEFT_ALONE).more(_who_drives(fleet, left))
         ended = (
             ended.more(told_of_signals(signals))
             .more(of_remarks(given) if stopped.ok else "")
@@ -230,13 +245,19 @@ def _drive(
         )
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
-            voice.tell(lambda: finish("start", given, ended, data, as_json=as_json))
+            voice.tell(lambda: finish("start", given, ended, data, fleet=fleet, as_json=as_json))
         if not isinstance(error, KeyboardInterrupt):
-            voice.say(ended.sentence)
+            voice.say(placed(fleet, asked, ended).sentence)
             raise
     if begun is not None:
-        voice.say(ended.sentence)
+        voice.say(placed(fleet, asked, ended).sentence)
     return ended
+
+
+def _who_drives(fleet: Fleet, left: list[int]) -> str:
+    """Sentence on robots that were left alone, and drive; empty if none does."""
+    busy = [r for i in left if (r := fleet.robots.get(i)) and r.drives_by_any_word]
+    return f"{of_busy(busy)}." if busy else ""
 
 
 def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
@@ -275,7 +296,7 @@ def _arm(
             given = tell.arm(fleet, asked)
         verdict = of_arm(given)
         decide(verdict.code)
-        return finish("arm", given, verdict, {}, as_json=as_json)
+        return finish("arm", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
 def _select(
@@ -302,7 +323,7 @@ def _select(
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
         verdict = of_select(given, behavior)
         decide(verdict.code)
-        return finish("select", given, verdict, {}, as_json=as_json)
+        return finish("select", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
 def _status(
@@ -338,6 +359,7 @@ def _show(fleet: Fleet) -> None:
     with Live(console=PlainConsole(), auto_refresh=False) as live:
         while True:
             fleet.listen(0.25)
+            tell.ask_once(fleet, {i for i, r in fleet.robots.items() if r.link})
             robots = [fleet.robots[i] for i in sorted(fleet.robots)]
             live.update(status_table(robots, has_key=fleet.has_key), refresh=True)
 
@@ -350,16 +372,16 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
-    told = f"Heard: {names(fleet.robots)}." if robots else "No robot is heard."
-    heard = Verdict(bool(robots), told)
     tell.ask_clocks(fleet, set(fleet.robots))
-    odd = clocks(fleet, fleet.robots)
+    heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
+        data |= addressed(fleet, fleet.robots)
         of_each = [r.to_json() for r in robots]
         print_object({**data, "robots": of_each, "key_fault": key_fault or None})
     else:
         PlainConsole().print(status_table(robots, has_key=fleet.has_key))
-        if odd:
-            PlainConsole().print(odd, soft_wrap=True)
+        where = placed(fleet, fleet.robots, Verdict(True, "")).sentence
+        for words in filter(None, [where, of_old_news(robots), odd]):
+            PlainConsole().print(words, soft_wrap=True)
     return heard.code

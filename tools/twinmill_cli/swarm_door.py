@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import errno
+import socket
+from contextlib import suppress
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -21,7 +23,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.key import load, of_operator
-    from twinmill_cli.swarm_verdict import of_clocks, of_late
+    from twinmill_cli.swarm_verdict import of_busy, of_clocks, of_late
 
     PREFIX_MAX = CHANNEL_MAX - len("R00_SIGNED_ACK")  # the longest of robots' channels
 
@@ -172,7 +174,9 @@ def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
     strange = {i for i in robots if not fleet.robots[i].link}
     if strange:
         why = several.of(strange, tell.NO_SIGNATURE)
-        raise ValueError(f"nothing was started: {names(strange)} {why}")
+        driving = [fleet.robots[i] for i in sorted(strange) if fleet.robots[i].says_that_it_drives]
+        more = f" {of_busy(driving)}." if driving else ""
+        raise ValueError(f"nothing was started: {names(strange)} {why}{more}")
 
 
 def names(robots: Iterable[int]) -> str:
@@ -185,11 +189,25 @@ def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
     for robot_id in sorted(robots & set(fleet.robots)):
         robot = fleet.robots[robot_id]
         if robot.is_double:
-            raise ValueError(
-                f"two robots say that they are number {robot_id} "
-                f"({', '.join(robot.senders.hosts)}): give one another number, "
-                "`twinmill robot flash HOST=ID`."
+            hosts = robot.senders.hosts
+            own = [host for host in hosts if _is_here(host)]
+            mend = (
+                f"{own[0]} is this computer: end what speaks here, a twin or a recording, or give "
+                f"the twin {option('channel_prefix', 'TWIN_')}."
+                if own
+                else "give one another number, `twinmill robot flash HOST=ID`."
             )
+            raise ValueError(
+                f"two robots say that they are number {robot_id} ({', '.join(hosts)}): {mend}"
+            )
+
+
+def _is_here(host: str) -> bool:
+    """An address is one of this computer's: what goes there comes from there. Nothing is sent."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
+        probe.connect((host, 9))
+        return probe.getsockname()[0] == host
+    return False
 
 
 def refuse_stopped(fleet: Fleet, robots: set[int]) -> None:

@@ -11,7 +11,7 @@ from twinmill.robots.tell import OTHERS_S
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_screen import answer_table
-from twinmill_cli.swarm_verdict import of_clocks_now, of_late
+from twinmill_cli.swarm_verdict import of_addressed, of_clocks_now, of_late
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -44,15 +44,40 @@ def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
     return " ".join(filter(None, [odd, of_late(known)]))
 
 
+def addressed(fleet: Fleet, robots: Iterable[int]) -> dict[str, Any]:
+    """Object on whom a command was for, where that is not all robots of the default bus; or empty.
+
+    Args:
+        fleet: where they are.
+        robots: that were asked or heard.
+    """
+    twins = [i for i in sorted(robots) if (r := fleet.robots.get(i)) and r.is_twin]
+    where = {**fleet.addressed_by, **({"twins": twins} if twins else {})}
+    return {"addressed": where} if where else {}
+
+
+def placed(fleet: Fleet, robots: Iterable[int], verdict: Verdict) -> Verdict:
+    """An outcome with words before it on whom the command was for, where these are needed."""
+    return verdict.behind(of_addressed(addressed(fleet, robots).get("addressed", {})))
+
+
 def finish(
-    verb: str, given: list[Answer], verdict: Verdict, data: dict[str, Any], *, as_json: bool
+    verb: str,
+    given: list[Answer],
+    verdict: Verdict,
+    data: dict[str, Any],
+    *,
+    fleet: Fleet,
+    as_json: bool,
 ) -> int:
-    """Prints what came of a command. Returns its exit code.
+    """Prints what came of a command, and whom it was for. Returns its exit code.
 
     If need be on stderr alone; there, too, what is wrong where stdout leads nowhere.
     """
-    robots = [answer.to_json() for answer in given]
-    data = {"verb": verb, "ok": verdict.ok, "sentence": verdict.sentence, **data, "robots": robots}
+    robots, asked = [answer.to_json() for answer in given], [a.robot_id for a in given]
+    verdict = placed(fleet, asked, verdict)
+    told = {"verb": verb, "ok": verdict.ok, "sentence": verdict.sentence}
+    data = {**told, **addressed(fleet, asked), **data, "robots": robots}
     text = Group(*([answer_table(given)] if given else []), verdict.sentence)
     try:
         deliver(data, text, as_json)

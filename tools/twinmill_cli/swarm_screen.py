@@ -96,6 +96,8 @@ def _link(robot: Robot) -> Text:
     """Signed statement of how the robot may be commanded."""
     if not robot.link:
         return Text("not signed", "red")
+    if robot.is_old_news:
+        return Text("old news", "red")
     if not robot.is_armed:
         return Text("stopped: arm it", "yellow")
     if robot.is_held is False:

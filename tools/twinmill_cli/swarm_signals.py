@@ -65,6 +65,14 @@ def key_reaches() -> bool:
             return False
 
 
+def _has_terminal() -> bool:
+    """A terminal that is closed sends this program SIGHUP."""
+    with suppress(OSError):
+        os.close(os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY))
+        return True
+    return False
+
+
 @contextmanager
 def _terminal() -> Iterator[int]:
     """A handle of this program's terminal, or a standard file, which may be none."""
@@ -86,7 +94,9 @@ def what_ends(lcm_url: str, channel_prefix: str | None) -> str:
     bus = ["--lcm-url", lcm_url] if lcm_url != URL else []
     bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
     stop = shlex.join(["twinmill", "swarm", "stop", *bus])
-    return f"No Ctrl-C reaches this command: `{stop}`, or here `kill {os.getpid()}`, stops them"
+    how = f"`{stop}`, or here `kill {os.getpid()}`"
+    how += ", or closing this terminal, nohup or not" if _has_terminal() else ""
+    return f"No Ctrl-C reaches this command: {how}, stops them"
 
 
 def told_of_signals(signals: Sequence[int]) -> str:

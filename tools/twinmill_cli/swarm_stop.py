@@ -191,7 +191,7 @@ def stop(
         code = WRONG_COMMAND_LINE if misread else verdict.code
         if misread:
             verdict = Verdict(False, f"{misread} {verdict.sentence}")
-        voice.tell(lambda: finish("stop", given, verdict, {}, as_json=as_json))
+        voice.tell(lambda: finish("stop", given, verdict, {}, fleet=fleet, as_json=as_json))
         decide(code)
         voice.end(code, signals)
     voice.check()

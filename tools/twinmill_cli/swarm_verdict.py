@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
+from typing import Any
 
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
@@ -27,6 +29,8 @@ from twinmill_cli import exit_now, several
 from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
 BY_HAND = "SWITCH OFF BY HAND what still drives."
+BY_ITS_WORD = "by its word, which nobody can check"
+LEFT_ALONE = "was told nothing by this start and is left alone"
 
 
 @dataclass(frozen=True)
@@ -59,18 +63,25 @@ class Verdict:
         """
         return exit_now.STOPPED if self.ends_well and KEYS & {*signals} else self.code
 
-    def beside(self, driving: list[str]) -> Verdict:
-        """This outcome with a word on robots that were not asked, and that drive."""
-        if not driving:
+    def beside(self, others: list[str], words: str = "drives, and was not asked") -> Verdict:
+        """This outcome with a word on robots that were not told to stop, to go on behind names."""
+        if not others:
             return self
         told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
         return replace(self, sentence=told).more(
-            f"{', '.join(driving)} {several.of(driving, 'drives, and was not asked')}."
+            f"{', '.join(others)} {several.of(others, words)}."
         )
+
+    def behind(self, words: str) -> Verdict:
+        """This outcome behind words without which it would be misread; they may be empty."""
+        return replace(self, sentence=_joined(words, self.sentence))
 
     def more(self, words: str) -> Verdict:
         """This outcome with words that change nothing of it; they may be empty."""
         return replace(self, sentence=_joined(self.sentence, words))
+
+
+NOBODY_TOLD = Verdict(False, "The start was ended before a robot was told of it.", ends_well=True)
 
 
 @dataclass(frozen=True)
@@ -215,6 +226,42 @@ def of_heard(robots: Iterable[int]) -> str:
     )
 
 
+def of_status(robots: Sequence[Robot]) -> Verdict:
+    """Who is heard; it went well where somebody is, and all of that is new."""
+    if not robots:
+        return Verdict(False, "No robot is heard.")
+    heard = f"Heard: {', '.join(f'R{r.robot_id:02d}' for r in robots)}."
+    old = of_old_news(robots)
+    return Verdict(not old, _joined(heard, old))
+
+
+def of_old_news(robots: Iterable[Robot]) -> str:
+    """Sentence on robots that are told by old words alone; empty if none is."""
+    old = [r for r in robots if r.is_old_news]
+    if not old:
+        return ""
+    each = "; ".join(f"R{r.robot_id:02d} {r.old_news}" for r in old)
+    return (
+        f"NOBODY KNOWS WHAT {', '.join(f'R{r.robot_id:02d}' for r in old)} "
+        f"{'DOES' if len(old) == 1 else 'DO'} NOW: {each}. It may be a recording that is played "
+        "while the robot is off or drives elsewhere."
+    )
+
+
+def of_addressed(where: dict[str, Any]) -> str:
+    """Sentences on whom a command was for: robots of a bus or prefix of their own, or twins.
+
+    Args:
+        where: as of swarm_end.addressed().
+    """
+    names = {"lcm_url": "--lcm-url", "channel_prefix": "--channel-prefix"}
+    options = [word for key, name in names.items() if key in where for word in (name, where[key])]
+    bus = f"Only robots with {shlex.join(options)} are meant; of others nothing is known."
+    twins = ", ".join(f"R{i:02d}" for i in where.get("twins", ()))
+    are = "is a twin, no robot" if len(where.get("twins", ())) == 1 else "are twins, no robots"
+    return _joined(bus if options else "", f"{twins} {are}." if twins else "")
+
+
 def _besides(given: list[Answer]) -> str:
     """Remarks on robots that have confirmed a stop."""
     lost_link = [a for a in given if a.lost_link]
@@ -236,19 +283,21 @@ def of_busy(busy: list[Robot]) -> str:
     """That robots drive already or are about to, and by whom; empty where none does."""
     by: dict[tuple[str, str], list[str]] = {}
     for robot in busy:
-        who = {
-            None: "untethered",
-            True: "held by another operator",
-            False: "and no operator is heard who holds it",
-        }[robot.is_held]
+        who = BY_ITS_WORD
+        if robot.drives:
+            who = {
+                None: "untethered",
+                True: "held by another operator",
+                False: "and no operator is heard who holds it",
+            }[robot.is_held]
         in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
-        if not robot.drives:
+        if not robot.drives_by_any_word:
             who = f"still{in_fault}, held by another operator who may be counting down to a start"
         elif in_fault:
             who = f"still{in_fault}, was started, and drives once that is over: {who}"
         else:
             who = f"already, {who}"
-        moves = robot.drives and not in_fault
+        moves = robot.drives_by_any_word and not in_fault
         by.setdefault(("drive" if moves else "stand", who), []).append(f"R{robot.robot_id:02d}")
     return "; ".join(
         f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
@@ -256,12 +305,22 @@ def of_busy(busy: list[Robot]) -> str:
     )
 
 
+def of_taking_over(busy: list[Robot]) -> str:
+    """`of_busy`, and which of them a start from here takes over."""
+    ours, theirs = [r for r in busy if r.link], [r for r in busy if not r.link]
+    told = [f"{of_busy(ours)}; this start takes over."] if ours else []
+    if theirs:
+        words = several.of(theirs, "it signs nothing with this operator's key, and obeys no start")
+        told.append(f"{of_busy(theirs)}: {words} from here.")
+    return _joined(*told)
+
+
 def of_countdown(busy: list[Robot], behavior: str) -> str:
     """Sentence on robots that may not play what is chosen; empty where all will.
 
     What the start names that they may wait for was said before anybody listened here.
     """
-    waiting = [f"R{robot.robot_id:02d}" for robot in busy if not robot.drives]
+    waiting = [f"R{robot.robot_id:02d}" for robot in busy if not robot.drives_by_any_word]
     if not waiting:
         return ""
     return (
@@ -341,7 +400,11 @@ def of_select(given: list[Answer], behavior: str) -> Verdict:
     """Who does what was chosen."""
     wrong = _wrong(given)
     if wrong:
-        return Verdict(False, f"Not all did: {wrong}{_hint(given)}.")
+        did = "Not all" if any(a.accepted is not False for a in given) else "None"
+        driving = [a for a in given if a.accepted is False and a.mode in DRIVING]
+        words = several.of(driving, "goes on with what it did")
+        more = f" {_names(driving)} {words}." if driving else ""
+        return Verdict(False, f"{did} did: {wrong}{_hint(given)}.{more}")
     waiting = [a for a in given if a.reason]
     if waiting:
         words = f"{_names(waiting)} will not play {behavior}{_because(waiting)}"
@@ -358,12 +421,15 @@ def _wrong(given: list[Answer]) -> str:
     return "; ".join(told)
 
 
-def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
+def of_start(
+    begun: Start, ends: str = BY_KEY, *, drove_before: Iterable[int] = frozenset()
+) -> Verdict:
     """Who drives.
 
     Args:
         begun: what became of it.
         ends: what stops those that are held.
+        drove_before: robots that did before anything was said from here.
     """
     given = begun.answers
     if begun.called_off:
@@ -374,7 +440,8 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     if len(standing) == len(given):
         return Verdict(False, _of_nobody(begun, at, ends))
     going = [a for a in given if a.accepted is False and a.mode in DRIVING]
-    if all(a.accepted is False for a in given):
+    if all(a.accepted is False or a.robot_id in begun.untold for a in given):
+        going = going or [a for a in given if a.robot_id in begun.untold and a.mode in DRIVING]
         words = f"NOBODY STARTED: {_why(given)}. {_as_before(going or faulty)}."
         return Verdict(False, words)
     late = {a.robot_id for a in begun.late}
@@ -382,6 +449,9 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     silent = [a for a in waiting if a.is_silent and a.accepted is not False]
     idle = [a for a in waiting if a not in silent]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
+    theirs = [a for a in unsure if a.robot_id in begun.untold]
+    before = [a for a in unsure if a.robot_id in drove_before and a not in theirs]
+    unsure = [a for a in unsure if a not in theirs and a not in before]
     told = [
         f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
         if faulty
@@ -391,7 +461,9 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
         f"{_unheard(begun.late)} in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
-        _unconfirmed(unsure) if unsure else "",
+        _unconfirmed(unsure, "drives without having confirmed it"),
+        _unconfirmed(before, "drove before, and has not confirmed it"),
+        _unconfirmed(theirs, "was told nothing by this start, and drives by somebody else's word"),
         _dry_run(given),
         _remarked(given),
         *_odd_links(begun),
@@ -405,9 +477,8 @@ def of_start(begun: Start, ends: str = BY_KEY) -> Verdict:
     return Verdict(False, words)
 
 
-def _unconfirmed(given: list[Answer]) -> str:
-    words = several.of(given, "drives without having confirmed it")
-    return f"{_names(given)} {words}{_because(given)}"
+def _unconfirmed(given: list[Answer], words: str) -> str:
+    return f"{_names(given)} {several.of(given, words)}{_because(given)}" if given else ""
 
 
 def _unheard(given: list[Answer]) -> str:
@@ -447,7 +518,8 @@ def _going_on(begun: Start, ends: str) -> str:
     else:
         words = f"{ends}; they stop by themselves "
         words += f"{begun.link_timeout_ms / 1e3:g} s after they have lost this command"
-    taken = [a for a in begun.answers if a.mode in DRIVING and a.accepted is not False]
+    told = [a for a in begun.answers if a.robot_id not in begun.untold]
+    taken = [a for a in told if a.mode in DRIVING and a.accepted is not False]
     waiting = [a for a in taken if a.link_timeout_s is None]
     verb = several.of(waiting, "has")
     return f"{words}{f', which {_names(waiting)} {verb} not signed yet' if waiting else ''}."
@@ -477,9 +549,12 @@ def _of_called_off(begun: Start) -> Verdict:
         words += f" {_names(taken)}: left to that operator."
     if STOPPED in begun.dropouts.words.values():
         words += f" {_who_stopped(begun)}"
+    untold = [a for a in begun.answers if a.robot_id in begun.untold]
+    if untold:
+        words += f" {_names(untold)} {several.of(untold, LEFT_ALONE)}."
     if begun.stopped:
-        whom = "The others" if taken else "All"
-        stopped = of_stop(begun.stopped, is_of_some=bool(taken)).sentence
+        whom = "The others" if taken or untold else "All"
+        stopped = of_stop(begun.stopped, is_of_some=bool(taken or untold)).sentence
         is_of_all = any(w.startswith((STOPPED, NONE_BEGUN)) for w in begun.dropouts.words.values())
         more = "" if is_of_all else "; --partial starts some"
         words += f" {whom} were told to stop: {stopped} They must be armed before they start"

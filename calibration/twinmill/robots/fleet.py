@@ -173,6 +173,11 @@ class Robot:
         return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
     @property
+    def is_twin(self) -> bool:
+        """It says that it is no robot."""
+        return bool(self.run) and self.run.source == "twin"
+
+    @property
     def is_here(self) -> bool:
         """It said something just now."""
         return time.monotonic() - self.heard_s < GONE_S
@@ -193,20 +198,62 @@ class Robot:
 
     @property
     def signs_that_it_stands(self) -> bool:
-        """It has signed just now that its board took zero.
+        """It has signed just now, by its own stamp, that its board took zero.
 
         What else it says, signed or not, may only contradict that.
         """
         link = self.link
         return bool(
             link
-            and time.monotonic() - self.link_s < SIGNED_S
+            and self.signed_ago_s < SIGNED_S
             and link.stands
             and not link.status_flags & MAY_MOVE
             and self.stands
             and self.is_here
             and not self.is_double
         )
+
+    @property
+    def answered_now(self) -> Answered | None:
+        """Its quickest answer in the session of its newest link; None: it gave none."""
+        link, answered = self.link, self.answered
+        return answered if link and answered and link.session == answered.session else None
+
+    @property
+    def signed_ago_s(self) -> float:
+        """How long ago it signed what is known of it; a recording that is played is no news.
+
+        At most, where it has answered in this session. Else by both clocks: one that is ahead for
+        so long that it could hide that leaves it open, as nothing signed does: infinite.
+        """
+        link, answered, now_s = self.link, self.answered_now, time.monotonic()
+        if not link:
+            return math.inf
+        if answered:
+            return now_s + answered.most_now_s - link.session_us / 1e6
+        stamped_s = time.time() - link.utime_us / 1e6
+        return max(stamped_s, now_s - self.link_s) if stamped_s > -SIGNED_S else math.inf
+
+    @property
+    def is_old_news(self) -> bool:
+        """It is heard, and nobody knows that it said so just now: it may be elsewhere, and drive.
+
+        Of a robot with another key its telemetry tells, which may be anybody's.
+        """
+        age_s = self.signed_ago_s if self.link else self.late_s
+        return self.is_here and age_s > SIGNED_S
+
+    @property
+    def old_news(self) -> str:
+        """Words on how old is what is known of it; empty where it is new."""
+        if not self.is_old_news:
+            return ""
+        if not self.link:
+            return f"by what it said {self.late_s:.0f} s ago, or its clock is behind"
+        if self.signed_ago_s == math.inf:
+            return "its clock is ahead, and it answers nothing: nobody knows when it said that"
+        how = "at most" if self.answered_now else "if its clock is right"
+        return f"by what it signed {self.signed_ago_s:.0f} s ago, {how}"
 
     def confirms(self, seq: int) -> bool:
         """It has signed that it obeyed this stop, and that its board took zero since.
@@ -266,6 +313,11 @@ class Robot:
         return bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
 
     @property
+    def drives_by_any_word(self) -> bool:
+        """It has signed so, or says so unsigned, as a robot of another key: anybody may say it."""
+        return self.drives or self.says_that_it_drives
+
+    @property
     def is_held(self) -> bool | None:
         """An operator is heard who holds it; None if it needs none."""
         return self.hears_operator if self.is_tethered else None
@@ -291,6 +343,7 @@ class Robot:
         """Alarms about it that a person must know, loudest first."""
         hosts = ", ".join(self.senders.hosts)
         said = [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
+        said += [f"OLD NEWS: {self.old_news}"] if self.is_old_news else []
         flags = self.telemetry.status_flags if self.telemetry else 0
         flags |= self.link.status_flags if self.link else 0
         return said + [words for flag, words in ALARMS if flags & flag]
@@ -317,8 +370,8 @@ class Robot:
     @property
     def _clock_most_s(self) -> float:
         """Infinite where nothing was answered in this session."""
-        link, answered = self.link, self.answered
-        if not (link and answered and link.session == answered.session):
+        link, answered = self.link, self.answered_now
+        if not (link and answered):
             return math.inf
         set_to_s = (link.utime_us - link.session_us) / 1e6
         return answered.most_now_s + set_to_s - (time.time() - time.monotonic())
@@ -384,7 +437,8 @@ class Robot:
             "signed": self.link is not None,
             "armed": self.is_armed,
             "tethered": self.is_tethered,
-            "held": self.is_held,
+            "held": None if self.is_old_news else self.is_held,
+            "signed_ago_s": self.signed_ago_s if self.link else None,
             "link_timeout_s": self.link_timeout_s,
             "battery_V": t.battery_V if t else None,
             "camera": self.camera,
@@ -438,9 +492,11 @@ class Fleet:
         # When commands were said from here first, by number, and the highest counter of those.
         self.said: dict[int, float] = {}
         self.counter = 0
+        # Robots that were told something from here that is signed, as to start.
+        self.addressed: set[int] = set()
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
-        self._prefix, self.key, self._hold_s = channel_prefix, key, 0.0
+        self.url, self._prefix, self.key, self._hold_s = url, channel_prefix, key, 0.0
         self._hold_seq = secrets.randbelow(2**31)  # by it what is said from here is known
         self._looked_s = _time_passed_s()
         self._empty_s = time.monotonic()  # nothing waited here then
@@ -701,6 +757,12 @@ class Fleet:
             self.bus.publish(channel, command.encode())
         elif hasattr(self.bus, "tell"):  # other buses know no machines
             self.bus.tell(host, channel, command.encode())
+
+    @property
+    def addressed_by(self) -> dict[str, str]:
+        """Parts of its address that are not the default, by the names of their options."""
+        bus = {"lcm_url": "" if self.url == URL else self.url, "channel_prefix": self._prefix}
+        return {name: value for name, value in bus.items() if value}
 
     @property
     def has_key(self) -> bool:

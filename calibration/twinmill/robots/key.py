@@ -82,6 +82,12 @@ def load(path: Path | None = None) -> bytes:
     told = option("key", str(file)) if path else f"the operator's key, {file}"
     if not file.exists():
         named = f" {told}" if path else ""
+        if str(path).startswith("~"):
+            raise ValueError(
+                f"{told}: there is no key here, for a shell makes a home folder of `~` only at the "
+                f"beginning of a word without quotes, not behind `--key=`; was "
+                f"{option('key', str(file.expanduser()))} meant?"
+            )
         raise ValueError(
             f"{told}: there is no key here, so no robot's answer is believed; "
             "copy the operator's, or make one and bring it to robots: "

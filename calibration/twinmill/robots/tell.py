@@ -164,37 +164,47 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
 
 
 def ask_clocks(fleet: Fleet, robots: set[int]) -> None:
-    """Asks robots of which all comes late for an answer.
+    """Asks robots of which all comes late, or was signed long ago, for an answer.
 
-    By that a network that is late is told from a clock that is behind. Without the operator's key
-    no answer is believed, and none asked for.
+    By that a network that is late is told from a clock that is behind, and a robot that is there
+    from a recording of it. Without the operator's key no answer is believed, and none asked for.
     """
-
-    def waiting() -> set[int]:
-        here = robots & fleet.here() if fleet.has_key else set()
-        return {i for i in here if fleet.robots[i].age_s > CLOCK_WARN_S} - {
-            i for i in here if fleet.robots[i].has_answered
-        }
-
     end_s = time.monotonic() + ASK_S
-    while waiting() and time.monotonic() < end_s:
-        for robot_id in sorted(waiting()):
-            command = make_command(ASK)
-            command.robot_id = robot_id
-            with suppress(OSError):
-                fleet.send(command)
-        fleet.listen(REPEAT_S, lambda: not waiting())
+    while _unasked(fleet, robots) and time.monotonic() < end_s:
+        ask_once(fleet, robots)
+        fleet.listen(REPEAT_S, lambda: not _unasked(fleet, robots))
+
+
+def ask_once(fleet: Fleet, robots: set[int]) -> None:
+    """As ask_clocks(), and waits for nothing."""
+    for robot_id in sorted(_unasked(fleet, robots)):
+        command = make_command(ASK)
+        command.robot_id = robot_id
+        with suppress(OSError):
+            fleet.send(command)
+
+
+def _unasked(fleet: Fleet, robots: set[int]) -> set[int]:
+    """Those that are late or old news, and have not answered."""
+    here = [fleet.robots[i] for i in robots & fleet.here()] if fleet.has_key else []
+    return {
+        r.robot_id
+        for r in here
+        if (r.age_s > CLOCK_WARN_S and not r.has_answered)
+        or (r.link and r.is_old_news and not r.answered_now)
+    }
 
 
 def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
     """Those of some robots that drive already, or that an operator holds who counts to their start.
 
-    Who holds them is heard by then. To be asked before this program holds any.
+    Be it by a word that nobody can check: a robot of another key signs nothing. Who holds them is
+    heard by then. To be asked before this program holds any.
     """
     known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
     fleet.listen(OTHERS_S, lambda: all(robot.hears_operator for robot in known))
     fleet.listen(FIND_S, lambda: all(r.is_held is not False for r in known if r.drives))
-    return [robot for robot in known if robot.drives or robot.hears_operator]
+    return [robot for robot in known if robot.drives_by_any_word or robot.hears_operator]
 
 
 def all_linked(fleet: Fleet, robots: set[int]) -> bool:
@@ -244,6 +254,7 @@ def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
         order.counter = max(time.time_ns() // 1000, *(n + 1 for n in [fleet.counter, *known]))
     session = order.sessions.setdefault(robot_id, robot.link.session)
     if session == robot.link.session:
+        fleet.addressed.add(robot_id)
         fleet.send_signed(
             order.message, robot, session, order.counter, link_timeout_ms=order.link_timeout_ms
         )
@@ -431,6 +442,8 @@ class Start:
             drive by another's.
         link_timeout_ms: that was sent with it; 0: they drive on without their operator.
         stop_heard: from where a stop came that was not said here, and when; empty: none was heard.
+        untold: robots that were asked for and told nothing, as they sign nothing with this key:
+            what they do is by somebody else's word.
     """
 
     utime_us: int
@@ -442,11 +455,13 @@ class Start:
     dropouts: Dropouts = field(default_factory=Dropouts)
     link_timeout_ms: int = LINK_TIMEOUT_MS
     stop_heard: str = ""
+    untold: frozenset[int] = frozenset()
 
     @property
     def begun_utime_us(self) -> int | None:
         """The instant; None where no robot was to start at it in the end."""
-        begin = [a for a in self.answers if a.accepted or (a.accepted is None and a.is_driving)]
+        told = [a for a in self.answers if a.robot_id not in self.untold]
+        begin = [a for a in told if a.accepted or (a.accepted is None and a.is_driving)]
         return self.utime_us if begin and not self.called_off else None
 
 
@@ -466,7 +481,7 @@ def start(
     Up to the instant a robot may drop out: it starts anew, is not heard any more, is stopped by
     another, be it before it could accept, or told something else. Then all others are told to stop,
     and if one does not begin with them, too. Robots that another operator is to start instead are
-    left to him.
+    left to him, and those alone that were told nothing: they may drive for somebody else.
 
     From the instant on they are held: as long as the fleet listens, they hear that the operator is
     there. Where this raises, as the fleet's watch does, they may drive: who calls it stops them.
@@ -529,8 +544,9 @@ def start(
     called_off = bool(out) or not agreed
     fleet.held -= out.taken | others.taken
     if called_off:
-        stopped = stopping(fleet, robots - out.taken) if robots - out.taken else []
-        out = out.beside(stopped_by_another(fleet, robots - out.taken, command.seq))
+        told = (robots & fleet.addressed) - out.taken
+        stopped = stopping(fleet, told) if told else []
+        out = out.beside(stopped_by_another(fleet, told, command.seq))
     sessions = {
         i: robot.signed_acks[command.seq].session
         for i in robots
@@ -545,7 +561,8 @@ def start(
             for now, a in zip(final, given, strict=True)
         ]
     begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out or others)
-    return Start(*begun, link_timeout_ms, fleet.stop_heard(robots))
+    untold = frozenset(robots - fleet.addressed)
+    return Start(*begun, link_timeout_ms, fleet.stop_heard(robots), untold)
 
 
 def _at_call_off(then: Answer, now: Answer, robot: Robot | None, seq: int) -> Answer:
