@@ -6,7 +6,8 @@ PYTHON := .venv/bin/python
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error \
 	    --parallel $(shell expr $$(nproc) + 1)
 
-.PHONY: bench build check check-long clean demo docs format lint paper rivals tests wheel
+.PHONY: bench build check check-long clean demo docs format lint paper rivals tests wheel \
+    wheel-aarch64
 
 # The native module and the messages into the environment; and our Python compiled: where Python is
 # told to write no bytecode, it would compile a hundred modules at each start.
@@ -90,6 +91,12 @@ docs: build
 wheel: build
 	@[ -d .deps/wheel-root ] || scripts/make_wheel_root .deps/wheel-root
 	@scripts/wheel dist .deps/wheel-root
+
+# The same for 64-bit ARM, as a Raspberry Pi has it, compiled here: what it needs goes into
+# .deps/wheel-root-aarch64.
+wheel-aarch64: build
+	@[ -d .deps/wheel-root-aarch64 ] || scripts/make_wheel_root .deps/wheel-root-aarch64 aarch64
+	@scripts/wheel dist .deps/wheel-root-aarch64
 
 # Removes what was built; `rm -rf .venv .deps` also removes what was installed here.
 clean:
