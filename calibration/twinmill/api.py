@@ -1777,7 +1777,7 @@ def infer(
     log: Log | str | Path,
     model: Model | str | Path | None = None,
     *,
-    own: Log | str | Path | None = None,
+    own: Logs | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Inference:
     """Posterior probability of each effect that a model may lack, and of an unknown cause.
@@ -1837,7 +1837,7 @@ def infer_robots(
     log: Log | str | Path,
     model: Model | str | Path | None = None,
     *,
-    own: Log | str | Path | None = None,
+    own: Logs | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> dict[int, Inference]:
     """Posterior probabilities for each robot of a log separately.
@@ -1917,7 +1917,7 @@ def next_run(
     duration_s: float = 30.0,
     floor_m: tuple[float, float] = (2.0, 2.0),
     max_duty: float = 1.0,
-    own: Log | str | Path | None = None,
+    own: Logs | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> NextRun:
     """Designs the run that best tells apart what these logs cannot.

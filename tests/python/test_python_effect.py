@@ -2,6 +2,7 @@
 """Effects written in Python, found in paths that are algebra and were made without the library."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -20,6 +21,10 @@ GRAIN, ALONG_RAD = 0.15, 0.6  # of a carpet: so much faster along this direction
 def grain(vx, theta, along_x, along_y):
     """Faster along one direction of the room than against it."""
     return vx * (along_x * np.cos(theta) + along_y * np.sin(theta))
+
+
+def test_an_effect_pickles_as_the_function_in_whose_place_it_stands():
+    assert pickle.loads(pickle.dumps(grain)) is grain
 
 
 @pytest.fixture(scope="module")

@@ -165,7 +165,8 @@ def inferred(
     writes = with_own("explain" if verb == "diagnose" else verb, own)
     mending = _mending(answer, writes, given) if answer and not written else []
     settling = _settling(answer, given, own) if answer else []
-    commands = [*mending, *settling]
+    looking = _looking(answer, given, own) if answer else []
+    commands = [*mending, *settling, *looking]
     data = {**data, **(written.to_json() if written else {})}
     data |= {"commands": [command for _, command in commands], **told(given.measurements)}
     if answer and settling:
@@ -206,3 +207,11 @@ def _settling(answer: Answer, given: Given, own: list[Path]) -> list[tuple[str, 
         return []
     verb = with_own("next", own)
     return [("To design that run", command_line(verb, given.logs, given.model, Path("next.csv")))]
+
+
+def _looking(answer: Answer, given: Given, own: list[Path]) -> list[tuple[str, str]]:
+    """Reason and command for a formula of what has no name, by the engine that proposes some."""
+    if answer.verdict != "outside_catalogue" or not own or "always" in given.model_file.fit:
+        return []
+    why = "To look for a formula of it, which probabilities do not propose"
+    return [(why, command_line("diagnose", given.logs, given.model))]

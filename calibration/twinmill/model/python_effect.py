@@ -143,6 +143,7 @@ class PythonEffect:
         self.name = function.__name__
         self.adds_to, self.numbers = adds_to, dict(numbers)
         self._function = function
+        self.__module__, self.__qualname__ = function.__module__, function.__qualname__
         if not 1 <= len(self.numbers) <= len(PLACES):
             raise ValueError(
                 f"{self.name}: has {len(self.numbers)} numbers; an effect has one to four."
@@ -183,6 +184,9 @@ class PythonEffect:
     def __call__(self, *signals: Any, **named: Any) -> Any:
         """Value of the function itself."""
         return self._function(*signals, **named)
+
+    def __reduce__(self) -> str:
+        return self.__qualname__  # pickled by reference, as the function in whose place it stands
 
     def __repr__(self) -> str:
         return f"PythonEffect({self.name}: {self.adds_to} + {self.texts['formula']})"

@@ -20,7 +20,7 @@ from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements
 from twinmill.inference.always import always_of
 from twinmill.inference.better import better
-from twinmill.inference.infer import infer, infer_robots
+from twinmill.inference.infer import infer, infer_robots, strangers
 from twinmill.inference.kept import kept, with_kept
 from twinmill.inference.planar import problem_of
 from twinmill.inference.screening import nearby, screened
@@ -41,6 +41,13 @@ def number(found, effect, name):
 def own(measure, tanh_robot):
     """The log that `one_clock_base` was fitted to."""
     return measure(tanh_robot(), 1, 60.0)
+
+
+def test_an_own_log_that_the_model_was_not_fitted_to_is_said(measure, one_clock_base, own):
+    """By the hash that the file keeps; the right one is no news."""
+    assert not strangers([own], one_clock_base)
+    (said,) = strangers([measure(seed=3)], one_clock_base)
+    assert "not to this" in said
 
 
 @pytest.mark.parametrize("seed", [5, 6, 12])
