@@ -88,7 +88,7 @@ class Answer:
 
     @property
     def sure_words(self) -> list[str]:
-        """What the rest depends on for sure, else the likeliest such thing; none if nothing."""
+        """Dependences of the rest that are sure, else the likeliest; none if there is none."""
         sure = [word for word, p in self.depends_on.items() if p >= PRIORS.sure]
         return sure or [*self.depends_on][:1]
 

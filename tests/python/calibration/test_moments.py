@@ -140,7 +140,7 @@ def test_moments_that_all_are_at_changes_of_the_command_may_be_what_acts_there(b
     command = np.tile([[0.2, 0, 0], [-0.2, 0, 0]], (10, 1))
     track = SimpleNamespace(command=command, command_t_s=t_s)
     data = SimpleNamespace(measurement=SimpleNamespace(track=track))
-    own = SimpleNamespace(trajectory=data, data=data, floor=SimpleNamespace(offset_s=0.0))
+    own = SimpleNamespace(trajectory=data, data=data, known_floor=SimpleNamespace(offset_s=0.0))
     at = _at_changes(own, np.array(begins_s))
     assert at == told
     words = sentence([Moment("run", 1, b, 0.7, "less", at) for b in begins_s])
@@ -201,7 +201,7 @@ def test_commands_that_act_later_from_a_moment_on_are_one_change(
         measurement=SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1)),
     )
     own = SimpleNamespace(
-        trajectory=data, data=data, floor=SimpleNamespace(across=None, keep=data.keep)
+        trajectory=data, data=data, known_floor=SimpleNamespace(across=None, keep=data.keep)
     )
     found = later_from(own, model)
     assert bool(found) == told

@@ -257,7 +257,7 @@ def test_the_command_writes_the_script_and_says_what_it_parts(
     designed, monkeypatch, capsys, tmp_path, coasting_robot
 ):
     """The design of a run is tested above; here it is the ready plan."""
-    monkeypatch.setattr(next_run, "plan_run", lambda *_: designed.plan)
+    monkeypatch.setattr(next_run, "plan_run", lambda *_, own: designed.plan)
     script, report = tmp_path / "script.csv", tmp_path / "report"
     words = ["next", coasting_robot.log, "--model", coasting_robot.model, "-o", script]
     cli.run([str(w) for w in [*words, "--json", "--out", report]])

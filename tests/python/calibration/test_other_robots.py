@@ -199,7 +199,7 @@ def test_the_next_run_of_a_robot_told_velocities_shows_what_its_log_could_not(
     assert np.all(np.abs(told).max(axis=0) <= (0.2, 0, 0.8, 0))  # of the log's, and never sideways
     assert told[:, 2].min() < 0 and "turn_asymmetry" in plan.separates
     assert np.all(plan.extent_m <= 2.0)
-    monkeypatch.setattr(next_run, "plan_run", lambda *_: plan)
+    monkeypatch.setattr(next_run, "plan_run", lambda *_, own: plan)
     script, log = tmp_path / "script.csv", str(tmp_path / "run.lcmlog")
     words = ["next", log, "--model", str(tmp_path / "model.toml"), "-o", str(script)]
     cli.run([*words, "--script-as", "publisher"])

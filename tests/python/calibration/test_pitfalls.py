@@ -558,7 +558,8 @@ def test_moments_that_hardly_change_the_way_must_be_many(count, way, windows, to
         errors=lambda _: nothing,
     )
     floor = SimpleNamespace(across=None, keep=np.ones(400, bool))
-    found = moments.events_of([SimpleNamespace(trajectory=data, data=data, floor=floor)], [None])
+    own = SimpleNamespace(trajectory=data, data=data, floor=floor, known_floor=floor)
+    found = moments.events_of([own], [None])
     assert len(found.moments) == told
 
 
@@ -1427,7 +1428,7 @@ def test_a_stretch_in_which_the_model_is_right_is_not_told():
         len(
             moments.left_out(
                 SimpleNamespace(
-                    trajectory=data, data=data, model=m, floor=SimpleNamespace(keep=keep)
+                    trajectory=data, data=data, model=m, known_floor=SimpleNamespace(keep=keep)
                 )
             )
         )

@@ -133,7 +133,9 @@ def test_a_floor_as_the_noise_makes_it_is_regular_and_one_three_times_as_high_is
     data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
     floor = np.column_stack([along, along, turn])
     for times in (1.0, 3.0):
-        own = SimpleNamespace(trajectory=data, data=data, floor=SimpleNamespace(rms=times * floor))
+        own = SimpleNamespace(
+            trajectory=data, data=data, known_floor=SimpleNamespace(rms=times * floor)
+        )
         found = irregularity(own, Noise(*channels), model)
         assert found == pytest.approx(times)
         assert (found > SETTINGS.irregular) == (times > 1)
@@ -152,7 +154,9 @@ def test_a_robot_that_drives_faster_than_the_model_was_told_slips_more(speed_mps
     along, turn = (np.sqrt(c.displaced(np.array(HORIZONS_S))) for c in channels)
     data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
     own = SimpleNamespace(
-        trajectory=data, data=data, floor=SimpleNamespace(rms=np.column_stack([along, along, turn]))
+        trajectory=data,
+        data=data,
+        known_floor=SimpleNamespace(rms=np.column_stack([along, along, turn])),
     )
     silent = ChannelNoise(0.0, 0.0, 0.1)
     found = irregularity(own, Noise(silent, silent, speed_mps), model, told_mps)
@@ -220,7 +224,9 @@ def test_what_grows_beside_a_noisy_sensor_shows_at_the_longest_horizon():
     ahead = np.sqrt(more.displaced(np.array(HORIZONS_S)))
     data = SimpleNamespace(measured=np.zeros((10, len(HORIZONS_S), 3)))
     own = SimpleNamespace(
-        trajectory=data, data=data, floor=SimpleNamespace(rms=np.column_stack([ahead, along, turn]))
+        trajectory=data,
+        data=data,
+        known_floor=SimpleNamespace(rms=np.column_stack([ahead, along, turn])),
     )
     found = irregularity(own, Noise(position, heading), model)
     assert found == pytest.approx(ahead[-1] / along[-1])
@@ -249,7 +255,9 @@ def test_a_heading_that_wanders_leads_the_robot_across_its_way_in_curves_too(cur
         found[round((k + 1) * step_s, 3)] = (*place, turned)
     ends = np.array([found[h] for h in HORIZONS_S])  # (H, 3, runs)
     data = SimpleNamespace(measured=np.moveaxis(ends, 2, 0))
-    own = SimpleNamespace(trajectory=data, data=data, floor=SimpleNamespace(rms=ends.std(axis=2)))
+    own = SimpleNamespace(
+        trajectory=data, data=data, known_floor=SimpleNamespace(rms=ends.std(axis=2))
+    )
     assert irregularity(own, Noise(position, heading), model) == pytest.approx(1.0, abs=0.35)
 
 
@@ -361,6 +369,10 @@ class Over:
     @property
     def trajectory(self) -> SimpleNamespace:
         return self.data
+
+    @property
+    def known_floor(self) -> Floor:
+        return self.floor
 
 
 @pytest.mark.parametrize(("depends_on", "likely"), [([], True), (["heading"], False)])
