@@ -146,7 +146,7 @@ def test_a_plan_is_whole_and_what_it_says_runs_as_printed(planned: Path, monkeyp
     starts = np.loadtxt("plan/starts.csv", delimiter=",", skiprows=1)
     assert starts.shape == (6 * 6, 5) and np.abs(starts[:, 2:4]).max() <= 0.6
     fill(Path("plan/outcomes.csv"), Path("plan/outcomes.csv"), {"class": ["milling"] * 6})
-    command = next(line for line in text.splitlines() if "twinmill lab score" in line)
+    command = next(line for line in text.splitlines() if line.startswith("    twinmill lab score"))
     command = command.replace(f"{planned}/", "")
     run([*command.split()[1:], "--json", "--out", "score"])
     data = json.loads(capsys.readouterr().out)

@@ -31,7 +31,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.diagnosis.stopped import NOTHING_TRIED, stopped
     from twinmill.files import check_new_file
-    from twinmill.inference.infer import keeps_its_error
+    from twinmill.inference.keeping import keeps_its_error
     from twinmill.model.model_file import ModelFile
     from twinmill.provenance import Provenance
     from twinmill_cli.frame import (
@@ -76,8 +76,8 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
 
-    With the log that the model was fitted to, each effect has a probability, as it
-    has with a model that keeps what it misses there:
+    With the log that the model was fitted to, or a model that keeps what it
+    misses there, each effect has a probability:
     twinmill diagnose run.lcmlog --model fitted.toml --own calibration.lcmlog
 
     Of a robot that MuJoCo can load:

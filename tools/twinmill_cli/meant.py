@@ -5,6 +5,7 @@ import difflib
 import re
 import shlex
 from collections.abc import Sequence
+from itertools import pairwise
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
@@ -117,7 +118,7 @@ def _two_dashes(named: dict[str, TyperOption], name: str, words: Sequence[str], 
 
 def _value(name: str, words: Sequence[str]) -> str:
     """Value given to an option, as a shell has it; empty where none is."""
-    for word, following in zip(words, [*words[1:], ""], strict=True):
+    for word, following in pairwise([*words, ""]):
         if word.partition("=")[0] == name:
             value = word.partition("=")[2] or following
             return "" if not value or value.startswith("-") else shlex.quote(value)

@@ -21,7 +21,8 @@ from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
-from twinmill.inference.infer import Inference, infer, keeps_its_error
+from twinmill.inference.infer import Inference, infer
+from twinmill.inference.keeping import keeps_its_error
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import base_parameters, catalogue_of
 from twinmill.predict.modelled_log import ModelledLog

@@ -167,17 +167,6 @@ def strangers(own: Sequence[Measurement | SteadyTable], model_file: ModelFile) -
     ]
 
 
-def keeps_its_error(
-    measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile
-) -> bool:
-    """True if the file tells what its model always misses, and one robot's logs are judged.
-
-    Several robots are compared with each other, and tables read, by the older engine alone.
-    """
-    robots = {m.track.robot_id if isinstance(m, Measurement) else None for m in measurements}
-    return "always" in model_file.fit and len(robots) == 1 and None not in robots
-
-
 def infer_robots(
     measurements: Sequence[Measurement | SteadyTable],
     model_file: ModelFile,
