@@ -227,20 +227,16 @@ size_t config_print(const struct app_config *config, bool with_docs, char *text,
 
 const char *config_remark(const struct app_config *config)
 {
-    if (config->duty_cap_pct == 0)
-    {
-        return "duty_cap_pct = 0: no wheel ever turns, whatever the robot is told; give 1..100 to "
-               "let it drive";
-    }
+    int turns = 0;
     for (int wheel = 0; wheel < FW_WHEEL_COUNT; ++wheel)
     {
-        if (config->sign[wheel] != 0)
-        {
-            return NULL;
-        }
+        turns |= config->sign[wheel];
     }
-    return "sign_fl, sign_fr, sign_rl, sign_rr = 0: no wheel ever turns, whatever the robot is "
-           "told; give 1 or -1 to let it drive";
+    if (config->duty_cap_pct == 0)
+    {
+        return "duty_cap_pct = 0";
+    }
+    return turns == 0 ? "all signs = 0" : NULL;
 }
 
 // Bits without a gap: the first that is empty is the end.

@@ -75,8 +75,7 @@ bool config_load_what_can_be(struct app_config *config, const char *path);
 // ends early if size is too small.
 size_t config_print(const struct app_config *config, bool with_docs, char *text, size_t size);
 
-// @return one sentence on a configuration that is right, and by which no wheel ever turns; else
-// NULL.
+// @return what it is in a configuration that is right by which no wheel ever turns; else NULL.
 const char *config_remark(const struct app_config *config);
 
 // The part that the core decides by. @return FW_OK, or why the core refuses it.

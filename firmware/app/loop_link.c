@@ -103,7 +103,7 @@ static void remark(const struct loop *loop, struct link_ack *ack)
              loop->core.config.duty_cap_pct == 0)
     {
         (void)snprintf(ack->reason, sizeof ack->reason,
-                       "no wheel turns: duty_cap_pct is 0 in the robot's configuration");
+                       "no wheel turns: duty_cap_pct is 0 in its file");
     }
     else if (ack->verb == FW_VERB_SELECT && ack->accepted && loop->plan.waits &&
              (loop->plan.plays_script || loop->plan.behavior[0] != '\0'))

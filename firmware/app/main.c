@@ -141,7 +141,7 @@ static void say_remark(const struct app_config *config)
     const char *remark = config_remark(config);
     if (remark != NULL)
     {
-        say("configuration: %s", remark);
+        say("configuration: %s: no wheel ever turns", remark);
     }
 }
 

@@ -108,11 +108,11 @@ static void test_a_configuration_by_which_no_wheel_turns_is_remarked(void)
     TEST_ASSERT_TRUE(parse("sign_fl = 0\nsign_fr = 0\nsign_rl = 0\n"));
     TEST_ASSERT_NULL(config_remark(&config));
     TEST_ASSERT_TRUE(parse("sign_rr = 0\n"));
-    TEST_ASSERT_NOT_NULL(strstr(config_remark(&config), "no wheel ever turns"));
+    TEST_ASSERT_EQUAL_STRING("all signs = 0", config_remark(&config));
     TEST_ASSERT_TRUE(parse("sign_rr = -1\nduty_cap_pct = 1\n"));
     TEST_ASSERT_NULL(config_remark(&config));
     TEST_ASSERT_TRUE(parse("duty_cap_pct = 0\n"));
-    TEST_ASSERT_NOT_NULL(strstr(config_remark(&config), "duty_cap_pct = 0: no wheel ever turns"));
+    TEST_ASSERT_EQUAL_STRING("duty_cap_pct = 0", config_remark(&config));
 }
 
 // Without keys of their own bits are those of the keys before there were several.
