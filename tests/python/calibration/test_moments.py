@@ -200,9 +200,8 @@ def test_commands_that_act_later_from_a_moment_on_are_one_change(
         errors=lambda _: errors(clock["clock.offset_s"]),
         measurement=SimpleNamespace(log_name="run", track=SimpleNamespace(robot_id=1)),
     )
-    own = SimpleNamespace(
-        trajectory=data, data=data, known_floor=SimpleNamespace(across=None, keep=data.keep)
-    )
+    floor = SimpleNamespace(across=None, keep=data.keep)
+    own = SimpleNamespace(trajectory=data, data=data, floor=floor, known_floor=floor)
     found = later_from(own, model)
     assert bool(found) == told
     if found:
