@@ -66,14 +66,13 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
             f"{model_file.path}: [robots.{robot}] has numbers of this robot alone, and a better "
             f"model is written for all; take that table out of a copy, and give the copy."
         )
-    before = comparison(model_file, open_measurements(found.measurements, model_file))
-    fitted, added = _fitted(found, model_file, before.score)
+    fitted, added = _fitted(found, model_file, found.before.score)
     child = child_of(model_file, fitted, path, command)
     after = comparison(child, open_measurements(found.measurements, child))
     child = child_of(model_file, replace(fitted, score_after=after.score), path, command)
     document = tomlkit.parse(child.text)
     document["fit"]["always"] = as_table(always_of(found.measurements, child))
-    return Better(ModelFile.of(path, tomlkit.dumps(document)), added, before, after)
+    return Better(ModelFile.of(path, tomlkit.dumps(document)), added, found.before, after)
 
 
 def _fitted(

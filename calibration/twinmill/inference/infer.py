@@ -2,7 +2,7 @@
 """One model, and each robot by itself: what is missing, with probabilities."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from twinmill.arguments import option
@@ -39,7 +39,7 @@ class Inference:
 
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
-        left: what the dependences look like that are sure, or the likeliest.
+        left: curves of the dependences that are sure, or of the likeliest.
         measurements: of the logs.
         always: what the model misses in its own logs, too; None where that is not known.
         before: these logs and the model as given.
@@ -118,8 +118,8 @@ def infer(
     found = answer(table_of(search))
     progress("scores")
     left = unnamed(search, problem.motion, found)
-    result = _scored(found, runs, model_file, left=left, always=always)
-    return replace(result, strangers=tuple(strangers(own, model_file)))
+    said = tuple(strangers(own, model_file))
+    return _scored(found, runs, model_file, left=left, always=always, said=said)
 
 
 def _scored(
@@ -129,6 +129,7 @@ def _scored(
     *,
     left: tuple[Unnamed, ...],
     always: Always | None,
+    said: tuple[str, ...],
 ) -> Inference:
     given = open_measurements(runs, model_file)
     there = always.effects if always else ()
@@ -149,7 +150,7 @@ def _scored(
         after=comparison(model_file, after),
         opened=base,
         not_shown=not_shown(given),
-        strangers=(),
+        strangers=said,
     )
 
 

@@ -22,7 +22,7 @@ from twinmill.report import Figure, Section, comparisons, show, unnamed
 from twinmill.report.canvas import FLOOR, PREDICTED, draw
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
-from twinmill.report.sections import robot_pictures
+from twinmill.report.sections import beside, robot_pictures
 from twinmill.report.tables import VERDICTS, Cell, Table, number, tone
 
 if TYPE_CHECKING:
@@ -89,13 +89,13 @@ def section(
         written: likewise.
     """
     before, refitted, after = (
-        joined([getattr(result, which) for result in results])
+        _joined([getattr(result, which) for result in results])
         for which in ("before", "refitted", "after")
     )
     scores = [("as given", before.score), ("base refitted", refitted.score)]
     if any(result.answer.added for result in results):
         scores.append(("with what was found", after.score))
-    errors = [("as given", before.shown), ("with what was found", _same_robot(before, after))]
+    errors = [("as given", before.shown), ("with what was found", beside(before, after))]
     one = results[0] if len(results) == 1 else None
     return Section(
         f"What {before.model_name} lacks",
@@ -121,16 +121,10 @@ def section(
     )
 
 
-def joined(each: Sequence[Comparison]) -> Comparison:
+def _joined(each: Sequence[Comparison]) -> Comparison:
     """One comparison of the robots of several."""
     robots = [robot for one in each for robot in one.robots]
     return replace(each[0], robots=robots, warnings=[w for one in each for w in one.warnings])
-
-
-def _same_robot(before: Comparison, after: Comparison) -> Any:
-    """The robot that is shown of the model as given, with the other model."""
-    pairs = zip(before.robots, after.robots, strict=True)
-    return next(other for own, other in pairs if own is before.shown)
 
 
 def _verdicts(results: Sequence[Inference]) -> list[str]:

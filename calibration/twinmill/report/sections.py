@@ -37,7 +37,7 @@ def comparison_section(result: Comparison) -> Section:
 
 def fit_section(result: FitResult) -> Section:
     """Section on one fit: the pictures of a comparison, beside the old model's errors."""
-    log_name = _same_robot(result)[1].measurement.log_name
+    log_name = result.after.shown.measurement.log_name
     return _of_both(
         result,
         f"{result.before.model_name} fitted to {log_name}",
@@ -63,7 +63,7 @@ def added_section(result: AddResult) -> Section:
 
 def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Section:
     """Section that pages of fitted models share; `more` tables stand at the end."""
-    before, after = _same_robot(result)
+    before, after = beside(result.after, result.before), result.after.shown
     return Section(
         title,
         [_score("before", result.before.score), _score("after", result.after.score)],
@@ -106,10 +106,10 @@ def _before_and_after(result: FitResult | AddResult) -> Callable[[], str] | None
     return charts(result.after, [("before", r.model) for r in result.before.robots])
 
 
-def _same_robot(result: FitResult | AddResult) -> tuple[RobotComparison, RobotComparison]:
-    """The robot that is shown of the new model, with the old model and with the new one."""
-    pairs = zip(result.before.robots, result.after.robots, strict=True)
-    return next(pair for pair in pairs if pair[1] is result.after.shown)
+def beside(shown: Comparison, other: Comparison) -> RobotComparison:
+    """With the other model, the robot that is shown of the first."""
+    pairs = zip(shown.robots, other.robots, strict=True)
+    return next(same for own, same in pairs if own is shown.shown)
 
 
 def robot_pictures(result: Comparison, models: Sequence[tuple] = ()) -> list[Figure]:
