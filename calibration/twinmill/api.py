@@ -15,6 +15,7 @@ Logs, models and results can be pickled, and so be sent to other processes.
 import logging
 import subprocess
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from importlib.util import find_spec
 from numbers import Integral, Real
@@ -79,6 +80,7 @@ from twinmill.fitting.equations import EQUATION
 from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.inference import better as _better
 from twinmill.inference import infer as _infer
+from twinmill.inference import keeping as _keeping
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
 from twinmill.model.python_effect import PythonEffect
@@ -1662,6 +1664,7 @@ def fit(
     result = _fit.fit_model(
         measurements, start.file, path, "twinmill.fit", choice=choice, settings=settings
     )
+    result = replace(result, child=_keeping.with_its_error(result.child, measurements))
     return _told(Fit(result), measurements)
 
 

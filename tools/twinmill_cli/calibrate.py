@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shlex
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -28,7 +29,8 @@ if working():  # not for --help
     from twinmill.files import check_new_file
     from twinmill.fitting.add import OWN_GAINS, AddResult, add
     from twinmill.fitting.compare import Comparison, compare
-    from twinmill.fitting.fit import FitResult, fit
+    from twinmill.fitting.fit import Choice, FitResult, fit_model
+    from twinmill.inference.keeping import with_its_error
     from twinmill.model.parameters import find_effect
     from twinmill.report import show
     from twinmill.report.sections import added_section, comparison_section, fit_section
@@ -115,7 +117,11 @@ def _fit(
     with busy(f"fitting {model}"):
         measurements = load(logs, model_file)
         runs = check_history(history, measurements) if history else []
-        result = fit(measurements, model_file, output, source.command, held=held, force=force)
+        result = fit_model(
+            measurements, model_file, output, source.command, choice=Choice(tuple(held))
+        )
+        result = replace(result, child=with_its_error(result.child, measurements))
+        result.child.write(force)  # last, so that Ctrl-C leaves no file of which nothing is told
         if history:
             append(history, calibration(result, runs, logs, history))
     section = partial(fit_section, result)

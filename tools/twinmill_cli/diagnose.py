@@ -52,7 +52,6 @@ if TYPE_CHECKING:
 
 TWIN_RUNS = 50
 TABLE = 1  # telemetry_t.mode
-OF_PROBABILITIES = "by probabilities (--own, or a model that keeps its error), which weigh names"
 
 
 def register(app: typer.Typer) -> None:
@@ -251,11 +250,11 @@ def _judge_swarm(path: Path, result: Diagnosis) -> tuple[str, dict[str, Any] | N
     return f"The swarm as a whole, {done}: {found.verdict} {LOOK.capitalize()}", found.to_json()
 
 
-def _refuse_formula(asked: bool | None, where: str) -> None:
-    """Raises ValueError if a formula is asked for, or none, where none is ever proposed."""
+def _refuse_formula(asked: bool | None) -> None:
+    """Raises ValueError if a formula is asked for, or none, of a robot that none is proposed of."""
     if asked is not None:
         given = "--formula" if asked else "--no-formula"
-        raise ValueError(f"explain: no formula is proposed {where}; leave {given} away.")
+        raise ValueError(f"explain: no formula is proposed for jointed robots; leave {given} away.")
 
 
 def _explain(
@@ -284,18 +283,15 @@ def _explain(
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 
-    With --own the likeliest effects are written, never a formula. Of an MJCF:
-    twinmill explain run.csv --model arm.xml -o better.xml
+    Of an MJCF: twinmill explain run.csv --model arm.xml -o better.xml
     """
     if is_mjcf(model):
         from twinmill_cli.joints import explained as of_joints  # as in diagnose
 
-        _refuse_formula(formula, "for jointed robots")
+        _refuse_formula(formula)
         return of_joints(
             *(logs, model, output), own=own or [], force=force, as_json=as_json, out=out
         )
-    if own:
-        _refuse_formula(formula, OF_PROBABILITIES)
     verb = "explain --no-formula" if formula is False else "explain"
     native.keep_memory()  # what the work frees it wants again
     source = provenance(
@@ -307,11 +303,11 @@ def _explain(
     if own or keeps_its_error(given.measurements, model_file):
         from twinmill_cli.infer import inferred  # as in diagnose
 
-        _refuse_formula(formula, OF_PROBABILITIES)
         return inferred(
-            *("explain", given),
+            *(verb, given),
             own=own or [],
             output=output,
+            formula=formula is not False,
             force=force,
             as_json=as_json,
             out=out,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,8 @@ if working():  # not for --help
     from twinmill.files import check_new_file
     from twinmill.inference.answer import Answer
     from twinmill.inference.infer import Inference, infer_robots
-    from twinmill.inference.kept import with_kept
+    from twinmill.inference.kept import as_table, with_kept
+    from twinmill.listing import listed
     from twinmill.model.parameters import with_role
     from twinmill.report.inference import next_run, section, sentence, terminal_of_robots
     from twinmill_cli.frame import (
@@ -111,6 +113,7 @@ def inferred(
     own: list[Path],
     keep: Path | None = None,
     output: Path | None = None,
+    formula: bool = True,
     force: bool = False,
     as_json: bool,
     out: Path | None,
@@ -123,6 +126,7 @@ def inferred(
         own: logs that the model was fitted to.
         keep: where the model is written with what it misses in these.
         output: where the model is written with what is missing.
+        formula: one that holds is in it, too.
         force: replaces what is there.
         as_json: one JSON object in the place of tables.
         out: folder of a report.
@@ -131,7 +135,7 @@ def inferred(
         ValueError: files or options do not fit together.
     """
     native.keep_memory()  # what the work frees it wants again
-    name, typed = verb.split()[-1], with_own(verb, own)
+    name, typed = verb.removeprefix("lab ").split()[0], with_own(verb, own)
     typed += f" --keep {shlex.quote(str(keep))}" if keep else ""
     source = provenance(command_line(typed, given.logs, given.model, output), given.model_file)
     if keep is not None and not own:
@@ -154,19 +158,20 @@ def inferred(
             from twinmill.inference.better import better  # slow, and judging needs none
 
             progress("what the new model still misses in these logs")
-            written = better(results[0], given.model_file, output, source.command)
+            found = results[0] if formula else replace(results[0], formula=None)
+            written = better(found, given.model_file, output, source.command)
     if keep is not None and (always := results[0].always):
-        with_kept(given.model_file, always, keep, source.command).write(force)
+        told_by = as_table(always, [m.log_sha256 for m in before])
+        with_kept(given.model_file, told_by, keep, source.command).write(force)
     if written:
         written.file.write(force)
     each = [{"sentence": sentence(result.answer), **result.to_json()} for result in results]
     data: dict[str, Any] = each[0] if len(each) == 1 else {"robots": each}
     answer = results[0].answer if len(results) == 1 else None
     writes = with_own("explain" if verb == "diagnose" else verb, own)
-    mending = _mending(answer, writes, given) if answer and not written else []
+    mending = _mending(results[0], writes, given) if answer and not written else []
     settling = _settling(answer, given, own) if answer else []
-    looking = _looking(answer, given, own) if answer else []
-    commands = [*mending, *settling, *looking]
+    commands = [*mending, *settling]
     data = {**data, **(written.to_json() if written else {})}
     data |= {"commands": [command for _, command in commands], **told(given.measurements)}
     if answer and settling:
@@ -183,15 +188,17 @@ def inferred(
     return results
 
 
-def _mending(answer: Answer, verb: str, given: Given) -> list[tuple[str, str]]:
+def _mending(result: Inference, verb: str, given: Given) -> list[tuple[str, str]]:
     """Reason and command for the model that has what is missing.
 
     What is of a moment of these logs is added to none.
     """
-    lasting = [name for name in answer.added if not with_role(name, "moment")]
-    if not lasting and answer.verdict != "refit_enough":
+    lasting = [name for name in result.answer.added if not with_role(name, "moment")]
+    if result.formula and result.formula.lasting:
+        lasting.append("equation")
+    if not lasting and result.answer.verdict != "refit_enough":
         return []
-    why = f"To add {' and '.join(lasting)}" if lasting else "To refit the base"
+    why = f"To add {listed(lasting)}" if lasting else "To refit the base"
     new = Path(f"{Path(given.model).stem}_{'_'.join(lasting) or 'fitted'}.toml")
     return [
         (
@@ -207,11 +214,3 @@ def _settling(answer: Answer, given: Given, own: list[Path]) -> list[tuple[str, 
         return []
     verb = with_own("next", own)
     return [("To design that run", command_line(verb, given.logs, given.model, Path("next.csv")))]
-
-
-def _looking(answer: Answer, given: Given, own: list[Path]) -> list[tuple[str, str]]:
-    """Reason and command for a formula of what has no name, by the engine that proposes some."""
-    if answer.verdict != "outside_catalogue" or not own or "always" in given.model_file.fit:
-        return []
-    why = "To look for a formula of it, which probabilities do not propose"
-    return [(why, command_line("diagnose", given.logs, given.model))]

@@ -2,8 +2,9 @@
 """The model with what it lacked: base and effects at their posterior, in a file of its own.
 
 Written is the likeliest set of missing effects, with what the base's own log shows beside it. An
-effect that is of a moment of the log stays out, since no other log has it. An unnamed cause stays
-out, too, but the base's numbers are those beside it, so that they do not stand for it.
+effect that is of a moment of the log stays out, since no other log has it. An unnamed cause is in
+it where a formula describes it; the base's numbers are those beside it, so that they do not stand
+for it.
 """
 
 from dataclasses import dataclass, replace
@@ -14,10 +15,9 @@ import tomlkit
 
 from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.opening import open_measurements
-from twinmill.inference.always import always_of
-from twinmill.inference.found_model import found_model
+from twinmill.inference.found_model import found_model, with_formula
 from twinmill.inference.infer import Inference
-from twinmill.inference.kept import as_table
+from twinmill.inference.keeping import with_its_error
 from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import CLOCK, CLOCK_RATE, instance_of, with_role
@@ -70,9 +70,7 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
     child = child_of(model_file, fitted, path, command)
     after = comparison(child, open_measurements(found.measurements, child))
     child = child_of(model_file, replace(fitted, score_after=after.score), path, command)
-    document = tomlkit.parse(child.text)
-    document["fit"]["always"] = as_table(always_of(found.measurements, child))
-    return Better(ModelFile.of(path, tomlkit.dumps(document)), added, found.before, after)
+    return Better(with_its_error(child, found.measurements), added, found.before, after)
 
 
 def _fitted(
@@ -82,6 +80,8 @@ def _fitted(
     always = found.always.effects if found.always else ()
     lasting = [n for n in (*always, *found.answer.added) if not with_role(n, "moment")]
     own = found_model(model_file.model, found.answer.numbers, lasting)
+    if found.formula and found.formula.lasting:
+        own = with_formula(own, found.formula)
     kept = [e for e in own.estimates if instance_of(e.name) != "clock"]
     clock = {e.name: e for e in own.estimates if e.name in (CLOCK, CLOCK_RATE)}
     declared = own.model.clock_same or any(m.same_clock for m in found.measurements)

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
+from scipy.linalg import block_diag
 
 from twinmill.inference.duties import TABLE
+from twinmill.inference.formula import Formula
 from twinmill.inference.table import Numbers
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
@@ -72,6 +74,25 @@ def found_model(given: native.Model, numbers: Numbers, let_in: Collection[str]) 
         if instance_of(name) != "clock":  # each log has its own
             model.set(name, value)
     return FoundModel(model, tuple(name_of.values()), estimates, Covariance(names, cov))
+
+
+def with_formula(found: FoundModel, formula: Formula) -> FoundModel:
+    """The model with a formula more, at its posterior beside all others."""
+    model = found.model.copy()
+    model.add_effect("equation", formula.texts)
+    instance = newest_instance(model, "equation")
+    names = tuple(f"{instance}.p{k}" for k in range(len(formula.values)))
+    estimates = [
+        ParameterEstimate(name=name, value=value, std=std, unit=unit, at_bound=False, seen=True)
+        for name, value, std, unit in zip(
+            names, formula.values, formula.stds, formula.units, strict=True
+        )
+    ]
+    for estimate in estimates:
+        model.set(estimate.name, estimate.value)
+    values = block_diag(found.covariance.values, np.diag(np.square(formula.stds)))
+    covariance = Covariance((*found.covariance.names, *names), values)
+    return FoundModel(model, (*found.added, instance), [*found.estimates, *estimates], covariance)
 
 
 def _with_effects(

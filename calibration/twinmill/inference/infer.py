@@ -14,14 +14,16 @@ from twinmill.fitting.opening import Opened, open_measurements
 from twinmill.inference.always import always_of
 from twinmill.inference.answer import Answer, answer
 from twinmill.inference.discrepancy import SIZES
-from twinmill.inference.found_model import found_model
+from twinmill.inference.formula import Formula, formula_of
+from twinmill.inference.found_model import found_model, with_formula
+from twinmill.inference.keeping import is_own
 from twinmill.inference.kept import kept
 from twinmill.inference.planar import problem_of
 from twinmill.inference.prior import Always
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Numbers, table_of
-from twinmill.inference.unnamed import Unnamed, unnamed
+from twinmill.inference.unnamed import Unnamed, likeliest, unnamed
 from twinmill.model.model_file import ModelFile
 
 HELD, HELD_OWN = "infer: the logs hold", "infer: the model's own logs hold"
@@ -40,18 +42,21 @@ class Inference:
     Attributes:
         answer: verdict, effects and dependences with their probabilities.
         left: curves of the dependences that are sure, or of the likeliest.
+        formula: the likeliest one for the first of these; None where there is none.
         measurements: of the logs.
         always: what the model misses in its own logs, too; None where that is not known.
         before: these logs and the model as given.
         refitted: with the base's numbers where nothing is missing.
-        after: with the likeliest set of effects; as `refitted` if that is empty.
+        after: with the likeliest set of effects and a formula that holds; as `refitted` without.
         opened: these logs with the model of `refitted`.
         not_shown: effects that these logs cannot show by their kind, and why.
         strangers: sentences on own logs that are not the model's.
+        of_own_log: one of these logs told what the model always misses.
     """
 
     answer: Answer
     left: tuple[Unnamed, ...]
+    formula: Formula | None
     measurements: Sequence[Measurement]
     always: Always | None
     before: Comparison
@@ -60,6 +65,12 @@ class Inference:
     opened: Sequence[Opened]
     not_shown: dict[str, str]
     strangers: tuple[str, ...]
+    of_own_log: bool
+
+    @property
+    def finds(self) -> bool:
+        """True if the model can have what was found."""
+        return bool(self.answer.added) or bool(self.formula and self.formula.holds)
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --json`."""
@@ -67,6 +78,8 @@ class Inference:
         wander = self.always.sizes_of_wander().items() if self.always else ()
         told = self.answer.to_json()
         told["rest"]["curves"] = [one.to_json() for one in self.left]
+        if self.formula and self.formula.holds:
+            told["rest"] |= {"formula": self.formula.text, "proven": self.formula.to_json()}
         return {
             **told,
             "robot_id": self.measurements[0].track.robot_id,
@@ -100,7 +113,7 @@ def infer(
         measurements: of the logs, which are judged together.
         model_file: the model.
         own: of the logs that the model was fitted to, with that robot: what it misses there, too,
-            is no news. Without them its file may tell that.
+            is no news. Without them its file may tell that of other logs.
         progress: told in words what is being done.
 
     Raises:
@@ -108,18 +121,23 @@ def infer(
         ModelError: what the file keeps cannot be read.
     """
     runs = of_one_robot(measurements, HELD, ONE)
-    always = kept(model_file)
+    always = None if is_own(runs, model_file) else kept(model_file)
     if own:
         progress("what the model misses in its own log")
         robot = runs[0].track.robot_id
         always = always_of(of_one_robot(own, HELD_OWN, OWN, robot), model_file)
-    problem = problem_of(runs, model_file, always)
+    problem = problem_of(runs, model_file, always, sheet=is_own(runs, model_file))
     search = Search(problem, progress).run()
     found = answer(table_of(search))
+    left, own_set = unnamed(search, problem.motion, found), likeliest(search, found)
+    formula = None
+    sure = [word for word, p in found.depends_on.items() if p >= PRIORS.sure]
+    if own_set is not None and sure:
+        progress("formula")
+        formula = formula_of(search, own_set, problem.motion, sure)
     progress("scores")
-    left = unnamed(search, problem.motion, found)
     said = tuple(strangers(own, model_file))
-    return _scored(found, runs, model_file, left=left, always=always, said=said)
+    return _scored(found, runs, model_file, left=left, formula=formula, always=always, said=said)
 
 
 def _scored(
@@ -128,21 +146,28 @@ def _scored(
     model_file: ModelFile,
     *,
     left: tuple[Unnamed, ...],
+    formula: Formula | None,
     always: Always | None,
     said: tuple[str, ...],
 ) -> Inference:
     given = open_measurements(runs, model_file)
     there = always.effects if always else ()
 
-    def under(numbers: Numbers, effects: Sequence[str]) -> list[Opened]:
-        model = found_model(given[0].model, numbers, effects).model
+    def under(
+        numbers: Numbers, effects: Sequence[str], beside: Formula | None = None
+    ) -> list[Opened]:
+        own = found_model(given[0].model, numbers, effects)
+        model = (with_formula(own, beside) if beside else own).model
         return [o.aligned(model) for o in given]
 
     base = under(found.refit, there)
-    after = under(found.numbers, (*there, *found.added)) if found.added else base
+    kept = formula if formula and formula.holds else None
+    new = found.added or kept
+    after = under(found.numbers, (*there, *found.added), kept) if new else base
     return Inference(
         found,
         left,
+        formula,
         runs,
         always,
         before=comparison(model_file, given),
@@ -151,6 +176,7 @@ def _scored(
         opened=base,
         not_shown=not_shown(given),
         strangers=said,
+        of_own_log=is_own(runs, model_file),
     )
 
 

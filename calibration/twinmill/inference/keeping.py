@@ -3,6 +3,8 @@
 
 from collections.abc import Sequence
 
+import tomlkit
+
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.model.model_file import ModelFile
@@ -11,9 +13,43 @@ from twinmill.model.model_file import ModelFile
 def keeps_its_error(
     measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile
 ) -> bool:
-    """True if the file tells what its model always misses, and one robot's logs are judged.
+    """True if the file tells what its model always misses, and other logs of one robot are judged.
 
-    Several robots are compared with each other, and tables read, by the older engine alone.
+    Several robots are compared with each other, and tables read, by the older engine alone; in the
+    logs that told it, all that the model misses would be no news.
     """
+    return (
+        "always" in model_file.fit
+        and _of_one_robot(measurements)
+        and not is_own(measurements, model_file)
+    )
+
+
+def is_own(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> bool:
+    """True if one of these logs told what the model always misses."""
+    told = {*model_file.fit.get("always", {}).get("logs", ())}
+    return any(m.log_sha256 in told for m in measurements)
+
+
+def with_its_error(
+    model_file: ModelFile, measurements: Sequence[Measurement | SteadyTable]
+) -> ModelFile:
+    """A fitted model's file with what it misses in the logs that it was fitted to.
+
+    Itself where these are of several robots or tables.
+    """
+    if not _of_one_robot(measurements):
+        return model_file
+    from twinmill.inference.always import always_of  # slow to import, for who fits alone
+    from twinmill.inference.kept import as_table
+
+    logs = [m for m in measurements if isinstance(m, Measurement)]
+    document = tomlkit.parse(model_file.text)
+    found = as_table(always_of(logs, model_file), [m.log_sha256 for m in logs])
+    document.setdefault("fit", tomlkit.table())["always"] = found
+    return ModelFile.of(model_file.path, tomlkit.dumps(document))
+
+
+def _of_one_robot(measurements: Sequence[Measurement | SteadyTable]) -> bool:
     robots = {m.track.robot_id if isinstance(m, Measurement) else None for m in measurements}
-    return "always" in model_file.fit and len(robots) == 1 and None not in robots
+    return len(robots) == 1 and None not in robots

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lasting errors of a model in its own logs, kept in its file as [fit.always]."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -55,19 +55,20 @@ def kept(model_file: ModelFile) -> Always | None:
         ) from error
 
 
-def with_kept(model_file: ModelFile, always: Always, path: Path, command: str) -> ModelFile:
-    """A model's file with what it misses, as another file that is not written yet."""
+def with_kept(model_file: ModelFile, always: dict[str, Any], path: Path, command: str) -> ModelFile:
+    """A model's file with a table of what it misses, as another file that is not written yet."""
     document = tomlkit.parse(model_file.text)
     document["parent"] = model_file.hash
     document["created_by"] = command
-    document.setdefault("fit", tomlkit.table())["always"] = as_table(always)
+    document.setdefault("fit", tomlkit.table())["always"] = always
     return ModelFile.of(Path(path), tomlkit.dumps(document))
 
 
-def as_table(always: Always) -> dict[str, Any]:
-    """Table [fit.always] for a model's file."""
+def as_table(always: Always, logs: Sequence[str]) -> dict[str, Any]:
+    """Table [fit.always] for a model's file, from logs of these hashes."""
     low = np.linalg.cholesky(always.cov)
     return {
+        "logs": [*logs],
         "effects": list(always.effects),
         "kernels": dict(always.kernels),
         "wander": {name: _short(p) for name, p in always.wander.items()},

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that drive on a floor, ready for inference."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,17 +10,19 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.inference import candidates, discrepancy, moments
 from twinmill.inference.candidate import Candidate
+from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.duties import refined
 from twinmill.inference.hypothesis import Fitter, Guess, Hypothesis
 from twinmill.inference.noise import Course, Noise, Usual, first_noise
 from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
-from twinmill.inference.problem import Kinds, Problem, flexible_noise
+from twinmill.inference.problem import Kinds, Missed, Problem, flexible_noise
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     CLOCK,
     LAG,
+    WHERE_OR_WHEN,
     beginning_at_a_moment,
     catalogue,
     effect_names,
@@ -84,6 +86,11 @@ class PlanarProblem(Problem):
 
 def planar_kinds() -> Kinds:
     """Kinds of effects in the twin's catalogue."""
+    sized = [
+        name
+        for name, card in catalogue().items()
+        if not any(p["role"] in (*WHERE_OR_WHEN, "limit") for p in card["parameters"])
+    ]
     return Kinds(
         {
             name: TOLD_BY[card["needs"]]
@@ -92,6 +99,7 @@ def planar_kinds() -> Kinds:
         },
         frozenset(filter(is_local, catalogue())),
         frozenset(beginning_at_a_moment()),
+        frozenset(sized),
     )
 
 
@@ -145,36 +153,68 @@ def problem_of(
     found = discrepancy.kernels(motion)
     noise = _begin_noise(steps, motion, model_file, always)
     usual = always.noise if always is not None else Usual.about(noise)
+    kinds, missed = planar_kinds(), []
     if always is not None:
         prior = with_always(prior, always, found)
-        missed = _missed_by_formulas(steps, model, motion, always.effects)
-        prior = prior.with_columns(_seen(missed, noise))
+        changes = _changes(steps, model, always.effects)
+        missed = [
+            *(Missed(kinds.told_by[n], c) for n, c in zip(always.effects, changes, strict=True)),
+            *_missed_by_kernels(prior, always, found),
+        ]
+        prior = prior.with_columns(_seen(_missed_by_formulas(changes, motion), noise))
     base = Fitter(steps, noise, prior.columns).fit(Guess.of_base(model, prior))
     names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
     wander = {k: discrepancy.in_another_log(p) for k, p in always.wander.items()} if always else {}
     rough = PlanarProblem(
-        steps, prior, base, found, names, rate, usual, noise, wander, planar_kinds(), motion, always
+        steps,
+        prior,
+        base,
+        found,
+        names,
+        rate,
+        usual,
+        noise,
+        wander,
+        kinds,
+        tuple(missed),
+        motion,
+        always,
     )
     noise = flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)
     return replace(rough, noise=noise, base=base)
 
 
-def _missed_by_formulas(
-    steps: Steps, model: native.Model, motion: Motion, effects: Sequence[str]
-) -> np.ndarray:
-    """(K, W, 3) columns of what the formulas of a model's effects may miss, of usual size.
+def _changes(steps: Steps, model: native.Model, effects: Sequence[str]) -> np.ndarray:
+    """(E, W, 3) change of the prediction by each effect of a model."""
+    whole, found = steps.predicted(model), []
+    for name in effects:
+        less = model.copy()
+        less.remove_effect(effect_names(less).index(newest_instance(less, name)))
+        found.append(whole - steps.predicted(less))
+    return np.array(found).reshape(-1, *whole.shape)
+
+
+def _missed_by_kernels(prior: Prior, always: Always, found: list[Kernel]) -> Iterator[Missed]:
+    """What each kernel of the base's discrepancy changes, at the mean of its weights."""
+    sizes, first = dict(always.kernels), 0
+    for kernel in found:
+        if kernel.name in sizes:
+            at = slice(first, first + len(kernel.columns))
+            weights, first = prior.mean[len(prior.names) :][at], at.stop
+            yield Missed((kernel.depends_on,), np.tensordot(weights, prior.columns[at], 1))
+
+
+def _missed_by_formulas(changes: np.ndarray, motion: Motion) -> np.ndarray:
+    """(K, W, 3) columns of what the formulas of (E, W, 3) effects may miss, of usual size.
 
     An effect is off in one of its forms by a size that is exponentially distributed; of this
     mixture the normal distribution has the variance.
     """
-    whole = steps.predicted(model)
-    found = [np.zeros((0, *whole.shape))]
-    for name in effects:
-        less = model.copy()
-        less.remove_effect(effect_names(less).index(newest_instance(less, name)))
-        forms = discrepancy.forms_of(whole - steps.predicted(less), motion)
+    found = [changes[:0]]
+    for change in changes:
+        forms = discrepancy.forms_of(change, motion)
         found += [np.sqrt(2 / len(forms)) * PRIORS.form * f for f in forms]
     return np.concatenate(found)
 

@@ -67,7 +67,7 @@ def beliefs(table: Table) -> list[Belief]:
     """
     rows = [row for entry in table.entries for row in _rows(entry, table)]
     logs = np.array([row.log for row in rows])
-    nothing = np.array([set(r.entry.effects) == set(r.always) and not r.entry.words for r in rows])
+    nothing = np.array([set(r.entry.effects) == set(r.no_news) and not r.entry.words for r in rows])
     blocks = np.array([row.entry.blocks for row in rows])
     rest = logs - blocks.sum(axis=1)
     count = blocks.shape[1]
@@ -86,7 +86,7 @@ class _Row:
     entry: Entry
     log: float
     mimicked: tuple[str, ...] = ()
-    always: tuple[str, ...] = ()
+    no_news: tuple[str, ...] = ()
 
 
 def _belief(row: _Row, probability: float, table: Table) -> Belief:
@@ -104,7 +104,7 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
 
     again = steps and swells is None and TIME not in entry.words
     words = (TIME, *entry.words) if again else entry.words
-    real = once(n for n in entry.effects if n not in (*row.mimicked, *row.always))
+    real = once(n for n in entry.effects if n not in (*row.mimicked, *row.no_news))
     like = tuple(n for n in once(row.mimicked) if n not in real)
     return Belief(real, like, words, entry, probability)
 
@@ -117,8 +117,13 @@ def _rows(entry: Entry, table: Table) -> list[_Row]:
     other = len(entry.words) * each if entry.words else np.log(1 - PRIORS.outside)
     real = stale + other + log_prior_of_effects(count, len(table.candidates)) + entry.log_evidence
     rows = [_Row(entry, float(real))]
-    for names, log_odds in table.always.get(entry.effects, []):
-        rows.append(_Row(entry, float(real + log_odds), always=names))
+    for known in table.no_news.get(entry.effects, []):
+        others = [catalogue_name(n) for n in entry.effects if n not in known.formal]
+        kin = [_kinship(catalogue_name(n), known.words, table) for n in known.formal]
+        like = float(np.log(kin).sum())
+        rest = log_prior_of_effects(len(others), len(table.candidates))
+        log = float(stale + other + like + rest + entry.log_evidence + known.log_odds)
+        rows.append(_Row(entry, log, no_news=(*known.always, *known.formal)))
     for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
         if np.isfinite(log_evidence):
             # the first word is no further thing, but the part that the effects' forms do not take
@@ -131,9 +136,14 @@ def _rows(entry: Entry, table: Table) -> list[_Row]:
 
 def _log_likeness(effect: str, words: tuple[str, ...], table: Table) -> float:
     """Log probability that an unnamed thing with these dependences looks like an effect."""
+    kin = _kinship(effect, words, table)
+    return float(np.log(PRIORS.alike * kin + (1 - PRIORS.alike) / len(table.candidates)))
+
+
+def _kinship(effect: str, words: tuple[str, ...], table: Table) -> float:
+    """Probability of an effect among those that depend on one of these; 0 if on none."""
 
     def of_kind(word: str) -> list[str]:
         return [n for n in table.candidates if word in table.kinds.told_by[n]]
 
-    kin = max((1 / len(of_kind(w)) for w in words if effect in of_kind(w)), default=0.0)
-    return float(np.log(PRIORS.alike * kin + (1 - PRIORS.alike) / len(table.candidates)))
+    return max((1 / len(of_kind(w)) for w in words if effect in of_kind(w)), default=0.0)

@@ -7,7 +7,7 @@ floor, `twinmill.joints.problem` those that MuJoCo can load.
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Protocol, SupportsIndex
 
@@ -50,11 +50,26 @@ class Kinds:
         told_by: dependences for which each effect may be mistaken.
         local: effects of a place or a while, which may be there more than once.
         at_moments: effects that act from a moment on.
+        sized: effects that act everywhere and have sizes alone.
     """
 
     told_by: Mapping[str, tuple[str, ...]]
     local: frozenset[str] = frozenset()
     at_moments: frozenset[str] = frozenset()
+    sized: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Missed:
+    """Part of a model whose formula is off by some of its size.
+
+    Attributes:
+        words: dependences for which it may be mistaken.
+        change: (W, C) of the prediction by it.
+    """
+
+    words: tuple[str, ...]
+    change: np.ndarray = field(repr=False)
 
 
 @dataclass(frozen=True)
@@ -109,6 +124,7 @@ class Problem(ABC):
         noise: what all flexible terms together leave.
         wander: kernels of time and place that are no news, and the probability of each size.
         kinds: of effects.
+        missed: what the base always misses, as far as known.
     """
 
     steps: Steps
@@ -121,6 +137,7 @@ class Problem(ABC):
     noise: Noise
     wander: dict[str, np.ndarray]
     kinds: Kinds
+    missed: tuple[Missed, ...]
 
     @abstractmethod
     def candidate(self, name: str, model: Any) -> Candidate:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of evidence: sets of effects, each alone and with nameless dependences."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from twinmill.inference import moments
+from twinmill.inference import formal, moments
 from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP, TIME
 from twinmill.inference.evidence import Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
@@ -82,6 +82,23 @@ class Numbers:
 
 
 @dataclass(frozen=True)
+class NoNews:
+    """Some effects of a set are none of their own.
+
+    Attributes:
+        always: those that the base always lacked.
+        formal: those that an error of the others' formulas looks like, or of what the base lacks.
+        words: dependences that these share with those.
+        log_odds: log evidence over that of effects that are new, the base's own log taken in.
+    """
+
+    always: tuple[str, ...]
+    formal: tuple[str, ...]
+    words: tuple[str, ...]
+    log_odds: float
+
+
+@dataclass(frozen=True)
 class Table:
     """All that an answer is made of.
 
@@ -92,8 +109,7 @@ class Table:
         excess: squares that the base leaves over those of noise.
         candidates: effects that compete.
         words: dependences that compete.
-        always: of sets, effects of theirs that the base may always have lacked, with the log
-            evidence of that over their being new, its own log taken in.
+        no_news: of sets, how some of their effects may be none of their own.
         swells: of sets in which several effects act from moments on, the kind of the one thing
             that they are steps of, where what they change together comes and goes once.
         kinds: of effects.
@@ -105,7 +121,7 @@ class Table:
     excess: float
     candidates: tuple[str, ...]
     words: tuple[str, ...]
-    always: dict[tuple[str, ...], list[tuple[tuple[str, ...], float]]]
+    no_news: dict[tuple[str, ...], list[NoNews]]
     swells: dict[tuple[str, ...], str]
     kinds: Kinds
 
@@ -146,7 +162,7 @@ def table_of(search: Search) -> Table:
             each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
             takes.setdefault(names, each)
             squares = np.array([each[index].sum() for index in within])
-            own = _Comparison(p, search.words, h, forms, squares, view)
+            own = _Comparison(p, search.words, h, changes, forms, squares, view)
             of_noise = own.entries(names in whole)
             entries += of_noise
             if view is views[0]:
@@ -163,7 +179,7 @@ def table_of(search: Search) -> Table:
         max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
         tuple(p.names),
         search.words,
-        {names: own.always() for names, (_, own) in best.items()},
+        {names: own.no_news() for names, (_, own) in best.items()},
         {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
         p.kinds,
     )
@@ -254,6 +270,7 @@ class _Comparison:
     problem: Problem
     words: tuple[str, ...]
     h: Hypothesis
+    changes: np.ndarray  # (E, W, C) of the prediction by each effect
     forms: list[tuple[np.ndarray, ...]]  # what the formula of each effect may miss
     squares: np.ndarray  # (M,) that each of `subsets` takes
     view: View
@@ -321,23 +338,64 @@ class _Comparison:
             out[np.ix_(named, ~named)] = np.linalg.solve(x @ x.T + known, x @ beside.T)
         return out
 
-    def always(self) -> list[tuple[tuple[str, ...], float]]:
-        """Log odds of each of `subsets` that it always was there, against its being new.
+    def no_news(self) -> list[NoNews]:
+        """Effects that the base always lacked, or that an error of the others' formulas may be."""
+        found, sized = [], self.problem.kinds.sized
+        for always, h, linear, log_odds in self._always():
+            found.append(NoNews(always, (), (), log_odds))
+            for names in subsets(tuple(n for n in self.h.effects if n not in always)):
+                kin = {n: self._kin(n, names) for n in names if catalogue_name(n) in sized}
+                if len(kin) == len(names) and all(kin.values()):
+                    sizes = {n: sum(size**2 for _, size in own) ** 0.5 for n, own in kin.items()}
+                    own = formal.log_odds(h, linear, sizes, norms=self._norms)
+                    own -= len(names) * float(np.log(len(self.forms[0]) + 1))
+                    words = tuple(word for each in kin.values() for word, _ in each)
+                    found.append(NoNews(always, names, words, log_odds + own))
+        return [known for known in found if known.always or known.formal]
+
+    @cached_property
+    def _norms(self) -> np.ndarray:
+        """(N,) of the slopes of all numbers, as the noise weighs them; 0 of a discrepancy's."""
+        norms = np.zeros(len(self.h.labels))
+        norms[self.h.named] = np.linalg.norm(self._rows[: self.h.named.sum()], axis=1)
+        return norms
+
+    def _kin(self, name: str, without: tuple[str, ...]) -> list[tuple[str, float]]:
+        """Word and white norm of what depends on the same as an effect, and is of a formula."""
+        words = self.problem.kinds.told_by[catalogue_name(name)]
+        return [
+            (shared[0], size)
+            for part, own_words, size in self._of_formulas
+            if part not in without and (shared := [w for w in own_words if w in words]) and size
+        ]
+
+    @cached_property
+    def _of_formulas(self) -> list[tuple[str | None, tuple[str, ...], float]]:
+        """Name, dependences and white norm of each effect, and of what the base always misses."""
+        told_by, whiten = self.problem.kinds.told_by, self.view.fitter.whiten
+        own = zip(self.h.effects, self.changes, strict=True)
+        parts = [
+            *((n, told_by[catalogue_name(n)], change) for n, change in own),
+            *((None, missed.words, missed.change) for missed in self.problem.missed),
+        ]
+        return [(n, words, float(np.linalg.norm(whiten(change)))) for n, words, change in parts]
+
+    def _always(self) -> Iterator[tuple[tuple[str, ...], Hypothesis, Linear, float]]:
+        """Each of `subsets`, and none: with these always there, and log odds against new ones.
 
         What may decide is fitted anew: numbers that the base's own log tells can be far from
         these, where the model is another linear one.
         """
-        found, fitter = [], self.view.fitter
-        new = self.h.log_evidence(self._known)
+        fitter, new = self.view.fitter, self.h.log_evidence(self._known)
+        yield (), self.h, self._known, 0.0
         for names in subsets(self.h.effects):
             if there := self.problem.always_there(self.h, names):
                 told, log_factor = there
                 log_odds = told.log_evidence(told.linear(fitter)) + log_factor - new
                 if log_odds > -BEYOND:
                     told = fitter.fit(told)
-                    log_odds = told.log_evidence(told.linear(fitter)) + log_factor - new
-                found.append((names, log_odds))
-        return found
+                    linear = told.linear(fitter)
+                    yield names, told, linear, told.log_evidence(linear) + log_factor - new
 
     @cached_property
     def _usual_and_news(self) -> tuple[_Beside, _Beside]:

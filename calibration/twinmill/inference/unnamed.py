@@ -14,7 +14,7 @@ import numpy as np
 
 from twinmill.inference.answer import Answer
 from twinmill.inference.discrepancy import CHANCE, SIZES, TIME, Kernel
-from twinmill.inference.search import Search
+from twinmill.inference.search import Evidence, Search
 from twinmill.inference.steps import Motion
 from twinmill.model.parameters import catalogue_name
 
@@ -52,6 +52,13 @@ class Unnamed:
         return {"form": self.form} | {name: getattr(self, name).tolist() for name in rows}
 
 
+def likeliest(search: Search, found: Answer) -> Evidence | None:
+    """Evidence of the likeliest set of the effects that were found; None if that was not fitted."""
+    wanted = {f.effect for f in found.findings}
+    sets = [s for s in search.likely() if {*map(catalogue_name, s)} == wanted]
+    return search.fitted[sets[0]] if sets else None
+
+
 def unnamed(search: Search, motion: Motion, found: Answer) -> tuple[Unnamed, ...]:
     """Each dependence that is sure, or else the likeliest, all in one model.
 
@@ -62,11 +69,9 @@ def unnamed(search: Search, motion: Motion, found: Answer) -> tuple[Unnamed, ...
         motion: of its logs.
         found: the answer.
     """
-    kernels, wanted = search.problem.kernels, {f.effect for f in found.findings}
-    sets = [s for s in search.likely() if {*map(catalogue_name, s)} == wanted]
-    if not sets:
+    kernels, own = search.problem.kernels, likeliest(search, found)
+    if own is None:
         return ()
-    own = search.fitted[sets[0]]
     linear, told = own.linear, []
     for word in found.sure_words:
         forms = [f for f, kernel in enumerate(kernels) if kernel.depends_on == word]

@@ -117,6 +117,7 @@ def problem_of(
         noise,
         {},
         kinds,
+        (),
         plant,
         effects,
         model.catalogue,

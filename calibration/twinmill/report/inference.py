@@ -93,7 +93,7 @@ def section(
         for which in ("before", "refitted", "after")
     )
     scores = [("as given", before.score), ("base refitted", refitted.score)]
-    if any(result.answer.added for result in results):
+    if any(result.finds for result in results):
         scores.append(("with what was found", after.score))
     errors = [("as given", before.shown), ("with what was found", beside(before, after))]
     one = results[0] if len(results) == 1 else None
@@ -113,7 +113,7 @@ def section(
         next_step=next_run(one.answer) if one else "",
         commands=[(f"{why}:", command) for why, command in commands],
         notes=[
-            *(_known(one) if one else [ONE_BY_ONE]),
+            *([*_formula(one), *_known(one)] if one else [ONE_BY_ONE]),
             *([_new(written)] if written else []),
         ],
         warnings=[*results[0].strangers, *before.warnings],
@@ -202,14 +202,14 @@ def terminal(result: Inference) -> RenderableType:
         f"score {number(result.before.score)} as given, "
         f"{number(result.refitted.score)} after a refit of the base"
     )
-    if result.answer.added:
+    if result.finds:
         scores += f", {number(result.after.score)} with what was found"
     return Group(
         Text(sentence(result.answer), show.STYLES[VERDICTS[result.answer.verdict]]),
         Text(scores),
         Text(),
         *map(show.table, _tables(result)),
-        *map(Text, _known(result)),
+        *map(Text, (*_formula(result), *_known(result))),
         *([Text(step)] if (step := next_run(result.answer)) else []),
         *show.warned([*result.strangers, *result.before.warnings]),
     )
@@ -234,9 +234,24 @@ def _unseen(not_shown: dict[str, str]) -> Table:
     return Table("Not shown by these logs", ["effects", "why"], rows, words=(0, 1))
 
 
+def _formula(result: Inference) -> list[str]:
+    """The formula of what has no name, in a sentence; none where there is none."""
+    found = result.formula
+    if found is None or not found.holds:
+        return []
+    spans = listed([f"{n['name']} {number(n['low'])} to {number(n['high'])}" for n in found.spans])
+    run = ", in this log alone" if found.of_one_run else ""
+    return [
+        f"What depends on {found.word} follows a formula ({percent(found.probability)}){run}: "
+        f"{found.text} (95 %: {spans})."
+    ]
+
+
 def _known(result: Inference) -> list[str]:
     """Errors that are not new, as far as they are known, in sentences."""
     always = result.always
+    if always is None and result.of_own_log:
+        return ["The model was fitted to this log: what it has always missed is told as well."]
     if always is None:
         return [
             "The model's error on the log that it was fitted to is not known, so it may be "

@@ -21,7 +21,7 @@ from twinmill.fitting.opening import open_measurements
 from twinmill.inference.always import always_of
 from twinmill.inference.better import better
 from twinmill.inference.infer import infer, infer_robots, strangers
-from twinmill.inference.kept import kept, with_kept
+from twinmill.inference.kept import as_table, kept, with_kept
 from twinmill.inference.planar import problem_of
 from twinmill.inference.screening import nearby, screened
 from twinmill.inference.steps import Steps, StepsOfLog
@@ -121,6 +121,13 @@ def test_a_gain_that_swings_with_the_heading_is_drawn_as_it_is(
     off = curve.gain[known, 2] - 0.15 * np.sin(curve.at[known, 0])
     assert np.abs(off).max() < 0.05
     assert np.sqrt(np.mean(off**2)) < 0.15 / 6
+    assert found.formula.holds and not found.formula.of_one_run
+    told = {**found.formula.texts, **{n["name"]: n for n in found.formula.spans}}
+    assert told["adds_to"] == "omega_radps"
+    assert told["formula"] == "p0*cos(theta)*omega + p1*sin(theta)*omega"
+    assert told["p1"]["value"] == pytest.approx(0.15, abs=0.01)
+    assert told["p0"]["value"] == pytest.approx(0.0, abs=0.01)
+    assert found.after.score < 1.3 < found.refitted.score
 
 
 def test_a_patch_whose_centre_was_never_driven_to_is_found(
@@ -261,7 +268,7 @@ def test_what_the_base_misses_in_its_own_log_is_no_news(
     news, known = infer([later], base), infer([later], base, [before])
     assert "yaw_lever" in known.always.effects  # its equation is the robot's
     path = tmp_path_factory.mktemp("kept") / "known.toml"
-    with_kept(base, known.always, path, "").write()
+    with_kept(base, as_table(known.always, ["of the own log"]), path, "").write()
     from_file = infer([later], ModelFile.load(str(path)))
     assert from_file.always.effects == known.always.effects
     assert from_file.answer.nothing == pytest.approx(known.answer.nothing, abs=0.01)

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag, toeplitz
 from scipy.special import logsumexp
 from scipy.stats import expon, multivariate_normal
 
-from twinmill.inference import hidden, moments
+from twinmill.inference import formal, hidden, moments
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import (
     OF_FORM,
@@ -33,7 +33,7 @@ from twinmill.inference.posterior import beliefs
 from twinmill.inference.screening import _products, _products_of_whiles, gains_of_pairs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
-from twinmill.inference.table import Entry, Table, swells_once
+from twinmill.inference.table import Entry, NoNews, Table, swells_once
 from twinmill.model.parameters import Parameter
 
 STEP_S = 0.1
@@ -342,6 +342,50 @@ def test_an_unnamed_thing_looks_rather_like_an_effect_that_depends_on_the_same(e
                        (lambda b: effect in b.effects, lambda b: effect in b.mimicked))  # fmt: skip
         alike = PRIORS.alike * kin + (1 - PRIORS.alike) / 10
         assert mimic / real == pytest.approx(density * alike / (PRIORS.effects / 10))
+
+
+def test_an_error_of_formulas_has_the_evidence_of_its_own_prior():
+    """Densities of all data at once, by SciPy: sizes are shares of what the others change."""
+    random = np.random.default_rng(5)
+    x, size = random.normal(size=(3, 40)), 2.0
+    y = x.T @ [0.4, -0.3, 0.8] + random.normal(size=40)
+    prior = np.array([0.5, 0.7, 1.1])  # standard deviations; the last two are of the effect
+    h = SimpleNamespace(
+        labels=("base.forward_gain", "lateral_slip.a", "lateral_slip.b"),
+        mean=np.zeros(3), low=np.full(3, -np.inf), one_sided=np.zeros(3, bool),
+        cov=np.diag(prior**2), instance=lambda name: name,
+    )  # fmt: skip
+    linear = Linear.of(y, prior[:, None] * x)
+    h.posterior = lambda own: (prior * own.mean, prior[:, None] * own.covariance * prior)
+
+    def log_density(std):
+        cov = np.eye(40) + (x.T * std**2) @ x
+        return multivariate_normal(np.zeros(40), cov).logpdf(y)
+
+    usual = np.linalg.norm(x[1:], axis=1) * np.sqrt(2)
+    each = [
+        log_density(np.r_[prior[0], (prior[1:] ** -2 + (usual / (s * size)) ** 2) ** -0.5])
+        for s in SIZES
+    ]
+    expected = logsumexp(each, b=OF_FORM) - log_density(prior)
+    found = formal.log_odds(h, linear, {"lateral_slip": size}, norms=np.linalg.norm(x, axis=1))
+    assert found == pytest.approx(expected, abs=1e-8)
+
+
+def test_an_effect_that_an_error_of_formulas_may_be_is_less_probable():
+    """Odds by the prior that docs/inference.md states: it is no further thing."""
+    both, log_odds = ("battery_sag", "heat_gain"), -1.5
+    entries = [entry((), (), -50), entry(both, (), 0)]
+    plain = table(entries)
+    known = replace(plain, no_news={both: [NoNews((), ("heat_gain",), ("time",), log_odds)]})
+    alone, two = (
+        sum(b.probability for b in beliefs(known) if set(b.effects) == names)
+        for names in ({"battery_sag"}, set(both))
+    )
+    assert alone / two == pytest.approx(  # one of four that depend on time, as the other does
+        np.exp(log_odds) / 4 / (PRIORS.effects / 10 * PRIORS.further)
+    )
+    assert not any(len(b.effects) == 1 for b in beliefs(plain))
 
 
 def test_what_a_formula_misses_changes_its_course_and_not_its_size():

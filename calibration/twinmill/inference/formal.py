@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors of formulas that look like effects.
+
+Each effect that a model has or that its base always misses is of a formula that is off by some of
+its size. Where that error looks like a further effect of the catalogue, this is no news. Its size
+has then the prior of such an error, not that of its card: Bayes factors of both priors, in the
+model that is linear about the fit.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from twinmill.inference.discrepancy import OF_FORM, SIZES
+from twinmill.inference.evidence import Linear
+from twinmill.inference.hypothesis import Hypothesis
+from twinmill.model.parameters import instance_of
+
+
+def log_odds(
+    h: Hypothesis, linear: Linear, sizes: Mapping[str, float], *, norms: np.ndarray
+) -> float:
+    """Log evidence of some effects as errors of formulas, over that of effects of their own.
+
+    Args:
+        h: with these effects, which act everywhere and have sizes alone.
+        linear: its linear model.
+        sizes: of each of them, norm of what is of formulas that are off, as the noise weighs it.
+        norms: (N,) of the slopes of all numbers, weighed likewise.
+    """
+    of = {h.instance(name): size for name, size in sizes.items()}
+    at = [k for k, label in enumerate(h.labels) if instance_of(label) in of]
+    each_of = [instance_of(h.labels[k]) for k in at]
+    size = np.array([of[name] / np.sqrt(each_of.count(name)) for name in each_of])
+    mean, cov = h.posterior(linear)
+    own = h.cov[np.ix_(at, at)]
+    inverse = np.linalg.inv(cov[np.ix_(at, at)])
+    precision, push = inverse - np.linalg.inv(own), inverse @ (mean - h.mean)[at]
+    usual = norms[at] / size
+    card = 1 / np.diag(own)  # is as wide as the prior may be: of what the log does not show
+    each = [_log_evidence(precision, push, np.diag(1 / (card + (usual / s) ** 2))) for s in SIZES]
+    z = ((mean - h.low) / np.sqrt(np.diag(cov)))[at]
+    signs = float(np.sum((np.log(2) + log_ndtr(z))[h.one_sided[at]]))
+    of_form = float(logsumexp(np.array(each) + np.log(OF_FORM)))
+    return of_form - _log_evidence(precision, push, own) - signs
+
+
+def _log_evidence(precision: np.ndarray, push: np.ndarray, prior: np.ndarray) -> float:
+    """Log evidence under N(0, prior), of a likelihood with this precision and push at zero."""
+    grown = np.eye(len(push)) + prior @ precision
+    return 0.5 * float(push @ np.linalg.solve(grown, prior @ push) - np.linalg.slogdet(grown)[1])
