@@ -811,7 +811,8 @@ class Model(Shown):
                 `python_effect`.
             log: data of the fit.
             robot: number of the robot that alone has it; by default all have.
-            texts: adds_to, formula, state_rate and second_rate of the effect `equation`.
+            texts: adds_to, formula, state_rate, second_rate, called and numbers of the effect
+                `equation`.
 
         Returns:
             Scores without and with the effect, and the new model.

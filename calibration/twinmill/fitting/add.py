@@ -59,6 +59,7 @@ from twinmill.model.parameters import (
     effect_parameters,
     is_of_camera,
     late_part,
+    numbers_of,
     stated_names,
     with_role,
 )
@@ -365,8 +366,8 @@ def with_effect(
     fresh = effect_parameters(richer, name, fresh=True)
     if text and not fresh:
         raise ValueError(
-            f"formula '{text}': names none of p0 to p3, so nothing of it can be fitted; write one "
-            f"before it, as in 'p0*({text})'."
+            f"formula '{text}': names none of {texts.get('numbers') or 'p0 to p3'}, so nothing of "
+            f"it can be fitted; write one before it, as in '{numbers_of(texts)[0]}*({text})'."
         )
     return richer, name, fresh
 

@@ -11,7 +11,7 @@ import twinmill_native as native
 from twinmill.arguments import option
 from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import effect_names, words
+from twinmill.model.parameters import effect_names, words_of
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.behaviors import parse_table
 from twinmill.swarm.request import PLANTS, Request
@@ -71,7 +71,7 @@ def _unnamed(model: native.Model) -> dict[str, str]:
         for row in model.values()
         if texts
         and row["name"].rpartition(".")[0] == name
-        and row["name"].rpartition(".")[2] not in words(" ".join(texts.values()))
+        and row["name"].rpartition(".")[2] not in words_of(texts)
     }
 
 
