@@ -25,7 +25,7 @@ def test_all_blocks_of_the_page_run(tmp_path, monkeypatch):
     for block in blocks:
         exec(block, names)
     plt.close(names["figure"])
-    assert "base.yaw_gain" not in names["fit"].params
+    assert "base.yaw_gain" not in names["fit"].stderr.dropna()
     # As examples/make_recording.py hides it.
     table = names["table"]
     assert table.index[0] == "with coasting" and table.loc["as fitted", "p_chance"] < 0.05

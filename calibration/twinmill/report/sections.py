@@ -64,6 +64,7 @@ def added_section(result: AddResult) -> Section:
 def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Section:
     """Section that pages of fitted models share; `more` tables stand at the end."""
     before, after = beside(result.after, result.before), result.after.shown
+    held = result.held if isinstance(result, FitResult) else ()
     return Section(
         title,
         [_score("before", result.before.score), _score("after", result.after.score)],
@@ -71,7 +72,7 @@ def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Se
         comparisons.facts(result.after),
         robot_pictures(result.after, [("before", before), ("after", after)]),
         [
-            tables.parameters(result.parameters),
+            tables.parameters(result.parameters, held),
             *tables.robots(result.after, result.before),
             *more,
         ],

@@ -49,7 +49,7 @@ def fit(result: FitResult, not_written: str = "") -> RenderableType:
         _change("score", result.before.score, result.after.score),
         score_line("", result.after, number_too=False),
         Text(),
-        table(tables.parameters(result.parameters)),
+        table(tables.parameters(result.parameters, result.held)),
         *(table(t) for t in tables.robots(result.after, result.before)),
         *warned([*result.notes, *result.after.warnings]),
         _written(result.path, not_written),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables that a person reads, as plain data: the terminal and the HTML report show the same."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Literal
@@ -10,6 +11,7 @@ import numpy as np
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
+from twinmill.fitting.fit import Held
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
 from twinmill.predict.noise import LEAST, Noise
 from twinmill.predict.regimes import HORIZON, Regime
@@ -257,8 +259,8 @@ def where(robot: RobotComparison) -> Table:
     )
 
 
-def parameters(estimates: list[ParameterEstimate]) -> Table:
-    """Fitted quantities with their uncertainty."""
+def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) -> Table:
+    """Fitted quantities with their uncertainty, then those that were held."""
     rows = []
     for e in estimates:
         told = e.seen or e.together
@@ -278,6 +280,10 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
                 Cell(remark, "warn" if doubt else "dim"),
             ]
         )
+    for h in held:
+        remark = "; ".join(words for words in (h.words, "held") if words)
+        cells = (h.name, number(h.value), "-", "" if h.unit == "1" else h.unit, remark)
+        rows.append([Cell(text, "dim") for text in cells])
     together = any(e.together for e in estimates)
     return Table(
         "Fitted quantities",
