@@ -1101,7 +1101,7 @@ class Fit(Reported):
 
         Returns:
             log, robot_id, t_s (start of the prediction), horizon_s, channel, unit, residual and
-            floor (the noise floor; both in the unit).
+            floor (the noise floor, one standard deviation; both in the unit).
 
         Examples:
             >>> fitted.residuals()["channel"].unique().tolist()

@@ -49,9 +49,9 @@ def error_growth(models: Sequence[tuple[str, RobotComparison]]) -> Figure:
     return Figure(
         draw(2.0 * len(shown_channels), paint, nrows=len(shown_channels), sharex=True),
         "Errors over the horizon",
-        "Errors grow with the horizon. Inside the green band an error cannot be distinguished "
-        "from noise: a line along its edge is as good as this log can show. The scale is "
-        "logarithmic.",
+        "RMS errors grow with the horizon. Inside the green band an error cannot be distinguished "
+        "from noise: its edge is the noise floor, one standard deviation of what noise alone "
+        "causes, and a line along it is as good as this log can show. The scale is logarithmic.",
     )
 
 

@@ -229,7 +229,8 @@ def errors(robot: RobotComparison) -> Table:
         "Prediction errors",
         columns,
         rows,
-        "RMS error of predictions that start from measured poses; ratio: error over noise floor.",
+        "RMS error of predictions that start from measured poses; noise floor: one standard "
+        "deviation of what noise alone causes; ratio: error over noise floor.",
     )
 
 
@@ -254,7 +255,8 @@ def where(robot: RobotComparison) -> Table:
         "Where it fails",
         ["by", "while", "error over noise floor", "share of error"],
         rows,
-        f"Horizon of {HORIZONS_S[HORIZON]:g} s; the {WORST} worst of each kind.",
+        f"Horizon of {HORIZONS_S[HORIZON]:g} s; the {WORST} worst of each kind. Each kind sorts "
+        "the same squared error anew: its shares, with those not listed, are 100 % at most.",
         (0, 1),
     )
 
@@ -282,7 +284,7 @@ def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) ->
         )
     for h in held:
         remark = "; ".join(words for words in (h.words, "held") if words)
-        cells = (h.name, number(h.value), "-", "" if h.unit == "1" else h.unit, remark)
+        cells = (h.name, number(h.value), "-", of_unit(h.unit), remark)
         rows.append([Cell(text, "dim") for text in cells])
     together = any(e.together for e in estimates)
     return Table(
@@ -292,6 +294,11 @@ def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) ->
         TOGETHER if together else "",
         words=(0, 3, 4),
     )
+
+
+def of_unit(unit: str) -> str:
+    """A unit for people; nothing for a pure number."""
+    return "" if unit == "1" else unit.replace("^2", "²")
 
 
 def estimate(e: ParameterEstimate) -> str:
