@@ -197,14 +197,14 @@ def _shares(hunt: Hunt, found: list[Entry], rows: np.ndarray, start_m2: float) -
 
 
 def offer(found: list[Entry], in_mujoco: bool) -> list[Entry]:
-    """Names those that hold; by kind, the surest first.
+    """Behaviours that came out again in repeated runs, each with a name: `milling_1`.
 
     Args:
-        found: all entries.
-        in_mujoco: whether only what ran there is offered.
+        found: all entries of the archive; the `name` of those that are offered is set.
+        in_mujoco: take only those that were repeated in MuJoCo, too.
 
     Returns:
-        Them alone. What does not hold keeps no name.
+        Those that are offered, by kind of behaviour and within a kind the most reliable first.
     """
     order = list(KIND_COLORS)
     ran = [entry for entry in found if not in_mujoco or entry.mujoco is not None]
