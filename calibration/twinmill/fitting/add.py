@@ -115,6 +115,21 @@ class AddResult:
         return isinstance(self.after, DetectionComparison)
 
     @property
+    def of_motion(self) -> tuple[Comparison, Comparison] | None:
+        """Comparisons of motion before and after; None of an effect of the camera."""
+        before, after = self.before, self.after
+        if isinstance(before, DetectionComparison) or isinstance(after, DetectionComparison):
+            return None
+        return before, after
+
+    @property
+    def of_detections(self) -> DetectionComparison:
+        """Comparison of detections after; an effect on motion has none."""
+        if not isinstance(self.after, DetectionComparison):
+            raise TypeError(f"{self.effect}: acts on the motion, and is judged by poses.")
+        return self.after
+
+    @property
     def label(self) -> str:
         """Name of the added effect and of its robot."""
         return self.effect if self.robot_id is None else f"{self.effect} of R{self.robot_id:02d}"

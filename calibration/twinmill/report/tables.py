@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -83,10 +83,14 @@ def tone(score: float) -> Tone:
     return "good" if score <= GOOD else "warn" if score <= MISSING else "bad"
 
 
-def facts(comparison: Comparison) -> list[tuple[str, str]]:
-    """Log and model of a comparison: label and text."""
-    robot = comparison.shown
-    measurement, noise = robot.measurement, robot.modelled.noise
+def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str]]:
+    """Log and model of a comparison: label and text.
+
+    Args:
+        comparison: of one robot or more.
+        robot: the one that is shown.
+    """
+    measurement, noise = robot.measurement, robot.modelled.known_noise
     track = measurement.track
     others = len(comparison.robots) - 1
     why = "which the model misses most" if comparison.about is None else "which it was added to"
@@ -356,7 +360,7 @@ def steps(scores: list[tuple[str, float]]) -> Table:
     )
 
 
-def catalogue(entries: list[dict]) -> Table:
+def catalogue(entries: list[dict[str, Any]]) -> Table:
     """The effects in the order of the signal path."""
     order = ("duty", "wheel", "ground", "world", "observe", "view", "decide")
     ranked = sorted(entries, key=lambda e: order.index(e["stage"]))
@@ -370,7 +374,7 @@ def catalogue(entries: list[dict]) -> Table:
     )
 
 
-def effect_parameters(entry: dict) -> Table:
+def effect_parameters(entry: dict[str, Any]) -> Table:
     """Parameters of an effect's card: unit, default, bounds and meaning."""
     rows = [
         [
