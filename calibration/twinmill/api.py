@@ -813,7 +813,8 @@ class Model(Shown):
                 `python_effect`.
             log: data of the fit.
             robot: number of the robot that alone has it; by default all have.
-            texts: adds_to, formula, state_rate and second_rate of the effect `equation`.
+            texts: adds_to, formula, state_rate, second_rate, called and numbers of the effect
+                `equation`.
 
         Returns:
             Scores without and with the effect, and the new model.
@@ -1037,29 +1038,34 @@ class Fit(Reported):
 
     @property
     def params(self) -> pd.Series:
-        """Estimates by name.
+        """Values by name: estimates, then what was held, whose standard error is NaN.
 
         Examples:
             >>> bool(fitted.params["base.motor_lag_s"] > 0)
             True
         """
-        return pd.Series({e.name: e.value for e in self._result.parameters}, name="value")
+        every = (*self._result.parameters, *self._result.held)
+        return pd.Series({p.name: p.value for p in every}, name="value")
 
     @property
     def stderr(self) -> pd.Series:
         """Standard errors by name: half a 95 % interval over 1.96.
 
         From the jackknife over blocks of 8 s, widened by Student's t where blocks are few, and by
-        the influence of the priors. All tables, files and intervals have these.
+        the influence of the priors. All tables, files and intervals have these. NaN for what was
+        held: nothing was estimated.
 
         Examples:
             >>> bool((fitted.stderr**2 - np.diag(fitted.covariance())).abs().max() < 1e-12)
             True
         """
-        return pd.Series({e.name: e.std for e in self._result.parameters}, name="stderr")
+        found = {e.name: e.std for e in self._result.parameters}
+        return pd.Series(
+            {name: found.get(name, np.nan) for name in self.params.index}, name="stderr"
+        )
 
     def covariance(self) -> pd.DataFrame:
-        """Covariance of the estimates.
+        """Covariance of the estimates, without what was held.
 
         Returns:
             A square table, in products of the units; the diagonal has `stderr` squared.
@@ -1097,7 +1103,7 @@ class Fit(Reported):
 
         Returns:
             log, robot_id, t_s (start of the prediction), horizon_s, channel, unit, residual and
-            floor (the noise floor; both in the unit).
+            floor (the noise floor, one standard deviation; both in the unit).
 
         Examples:
             >>> fitted.residuals()["channel"].unique().tolist()
@@ -1115,7 +1121,9 @@ class Fit(Reported):
         """
         rows = pd.DataFrame({"value": self.params, "stderr": self.stderr})
         rows = rows.join(self.conf_int().set_axis(["[0.025", "0.975]"], axis=1))
-        rows["unit"] = [e.unit for e in self._result.parameters]
+        rows["unit"] = [p.unit for p in (*self._result.parameters, *self._result.held)]
+        if self._result.held:
+            rows[""] = ["(held)" if h else "" for h in self.table()["held"]]
         head = {
             "model": self.model.name,
             "score": f"{self.before.score:.3g} -> {self.score:.3g}",
@@ -1125,21 +1133,26 @@ class Fit(Reported):
             "converged": "yes" if self.converged else "no",
         }
         lines = [f"{name:20}{value}" for name, value in head.items()]
-        return "\n".join([*lines, "", rows.to_string(float_format="{:.4g}".format)])
+        told = rows.to_string(float_format="{:.4g}".format, na_rep="")
+        return "\n".join([*lines, "", *(line.rstrip() for line in told.splitlines())])
 
     def table(self) -> pd.DataFrame:
-        """Fitted quantities.
+        """Fitted quantities, then those that were held.
 
         Returns:
-            name, value, std (half a 95 % interval over 1.96), unit, at_bound, seen (false where
-            the log does not determine the quantity, only its prior), together (determined in
-            combination with others, not alone).
+            name, value, std (half a 95 % interval over 1.96; NaN where held), unit, at_bound, seen
+            (false where the log does not determine the quantity, only its prior), together
+            (determined in combination with others, not alone), words (what it is, where the name
+            does not say so), held.
 
         Examples:
             >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
             's'
         """
-        return pd.DataFrame([e.to_json() for e in self._result.parameters])
+        rows = [{**e.to_json(), "held": False} for e in self._result.parameters]
+        kept = {"std": np.nan, "at_bound": False, "seen": False, "together": False, "held": True}
+        rows += [{**h.to_json(), **kept, "words": h.words} for h in self._result.held]
+        return pd.DataFrame(rows)
 
     def plot(self) -> Figure:
         """Errors before and after, over the horizon.
@@ -1649,9 +1662,9 @@ def fit(
         >>> fitted.score <= fitted.before.score
         True
         >>> list(fitted.table().columns)
-        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words']
+        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words', 'held']
         >>> gains = ["base.forward_gain", "base.yaw_gain"]
-        >>> tm.fit("run.lcmlog", "turbopi.toml", free=gains).params.index.tolist()
+        >>> tm.fit("run.lcmlog", "turbopi.toml", free=gains).stderr.dropna().index.tolist()
         ['base.yaw_gain', 'base.forward_gain']
     """
     start = _model(model)

@@ -16,6 +16,7 @@ from twinmill.experiment.played import csv_text
 from twinmill.files import plain, replacing
 from twinmill.fitting import compare as _compare
 from twinmill.inference import infer as _infer
+from twinmill.inference.answer import units_of
 from twinmill.report import (
     comparisons,
     error_figures,
@@ -57,7 +58,8 @@ class Comparison(Reported):
         """Errors of each robot in each log.
 
         Returns:
-            log, robot_id, channel, unit, horizon_s, rms, floor (in the unit), ratio.
+            log, robot_id, channel, unit, horizon_s, rms, floor (one standard deviation of what
+            noise alone would cause; both in the unit), ratio.
 
         Examples:
             >>> found.table()["horizon_s"].unique().tolist()
@@ -105,6 +107,10 @@ class Inference(Reported):
         findings: effects that are missing, each with `effect`, `probability` and `certainty`.
         nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
         score: as of `compare`, of the model as given.
+        score_refit: of its base at its posterior where no effect is new.
+        score_after: with the likeliest set of new effects. All three are RMS errors of predictions
+            0.1 to 2 s ahead over the noise floor; the models are the most probable ones, not those
+            with the least score, so that it may also rise.
 
     Examples:
         >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
@@ -117,6 +123,7 @@ class Inference(Reported):
         self.verdict, self.findings = answer.verdict, list(answer.findings)
         self.nothing, self.outside = answer.nothing, answer.outside
         self.sentence, self.score = inference.sentence(answer), result.before.score
+        self.score_refit, self.score_after = result.refitted.score, result.after.score
 
     def to_json(self) -> dict[str, Any]:
         """All numbers and names, as of `twinmill lab infer --json`.
@@ -134,15 +141,23 @@ class Inference(Reported):
         """Effects and their numbers.
 
         Returns:
-            effect, probability, certainty, name, value, std (both in the unit of the number).
+            effect, probability, certainty, name, value, std, unit (of both).
 
         Examples:
             >>> inferred.table()["effect"].unique().tolist()
             ['coasting']
         """
-        columns = ["effect", "probability", "certainty", "name", "value", "std"]
+        columns = ["effect", "probability", "certainty", "name", "value", "std", "unit"]
         rows = [
-            (f.effect, f.probability, f.certainty, name, value, std)
+            (
+                f.effect,
+                f.probability,
+                f.certainty,
+                name,
+                value,
+                std,
+                units_of(f.effect).get(name, ""),
+            )
             for f in self.findings
             for name, (value, std) in f.numbers.items()
         ]

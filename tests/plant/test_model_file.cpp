@@ -115,6 +115,21 @@ const Bad kBad[] = {
      "[[effect]]\nname = \"equation\"\nformula = \"p0*omga\"",
      {"equation.formula", "'omga'", "'omega'", "letter 4"}},
     {"FormulaThatIsNoText", "[[effect]]\nname = \"equation\"\nformula = 3", {"text"}},
+    {"FormulaWithASignalsNameForANumber",
+     "[[effect]]\nname = \"equation\"\nformula = \"x*vx\"\nnumbers = \"x 1/m\"",
+     {"equation.numbers", "'x'", "another name"}},
+    {"FormulaWithAFileKeyForANumber",
+     "[[effect]]\nname = \"equation\"\nformula = \"share*vx\"\nnumbers = \"share\"",
+     {"equation.numbers", "'share'", "another name"}},
+    {"FormulaWithTwoNumbersOfOneName",
+     "[[effect]]\nname = \"equation\"\nformula = \"k*vx\"\nnumbers = \"k, k\"",
+     {"equation.numbers", "'k'", "twice"}},
+    {"FormulaWithFiveNumbers",
+     "[[effect]]\nname = \"equation\"\nformula = \"a*vx\"\nnumbers = \"a, b, c, d, e\"",
+     {"equation.numbers", "5", "at most 4"}},
+    {"FormulaCalledByNoName",
+     "[[effect]]\nname = \"equation\"\ncalled = \"of air\"",
+     {"equation.called", "'of air'", "no name"}},
     {"UnknownTextOfAnEffect",
      "[[effect]]\nname = \"dead_zone\"\nformula = \"p0\"",
      {"'formula'", "dead_zone"}},
@@ -231,6 +246,28 @@ TEST(ModelFile, ReadsWhatIsThereAndLeavesTheRestAtItsDefaults)
               model.effects[1].spec->parameters[0].default_value);
 }
 
+TEST(ModelFile, AFormulaHasTheNamesAndUnitsOfItsAuthor)
+{
+    const std::string drag =
+        "[[effect]]\nname = \"equation\"\ncalled = \"air\"\n"
+        "numbers = \"drag s/m, share_of_it\"\nadds_to = \"vx_mps\"\n"
+        "formula = \"-share_of_it*drag*vx*abs(vx)\"\n"
+        "drag = 0.5\nshare_of_it = 2\n";
+    Model model = Parse(drag + drag + "[[effect]]\nname = \"equation\"\n");
+    EXPECT_EQ(model.Instances(),
+              (std::vector<std::string>{"equation#air", "equation#air#2", "equation"}));
+    EXPECT_EQ(model.Find("equation#air.drag").unit, "s/m");
+    EXPECT_EQ(model.Find("equation#air.share_of_it").unit, "1");
+    EXPECT_EQ(model.Get("equation#air#2.drag"), 0.5);
+    EXPECT_NO_THROW(model.Get("equation.p3"));
+    EXPECT_THROW(model.Get("equation#air.p0"), std::invalid_argument);
+    const BoundEffect effect = model.effects[0].Bind();
+    const RobotFacts robot;
+    GroundSignals s{robot, 0, 0, false, 0, 0, 0, {}, 3, 0, 0};
+    std::get<OnGround>(effect.act()).step(s, effect.numbers(), nullptr);
+    EXPECT_EQ(s.vx_mps, 3 - 2 * 0.5 * 3 * 3);
+}
+
 TEST(ModelFile, OneClockIsDeclaredAndNotContradicted)
 {
     const Model model = Parse("[clock]\nsame = true");
@@ -248,7 +285,8 @@ TEST(ModelFile, ReadsFormulasAndNarrowerBounds)
     Model model = Parse(
         "[[effect]]\nname = \"equation\"\nadds_to = \"vy_mps\"\nformula = \"p0*vx\"\n"
         "p0 = 0.5\nbounds = { p0 = [-1, 1] }");
-    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vy_mps", "p0*vx", "", ""}));
+    EXPECT_EQ(model.effects[0].texts,
+              (std::vector<std::string>{"vy_mps", "p0*vx", "", "", "", ""}));
     model.Set("equation.p0", 1);
     EXPECT_THROW(model.Set("equation.p0", 1.1), std::invalid_argument);
     model.Set("equation.p1", 1.1);
@@ -263,7 +301,8 @@ TEST(ModelFile, AddsAnEffectWithTextsOrWithItsOwn)
 {
     Model model;
     model.AddEffect("equation", {{"formula", "p0*vy"}});
-    EXPECT_EQ(model.effects[0].texts, (std::vector<std::string>{"vx_mps", "p0*vy", "", ""}));
+    EXPECT_EQ(model.effects[0].texts,
+              (std::vector<std::string>{"vx_mps", "p0*vy", "", "", "", ""}));
     EXPECT_THROW(model.AddEffect("equation", {{"formula", "p0*"}}), std::invalid_argument);
     EXPECT_THROW(model.AddEffect("equation", {{"formla", "p0"}}), std::invalid_argument);
     EXPECT_THROW(model.AddEffect("dead_zone", {{"formula", "p0"}}), std::invalid_argument);

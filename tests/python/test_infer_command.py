@@ -2,6 +2,7 @@
 """`twinmill lab infer`, and `diagnose` and `explain` with a model's own log, which it answers."""
 
 import json
+import re
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -84,6 +85,12 @@ def test_the_page_of_a_diagnosis_shows_its_probabilities(
         assert shown in page
     assert found["score_after"] < min(found["score_refit"], found["score"])
     assert found["ranking"][0]["effect"] == found["found"][0] == "coasting"
+    told = (Path(__file__).parents[2] / "docs/inference.md").read_text()
+    rows = told.partition("| field | what |\n|---|---|\n")[2].partition("\n\n")[0].splitlines()
+    fields = [name for row in rows for name in re.findall(r"`(\w+)`", row.split("|")[1])]
+    assert [name for name in found if name != "report"] == fields
+    assert found["findings"][0]["parameters"][0]["unit"] == "m/s^2"
+    assert "m/s²" in page and "so they do not add up to 100 %" in page
 
 
 def test_a_run_is_designed_for_what_probabilities_leave_open(

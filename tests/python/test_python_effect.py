@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects written in Python, found in paths that are algebra and were made without the library."""
 
+import json
 import math
 import pickle
+import re
 
 import numpy as np
 import pytest
@@ -68,7 +70,8 @@ def test_a_model_with_it_is_fitted_and_held_by_its_names(carpet, added):
     fitted = tm.fit(
         carpet[0], added.model, hold=[names["along_x"]], priors={names["along_y"]: (0, 1e-3)}
     )
-    assert names["along_x"] not in fitted.params and abs(fitted.params[names["along_y"]]) < 0.02
+    assert fitted.params[names["along_x"]] == added.model[names["along_x"]]
+    assert abs(fitted.params[names["along_y"]]) < 0.02
 
 
 def test_nothing_is_missing_beside_it(carpet, added):
@@ -88,6 +91,48 @@ def test_the_plant_drives_by_it(added, tmp_path):
     speed_mps = math.hypot(end["x_m"] - x_m, end["y_m"] - y_m) / (end["t_s"] - t_s)
     share = 1 + GRAIN * math.cos(theta_rad - ALONG_RAD)
     assert speed_mps == pytest.approx(50 * 0.0036 * share, rel=0.01)
+
+
+NAMED = "equation#grain.along_x"
+
+
+def test_tables_files_and_exports_have_its_own_names_and_units(carpet, tmp_path):
+    """Function, number and unit are called here as by the author of the effect."""
+    log, model = carpet
+
+    @tm.python_effect("vx_mps", {"drag": tm.Number("s/m")})
+    def air(vx, drag):
+        """Drag that grows with the square of the speed."""
+        return -drag * vx * np.abs(vx)
+
+    fit = tm.fit(log, model.add(air, log).model, hold=["base.yaw_gain"])
+    named = "equation#air.drag"
+    assert re.search(rf"^{re.escape(named)} .* s/m$", fit.summary(), re.M)
+    assert fit.table().set_index("name").loc[named, "unit"] == "s/m"
+    assert named in fit.params and fit.model.numbers(air) == {
+        "drag": pytest.approx(fit.params[named], rel=1e-5)
+    }
+    known = {row["name"]: row["unit"] for row in fit.to_json()["parameters"]}
+    assert known[named] == "s/m" and not [n for n in known if n.endswith(".p0")]
+    assert fit.model.table().set_index("name").loc[named, "unit"] == "s/m"
+    fit.report(tmp_path / "report")
+    page = re.sub("<[^>]+>", " ", (tmp_path / "report/index.html").read_text())
+    assert re.search(rf"{re.escape(named)}[^a-z]* s/m", page)
+    for to, file in [("json", "a.json"), ("urdf", "a.urdf"), ("mjcf", "a.xml"), ("sdf", "a.sdf")]:
+        fit.model.export(tmp_path / file, to=to)
+        told = (tmp_path / file).read_text()
+        assert "equation#air" in told and "(-drag)*vx" in told and "p0" not in told
+    numbers = json.loads((tmp_path / "a.json").read_text())["numbers"]
+    assert numbers[named]["unit"] == "s/m"
+
+
+def test_a_saved_model_is_read_with_its_names(carpet, added, tmp_path):
+    added.model.save(tmp_path / "grain.toml")
+    read = tm.Model.load(tmp_path / "grain.toml")
+    assert read.numbers(grain).keys() == {"along_x", "along_y"}
+    assert read.set({NAMED: 0.05})[NAMED] == 0.05
+    fitted = tm.fit(carpet[0], read, priors={NAMED: (0.05, 1e-5)})
+    assert fitted.params[NAMED] == pytest.approx(0.05, abs=1e-4)
 
 
 def test_a_prior_decides_where_data_do_not(carpet):
@@ -119,7 +164,7 @@ def test_the_formula_computes_what_the_function_does(function):
     words = {"sign": np.sign, "abs": abs, "sqrt": math.sqrt, "ln": math.log, "atan2": math.atan2}
     for vx, k in np.random.default_rng(2).uniform(-1, 1, (20, 2)):
         text = effect.texts["formula"].replace("^", "**")
-        worth = eval(text, {**words, "min": min, "max": max}, {"vx": vx, "p0": k})
+        worth = eval(text, {**words, "min": min, "max": max}, {"vx": vx, "k": k})
         assert worth == pytest.approx(function(vx, k), rel=1e-12)
 
 
@@ -135,3 +180,16 @@ def test_the_formula_computes_what_the_function_does(function):
 def test_what_no_formula_can_do_is_said(function, error, says):
     with pytest.raises(error, match=says):
         tm.python_effect("vx_mps", {"k": tm.Number()})(function)
+
+
+def test_a_number_with_the_name_of_a_signal_is_refused(carpet):
+    @tm.python_effect("vx_mps", {"x": tm.Number()})
+    def push(vx, x):
+        return vx * x
+
+    with pytest.raises(ValueError, match="'x' means something else in a formula; take another"):
+        carpet[1].add(push, carpet[0])
+    with pytest.raises(ValueError, match="'größe' must be called by letters of English"):
+        tm.python_effect("vx_mps", {"größe": tm.Number()})(lambda vx, größe: vx * größe)
+    with pytest.raises(ValueError, match="has a comma"):
+        tm.python_effect("vx_mps", {"k": tm.Number("m, s")})(lambda vx, k: vx * k)

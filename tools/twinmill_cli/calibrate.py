@@ -163,6 +163,17 @@ def _add(
         str | None,
         typer.Option("--second-rate", help="For equation: dr/dt of a second state r."),
     ] = None,
+    called: Annotated[
+        str | None,
+        typer.Option("--called", help="For equation: a name, as air; else it is `equation`."),
+    ] = None,
+    numbers: Annotated[
+        str | None,
+        typer.Option(
+            "--numbers",
+            help="For equation: names and units in the place of p0 to p3, as 'drag s/m, ratio'.",
+        ),
+    ] = None,
     hold: Hold = None,
     robot: Annotated[
         int | None,
@@ -180,7 +191,8 @@ def _add(
     gains = robot is not None and effect == OWN_GAINS
     known = {} if gains else {t["name"]: t["default"] for t in find_effect(effect)["texts"]}
     rates = {"state_rate": state_rate, "second_rate": second_rate}
-    typed = {"adds_to": adds_to, "formula": formula, **rates}
+    names = {"called": called, "numbers": numbers}
+    typed = {"adds_to": adds_to, "formula": formula, **rates, **names}
     texts = {name: text for name, text in typed.items() if text is not None}
     if extra := [name for name in texts if name not in known]:
         raise ValueError(

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "effects/own_numbers.h"
 #include "fields.h"
 
 namespace twin
@@ -14,14 +15,46 @@ namespace twin
 namespace
 {
 
+// A text of an effect; empty: it has none of that name.
+std::string TextOf(const EffectInstance &effect, std::string_view name)
+{
+    for (size_t i = 0; i < effect.texts.size(); ++i)
+        if (effect.spec->texts[i].name == name)
+            return effect.texts[i];
+    return "";
+}
+
+// "dead_zone", and "equation#air" of a formula that its author calls air.
+std::string KindName(const EffectInstance &effect)
+{
+    const std::string called = TextOf(effect, "called");
+    return effect.spec->card.name + (called.empty() ? "" : "#" + called);
+}
+
 // "dead_zone", and "dead_zone#2" for the second of its kind.
 std::string InstanceName(const std::vector<EffectInstance> &effects, size_t index)
 {
-    const std::string name = effects[index].spec->card.name;
+    const std::string name = KindName(effects[index]);
     int count = 1;
     for (size_t i = 0; i < index; ++i)
-        count += effects[i].spec == effects[index].spec;
+        count += KindName(effects[i]) == name;
     return count == 1 ? name : name + "#" + std::to_string(count);
+}
+
+// The numbers of a formula, as its author calls them.
+void TakeOwnNumbers(EffectInstance &effect)
+{
+    const std::vector<OwnNumber> own =
+        OwnNumbers(TextOf(effect, "numbers"), effect.parameters.size());
+    if (own.empty())
+        return;
+    effect.parameters.resize(own.size());
+    for (size_t i = 0; i < own.size(); ++i)
+    {
+        effect.parameters[i].name = own[i].name;
+        effect.parameters[i].unit = own[i].unit;
+        effect.parameters[i].doc = own[i].name + " of the formula";
+    }
 }
 
 constexpr double kSpeedPrior_mps = 0.15;  // of a speed of the duty table
@@ -98,6 +131,14 @@ BoundEffect EffectInstance::Bind() const
     return BoundEffect(*spec, Values(), texts);
 }
 
+std::vector<std::string> Model::Instances() const
+{
+    std::vector<std::string> names;
+    for (size_t i = 0; i < effects.size(); ++i)
+        names.push_back(InstanceName(effects, i));
+    return names;
+}
+
 std::vector<Parameter> Model::Parameters() const
 {
     std::vector<Parameter> all;
@@ -170,6 +211,7 @@ void Model::AddEffect(const std::string &name, const std::map<std::string, std::
         throw std::invalid_argument("effect '" + name +
                                     "' has no such text; `twinmill twin effects " + name +
                                     "` lists those it has");
+    TakeOwnNumbers(instance);
     instance.stage = StageName(instance.Bind().act());
     effects.push_back(std::move(instance));
 }

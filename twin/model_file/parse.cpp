@@ -11,6 +11,7 @@
 #include <toml++/toml.h>
 
 #include "effects/nearest.h"
+#include "effects/own_numbers.h"
 #include "fields.h"
 #include "model_file/installed.h"
 #include "model_file/model.h"
@@ -341,8 +342,7 @@ private:
 
     void ReadEffectValues(const toml::table &table, const EffectSpec &spec)
     {
-        std::set<std::string> known{"name",         "std",         "bounds", "fitted_on",
-                                    "error_before", "error_after", "share"};
+        std::set<std::string> known(std::begin(kEffectKeys), std::end(kEffectKeys));
         for (const TextParameter &text : spec.texts)
             known.insert(text.name);
         std::set<std::string> parameters;

@@ -88,7 +88,8 @@ nb::dict ParameterEntry(const Parameter &p)
     return row;
 }
 
-nb::dict CardEntry(const EffectSpec &spec, const std::vector<Wheel> &wheels)
+// `own`: its parameters on some robot.
+nb::dict CardEntry(const EffectSpec &spec, const std::vector<Parameter> &own)
 {
     const Card &card = spec.card;
     nb::dict entry;
@@ -108,7 +109,7 @@ nb::dict CardEntry(const EffectSpec &spec, const std::vector<Wheel> &wheels)
     entry["duty_only"] = card.drives == kDutyOnly;
     bool place_like = false;
     nb::list parameters;
-    for (const Parameter &p : ParametersFor(spec, wheels))
+    for (const Parameter &p : own)
     {
         place_like |= p.role == Role::kPlace;
         nb::dict row = ParameterEntry(p);
@@ -137,15 +138,24 @@ nb::list CatalogueOf(const Model &model)
     nb::list effects;
     for (const EffectSpec *spec : Catalogue())
         if (model.WhyNot(*spec).empty())
-            effects.append(CardEntry(*spec, model.MakeWheels()));
+            effects.append(CardEntry(*spec, ParametersFor(*spec, model.MakeWheels())));
     return effects;
+}
+
+// The cards of a model's own effects, in their order.
+nb::list OwnCards(const Model &model)
+{
+    nb::list cards;
+    for (const EffectInstance &effect : model.effects)
+        cards.append(CardEntry(*effect.spec, effect.parameters));
+    return cards;
 }
 
 nb::list CatalogueList()
 {
     nb::list effects;
     for (const EffectSpec *spec : Catalogue())
-        effects.append(CardEntry(*spec, Model().MakeWheels()));
+        effects.append(CardEntry(*spec, ParametersFor(*spec, Model().MakeWheels())));
     return effects;
 }
 
@@ -443,6 +453,11 @@ NB_MODULE(twinmill_native, m)
         .def_prop_ro("clock_same", [](const Model &model) { return model.clock.same; })
         .def_prop_ro("bits", [](const Model &model) { return model.sensor.bits; })
         .def_prop_ro("texts", &TextsList, "By effect in their order: its texts by name.")
+        .def_prop_ro("cards", &OwnCards,
+                     "By effect in their order: its card, with the parameters that it has here.")
+        .def_prop_ro("instances", &Model::Instances,
+                     "Names of its effects in their order: `dead_zone`, `dead_zone#2`; "
+                     "`equation#air` of a formula that its author calls air.")
         .def_prop_ro("effects", [](const Model &model) {
             nb::list names;
             for (const EffectInstance &effect : model.effects)

@@ -66,7 +66,16 @@ def whole(names: list[str]) -> list[str]:
 
 
 def messages(first: str, lines: Iterable[str]) -> Named | None:
-    """The table that echo writes of stamped poses, velocities or odometry; None of others."""
+    """Table without column names that `ros2 topic echo --csv` writes, with names put in.
+
+    Args:
+        first: its first line, by whose stamp and number of fields the type of message is told: a
+            stamped pose, a stamped velocity, or odometry.
+        lines: all of its lines, in which seconds and nanoseconds of the stamp become one column.
+
+    Returns:
+        Header, lines and a remark for people; None where the first line is of no such message.
+    """
     found = STAMPED.match(first)
     fields = FIELDS.get(first[found.end() :].count(",") + 1) if found else None
     if not fields:

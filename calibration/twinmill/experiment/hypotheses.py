@@ -131,9 +131,19 @@ def question(
 def candidate_effects(
     logs: list[ModelledLog], planned: ModelledLog, *, state: State, asked: Hypotheses, usual: float
 ) -> list[CandidateEffect]:
-    """Every effect that the logs or the planned run show, at its fitted or its usual strength.
+    """Effects between which the planned run may have to decide, each as one step of its strength.
 
-    Errors of the next run scatter no less over their noise than the score `usual` says.
+    Args:
+        logs: recorded so far, with the model that lacks the effects in question.
+        planned: the run to be judged, with predicted poses in the place of measured ones.
+        state: the logs with the parameters that are refitted beside each effect.
+        asked: effects in question, with their fitted strengths.
+        usual: score that predictions of this model usually have; errors of the planned run are
+            taken to scatter by this factor over the noise at least.
+
+    Returns:
+        All effects that change a prediction of the logs or of the planned run, each from neutral to
+        its fitted strength, or to the default on its card where it was not fitted.
     """
     shown, _ = candidates([*logs, planned])
     without = [s.white_errors() for s in logs]

@@ -12,7 +12,7 @@ import twinmill_native as native
 
 from twinmill.arguments import option
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import catalogue_name, catalogue_of, effect_names
+from twinmill.model.parameters import card_of, effect_names
 
 HULL_HEIGHT_M = 0.08  # of the body: no model file states it
 WHEEL_SHARE = 0.03  # of the robot's mass, each, as in the twin's own MuJoCo robots
@@ -136,10 +136,9 @@ class RobotModel:
 
     def effects(self) -> list[tuple[str, dict, dict[str, float]]]:
         """Instance name, card and values by parameter of each effect."""
-        cards = catalogue_of(self.model)
         found = []
         for instance in effect_names(self.model):
-            card = cards[catalogue_name(instance)]
+            card = card_of(self.model, instance)
             values = {
                 p["name"]: self.model.get(f"{instance}.{p['name']}") for p in card["parameters"]
             }

@@ -17,15 +17,25 @@ from twinmill.diagnosis.trials import REFIT
 from twinmill.export.formula_cpp import in_cpp
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.model_file import ModelError, ModelFile, write_whole
-from twinmill.model.parameters import catalogue, catalogue_name, effect_names, words
+from twinmill.model.parameters import (
+    FORMULA_NUMBERS,
+    FORMULAS,
+    RATES,
+    card_of,
+    catalogue,
+    catalogue_name,
+    effect_names,
+    numbers_of,
+    words,
+)
 
 CATALOGUE, TESTS = Path("twin/effects/catalogue"), Path("tests/effects")
 LISTED = "add_executable(test_effects\n"  # in the tests' CMakeLists.txt; the new one follows
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
-PARAMETERS = ("p0", "p1", "p2", "p3")
 FAR = 1e6  # of any number: its size is the formula's
 LONGEST = 78  # of a text in the card
 NEW = "new"  # in the place of an effect's name
+NAME_IN_FORMULA = re.compile(r"[A-Za-z_]\w*")
 RESERVED = {OWN_GAINS, REFIT, NEW}  # which commands take for something else
 
 WHEEL = {
@@ -54,7 +64,6 @@ BODY = {
 }
 POSE = {"x": "in.x_m", "y": "in.y_m", "theta": "in.theta_rad"}
 CHANGING = {"x", "y", "theta", "course", "t", "rim", "angle"}  # within a step, which holds them
-RATES = {"state_rate": "s", "second_rate": "r"}
 
 
 @dataclass(frozen=True)
@@ -109,6 +118,15 @@ PLACES = {
 
 
 @dataclass(frozen=True)
+class Own:
+    """A number of the equation as the model has it: its name, unit and value."""
+
+    name: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True)
 class Function:
     """A C++ function of one text: its arguments, what is passed, the numbers that it names."""
 
@@ -142,10 +160,15 @@ def write_effect(name: str, model_file: ModelFile, instance: str | None, root: P
     if LISTED not in listed:
         raise ModelError(f"{lists}: has no line '{LISTED.strip()}'; list the test there by hand.")
     instance = _chosen(model_file, instance)
-    texts = _texts(model, instance)
-    values = {p: model.get(f"{instance}.{p}") for p in PARAMETERS}
-    made = _source(name, texts, values, model_file.path.name)
-    tested = _test(name, texts, values)
+    told = model.texts[effect_names(model).index(instance)]
+    texts = _texts(told, instance)
+    cards = card_of(model, instance)["parameters"]
+    own = {
+        p: Own(card["name"], card["unit"], model.get(f"{instance}.{card['name']}"))
+        for p, card in zip(FORMULA_NUMBERS, cards, strict=False)
+    }
+    made = _source(name, texts, own, told=told, model=model_file.path.name)
+    tested = _test(name, texts, own)
     with ExitStack() as undo:  # of all or none
         for path, text in ((source, made), (test, tested)):
             undo.callback(path.unlink, missing_ok=True)
@@ -172,9 +195,15 @@ def _chosen(model_file: ModelFile, instance: str | None) -> str:
     return instance or has[0]
 
 
-def _texts(model: native.Model, instance: str) -> dict[str, str]:
-    """Formulas of an equation that can be an effect."""
-    texts = model.texts[effect_names(model).index(instance)]
+def _texts(told: dict[str, str], instance: str) -> dict[str, str]:
+    """Formulas of an equation that can be an effect, its numbers as p0 to p3.
+
+    In the source they cannot mean something else, as a number that is called `value` would.
+    """
+    texts = {"adds_to": told["adds_to"]}
+    places = dict(zip(numbers_of(told), FORMULA_NUMBERS, strict=False))
+    for key in FORMULAS:
+        texts[key] = NAME_IN_FORMULA.sub(lambda m: places.get(m[0], m[0]), told[key])
     if texts["adds_to"] not in PLACES:
         raise ValueError(
             f"{instance}: adds to {texts['adds_to']}, which has two values, and only formulas of "
@@ -211,15 +240,18 @@ def _check(name: str, model: native.Model, root: Path, files: Sequence[Path]) ->
         raise ValueError(f"{there}: exists already; take another name, or remove it.")
 
 
-def _source(name: str, texts: dict[str, str], values: dict[str, float], model: str) -> str:
+def _source(
+    name: str, texts: dict[str, str], own: dict[str, Own], *, told: dict[str, str], model: str
+) -> str:
     place = PLACES[texts["adds_to"]]
     rates = {of: texts[key] for key, of in RATES.items() if texts.get(key)}
     used = words(" ".join([texts["formula"], *rates.values()]))
     state = {of: of for of in rates}
     formula = _function(texts["formula"], place.names, state)
     what = "adds" if texts["adds_to"] not in SHARES else "changes by a share"
-    equation = f"{what} to {texts['adds_to']}: {texts['formula']}"
-    equation += "".join(f"; d{of}/dt = {rate}, {of} = 0 at the start" for of, rate in rates.items())
+    equation = f"{what} to {texts['adds_to']}: {told['formula']}"
+    for key, of in RATES.items():
+        equation += f"; d{of}/dt = {told[key]}, {of} = 0 at the start" if of in rates else ""
     return (
         _environment()
         .get_template("effect.cpp.j2")
@@ -232,7 +264,7 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
             phrase="a formula that was found in data",
             **_kind(used, bool(rates), place.stage),
             parameters=[
-                {"name": p, "value": _plain(values[p] or 0.01), "far": f"{FAR:g}"}
+                {**vars(own[p]), "value": _plain(own[p].value or 0.01), "far": f"{FAR:g}"}
                 for p in _numbers(texts)
             ],
             places={p: k for k, p in enumerate(_numbers(texts))},
@@ -255,7 +287,7 @@ def _source(name: str, texts: dict[str, str], values: dict[str, float], model: s
 def _numbers(texts: dict[str, str]) -> list[str]:
     """Those of p0 to p3 that the texts name."""
     used = words(" ".join(texts.values()))
-    return [p for p in PARAMETERS if p in used]
+    return [p for p in FORMULA_NUMBERS if p in used]
 
 
 def _kind(used: set[str], remembers: bool, stage: str) -> dict[str, str]:
@@ -278,16 +310,16 @@ def _kind(used: set[str], remembers: bool, stage: str) -> dict[str, str]:
 def _function(text: str, names: dict[str, str], state: dict[str, str]) -> Function:
     used = words(text)
     own = [n for n in (*names, *state) if n in used]
-    numbers = [p for p in PARAMETERS if p in used]
+    numbers = [p for p in FORMULA_NUMBERS if p in used]
     return Function(
-        in_cpp(text, {*names, *state, *PARAMETERS}),
+        in_cpp(text, {*names, *state, *FORMULA_NUMBERS}),
         ", ".join(["const Numbers &v"] * bool(numbers) + [f"double {n}" for n in own]),
         ", ".join(["v"] * bool(numbers) + own),
         numbers,
     )
 
 
-def _test(name: str, texts: dict[str, str], values: dict[str, float]) -> str:
+def _test(name: str, texts: dict[str, str], own: dict[str, Own]) -> str:
     numbers = _numbers(texts)
     pairs = ", ".join(f'{{"{key}", {_quoted(text)}}}' for key, text in texts.items() if text)
     title = "".join(part.capitalize() for part in name.split("_"))
@@ -295,8 +327,8 @@ def _test(name: str, texts: dict[str, str], values: dict[str, float]) -> str:
     return template.render(
         name=name,
         title=title,
-        values=", ".join(_plain(values[p] or 0.01) for p in numbers),
-        places=", ".join(str(PARAMETERS.index(p)) for p in numbers),
+        values=", ".join(_plain(own[p].value or 0.01) for p in numbers),
+        places=", ".join(str(FORMULA_NUMBERS.index(p)) for p in numbers),
         texts=f"{{{pairs}}}",
         held=bool(words(" ".join(texts.values())) & CHANGING),
     )

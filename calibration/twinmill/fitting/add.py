@@ -59,6 +59,7 @@ from twinmill.model.parameters import (
     effect_parameters,
     is_of_camera,
     late_part,
+    numbers_of,
     stated_names,
     with_role,
 )
@@ -112,6 +113,21 @@ class AddResult:
     def of_camera(self) -> bool:
         """True if the effect is of the camera, so that all scores are those of detections."""
         return isinstance(self.after, DetectionComparison)
+
+    @property
+    def of_motion(self) -> tuple[Comparison, Comparison] | None:
+        """Comparisons of motion before and after; None of an effect of the camera."""
+        before, after = self.before, self.after
+        if isinstance(before, DetectionComparison) or isinstance(after, DetectionComparison):
+            return None
+        return before, after
+
+    @property
+    def of_detections(self) -> DetectionComparison:
+        """Comparison of detections after; an effect on motion has none."""
+        if not isinstance(self.after, DetectionComparison):
+            raise TypeError(f"{self.effect}: acts on the motion, and is judged by poses.")
+        return self.after
 
     @property
     def label(self) -> str:
@@ -365,8 +381,8 @@ def with_effect(
     fresh = effect_parameters(richer, name, fresh=True)
     if text and not fresh:
         raise ValueError(
-            f"formula '{text}': names none of p0 to p3, so nothing of it can be fitted; write one "
-            f"before it, as in 'p0*({text})'."
+            f"formula '{text}': names none of {texts.get('numbers') or 'p0 to p3'}, so nothing of "
+            f"it can be fitted; write one before it, as in '{numbers_of(texts)[0]}*({text})'."
         )
     return richer, name, fresh
 

@@ -398,12 +398,30 @@ def lagged(values: np.ndarray, lag_s: float, step_s: np.ndarray) -> np.ndarray:
 
 
 def held(values: np.ndarray, least: float) -> np.ndarray:
-    """(N,) values of which changes below a least one are not taken."""
+    """Signal after a dead band on its changes: it keeps its value until a change is large enough.
+
+    Args:
+        values: (N,) signal.
+        least: a new value is taken where it differs by more than this from the one that is kept.
+
+    Returns:
+        (N,) in the unit of `values`; it begins at 0.
+    """
     return native.held(np.ascontiguousarray(values), least)
 
 
 def wound(way: np.ndarray, most: float) -> np.ndarray:
-    """(N,) how far something is wound up by (N,) steps of way, -1..1: by `most` it is wholly."""
+    """State of play or a spring that has to be taken up after each change of direction.
+
+    It follows the way that is driven and saturates: u[k] = clip(u[k - 1] + way[k] / most, -1, 1).
+
+    Args:
+        way: (N,) way driven in each step, m or rad, with its sign.
+        most: way from the middle to either end, in the same unit.
+
+    Returns:
+        (N,) -1 to 1; at an end while the robot has driven far enough in one direction.
+    """
     return native.wound(np.ascontiguousarray(way), most)
 
 
@@ -441,7 +459,20 @@ def _reversals(way: np.ndarray) -> np.ndarray:
 
 
 def fading(events: np.ndarray, fade_s: float, step_s: np.ndarray) -> np.ndarray:
-    """(N,) or (N, n) events that each fade, on steps that are taken to be even."""
+    """Trace that events leave: each counts in full at its step, then decays exponentially.
+
+    y[k] = events[k] + exp(-dt / fade_s) y[k - 1], from rest. For all steps dt is the median of
+    `step_s`, and a gap between stretches of a log counts as one step.
+
+    Args:
+        events: (N,) or (N, n) size of each of n kinds of event at N steps, such as the rise of a
+            speed in m/s; 0 where nothing happens.
+        fade_s: time in which a trace falls to 1/e.
+        step_s: (N,) length of the step that ends at each point; 0 where a stretch begins.
+
+    Returns:
+        y, of the shape and in the unit of `events`.
+    """
     return filtered([1.0], [1.0, -np.exp(-even_step_s(step_s) / fade_s)], events, axis=0)
 
 

@@ -7,7 +7,14 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.model.model_file import ModelError
-from twinmill.model.parameters import catalogue_name, effect_names, instance_of, phases, words
+from twinmill.model.parameters import (
+    catalogue_name,
+    effect_names,
+    instance_of,
+    numbers_of,
+    phases,
+    words_of,
+)
 from twinmill.predict.datasets import ErrorDataset, Trajectory, errors_of
 
 EQUATION = "equation"
@@ -57,7 +64,7 @@ def idle(data: Sequence[ErrorDataset], models: Sequence[native.Model]) -> list[s
     """
     found = []
     for name, texts in _equations(models[0]).items() if data else ():
-        named = [p for p in ("p0", "p1", "p2", "p3") if p in words(" ".join(texts.values()))]
+        named = [p for p in numbers_of(texts) if p in words_of(texts)]
         if named and not any(m.get(f"{name}.{p}") for m in models for p in named):
             continue
         if any(instance_of(p.name) == name for p in phases(models[0])):

@@ -91,6 +91,24 @@ class Statistics:
 
 
 @dataclass(frozen=True)
+class Held:
+    """A quantity that a fit could have moved, and that kept the value of the model as given.
+
+    Attributes:
+        words: as of a `Parameter`.
+    """
+
+    name: str
+    value: float
+    unit: str
+    words: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Fields of the interface."""
+        return {"name": self.name, "value": self.value, "unit": self.unit}
+
+
+@dataclass(frozen=True)
 class FitResult:
     """Result of a fit.
 
@@ -102,6 +120,7 @@ class FitResult:
         child: the new model.
         statistics: how the estimates scatter, and what is left.
         notes: sentences on where it holds.
+        held: what kept its value because the fit's choice says so.
     """
 
     before: Comparison
@@ -112,6 +131,7 @@ class FitResult:
     child: ModelFile
     statistics: Statistics
     notes: tuple[str, ...] = ()
+    held: tuple[Held, ...] = ()
 
     @property
     def path(self) -> Path:
@@ -126,6 +146,7 @@ class FitResult:
             "score_after": self.after.score,
             "heldout_after": self.heldout.score,
             "parameters": [e.to_json() for e in self.parameters],
+            "held": [h.to_json() for h in self.held],
             "time_offset_s": self.clock.value if self.clock else None,
             "notes": list(self.notes),
         }
@@ -164,6 +185,21 @@ class Choice:
                 if not any(_among(p.name, (name,)) for p in chosen):
                     raise ModelError(f"{name}: moves nothing in these measurements; leave it out.")
         return [self._informed(p) for p in chosen if not _among(p.name, self.hold)]
+
+    def held(self, usual: Sequence[Parameter], model: native.Model) -> tuple[Held, ...]:
+        """Quantities that keep their values by this choice, in the order of the usual ones.
+
+        They are those that would be fitted without it; then others that it holds by their own
+        names, not with a table as a whole.
+        """
+        names = [p.name for p in usual if not self._moves(p.name)]
+        units = {v["name"]: v["unit"] for v in model.values()}
+        others = [n for n in sorted(units) if n in self.hold and n not in names]
+        words = {p.name: p.words for p in usual}
+        return tuple(Held(n, model.get(n), units[n], words.get(n, "")) for n in (*names, *others))
+
+    def _moves(self, name: str) -> bool:
+        return not _among(name, self.hold) and (self.free is None or _among(name, self.free))
 
     def _informed(self, p: Parameter) -> Parameter:
         """With its prior."""
@@ -361,6 +397,7 @@ def fit_model(
         child=child,
         statistics=Statistics.of(found),
         notes=notes,
+        held=choice.held(usual, model),
     )
 
 

@@ -86,9 +86,18 @@ def _cost(
 
 
 def sized(fresh: Sequence[Parameter], opened: Sequence[Opened]) -> list[Parameter]:
-    """Numbers of a formula with priors and steps by what changes predictions as much as they err.
+    """Numbers of a formula with starts, priors and difference steps of a size that acts.
 
-    In what unit a formula has them, and how large they are, nobody but it knows.
+    Nobody but the formula knows in which unit it has its numbers, so that 1 may be nothing or
+    absurd. The reach of a number is the change of it that alters predictions by as much as they err
+    now, to first order; it bounds the start, widens the prior and bounds the step of differences.
+
+    Args:
+        fresh: the numbers, with bounds of the card.
+        opened: logs with models that have the formula.
+
+    Returns:
+        The same numbers in their order; as they were where a number changes no prediction.
     """
     known = judged(opened)
     return _sized([o.data for o in known], [o.model for o in known], fresh)

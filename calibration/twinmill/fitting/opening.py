@@ -221,9 +221,19 @@ def _on_its_clock(measurement: Measurement, model_file: ModelFile) -> tuple[nati
 
 
 def open_roughly(measurement: Measurement, model_file: ModelFile) -> Opened | None:
-    """A log with few predictions, over the model's own errors; None if it cannot give a floor.
+    """A log for a quick look: some of its predictions, weighed by the model's own errors.
 
-    A tenth of a second, where the floor takes more than one.
+    It takes a tenth of a second, where the noise floor takes more than one. In place of the floor
+    stands the RMS error of the model itself in each channel and at each horizon, so that its
+    score tells nothing; its errors in one regime against another's do.
+
+    Args:
+        measurement: one robot's log.
+        model_file: the model.
+
+    Returns:
+        The log with the robot's model, its clock found roughly unless it is known; None where the
+        log is too poor for a noise floor, or has no heading.
     """
     measurement = measurement.punctual()
     model, same_clock = _on_its_clock(measurement, model_file)

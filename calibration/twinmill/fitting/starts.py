@@ -82,12 +82,19 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Left:
-    """Errors of all data sets, weighted; free parameters are projected out of them.
+    """Prediction errors that no change of a fit's free parameters can reduce, to first order.
+
+    All are weighted such that their squares add up to the fit's cost. A candidate that is not in
+    the model yet is compared with them: what of it the free parameters could do, too, is taken off.
 
     Attributes:
-        weights: (R,) of each data set's rows.
-        rests: (R,) of each data set.
-        bases: (R, P) of each data set; all of them together, and their prior, are orthonormal.
+        weights: for each data set (R,), by which its R errors are multiplied: roots of their
+            weights in the fit's cost.
+        rests: for each data set (R,) weighted errors, without units, less their part along the
+            columns of the free parameters.
+        bases: for each data set its R rows of an orthonormal basis of these P columns. Below all
+            data sets, P rows of the priors belong to the basis, and are not kept here: so the rows
+            of the data sets alone are orthonormal only as far as the priors are weak.
     """
 
     weights: Sequence[np.ndarray]

@@ -12,10 +12,15 @@ from twinmill.inference.discrepancy import NODES
 from twinmill.inference.posterior import Belief, beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Numbers, Table
-from twinmill.model.parameters import catalogue_name, instance_of
+from twinmill.model.parameters import catalogue, catalogue_name, instance_of
 
 LARGEST_GROUP = 4  # names: more help nobody
 OF_SIZE = PRIORS.form / np.sqrt(NODES)  # error of an effect's size where its formula is off
+
+
+def units_of(effect: str) -> dict[str, str]:
+    """Units of an effect's parameters, on TurboPi's wheels; none of what is not the catalogue's."""
+    return {p["name"]: p["unit"] for p in catalogue().get(effect, {}).get("parameters", ())}
 
 
 @dataclass(frozen=True)
@@ -28,7 +33,10 @@ class Named:
         group: names one of which is missing, itself first; empty if it stands alone.
         group_probability: that one of the group is.
         certainty: sure, group or doubtful.
-        share: of the excess squared error that it takes.
+        share: squares of the change that it alone makes to the predicted steps, in the likeliest
+            model with the set of effects that is told, over the excess: what the base, refitted
+            without a new effect, leaves beyond the noise's own squares. Errors are counted in
+            standard deviations of the noise. At most 1.
         numbers: parameter -> (value, standard deviation).
     """
 
@@ -42,6 +50,7 @@ class Named:
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `findings` of the interface."""
+        units = units_of(self.effect)
         return {
             "effect": self.effect,
             "probability": self.probability,
@@ -50,7 +59,7 @@ class Named:
             "certainty": self.certainty,
             "share": self.share,
             "parameters": [
-                {"name": name, "value": value, "std": std}
+                {"name": name, "value": value, "std": std, "unit": units.get(name, "")}
                 for name, (value, std) in self.numbers.items()
             ],
         }
@@ -68,7 +77,9 @@ class Answer:
         stale: probability that the base is known no better than a data sheet.
         effects: probability of each effect that was fitted, likeliest first.
         depends_on: what is left depends on, likeliest first, each with its probability.
-        share: of the excess squared error that the likeliest dependence takes.
+        share: squares by which the likeliest dependence lowers what these effects leave, over the
+            same excess as the share of an effect. Effects and dependences that change the same
+            motion overlap, so that these shares do not add up to 1.
         added: the likeliest set of effects of the catalogue that are missing, each kind once.
         numbers: of the likeliest model that has these.
         refit: of the base with nothing that is missing.

@@ -70,12 +70,18 @@ class Moment:
 
 @dataclass(frozen=True)
 class Found:
-    """Moments let in, likeliest first.
+    """Transients of a log, as a greedy search found them beside one linear model.
+
+    A moment is a transient of 0.5, 1 or 2 s, in which all motion is scaled, or in which travel,
+    turning and two additive velocities change each by itself. In each round of the search the one
+    that raises the evidence most is taken, so the first k of them are the best k that it knows.
 
     Attributes:
-        gains: (n + 1,) gain in log evidence with the first so many on, their chances left out.
-        on: the moments.
-        count: number of bins.
+        gains: (n + 1,) log evidence (natural logarithm) with the first 0, 1, .. n moments, less
+            that without any; their sizes are integrated out, and the prior probability that they
+            happen at all is not in it: `log_chance` has that.
+        on: the n moments, in the order in which they were taken.
+        count: bins of 0.5 s in the log, each of which may begin one.
     """
 
     gains: np.ndarray
@@ -83,15 +89,23 @@ class Found:
     count: int
 
     def log_evidence(self, rate: Rate) -> float:
-        """Gain in log evidence: the best number of moments, and the chance of these at a rate."""
+        """Gain in log evidence over no moment, prior included, at the best number of moments.
+
+        Args:
+            rate: belief on how often moments happen.
+        """
         return float(self.by_number(rate).max())
 
     def likeliest(self, rate: Rate) -> int:
-        """How many moments are on at that."""
+        """Number of moments at which `log_evidence` has its maximum."""
         return int(self.by_number(rate).argmax())
 
     def after(self, there: float) -> Rate:
-        """Rate after the log, if something happens ever with that probability."""
+        """Belief on the rate of moments in later logs, by what this one has.
+
+        Args:
+            there: probability before this log that moments ever happen to this robot.
+        """
         some = Rate()
         on, odds = self.likeliest(some), np.log(there / (1 - there)) + self.log_evidence(some)
         return Rate(float(expit(odds)), some.on + on, some.off + self.count - on)

@@ -18,7 +18,7 @@ from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.joints.hook import Held
 from twinmill.joints.plant import CLOCK, JointModel
-from twinmill.model.parameters import Parameter, effect_names, instance_of
+from twinmill.model.parameters import Parameter, instance_of
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,7 @@ def of_hook(hook: Sequence[Held]) -> Always:
     """Effects in a model's hook, their numbers as exact as what an own log tells exactly."""
     model = JointModel({}, {})
     model.effects = [name for name, _ in hook]
-    instances = effect_names(model)  # type: ignore[arg-type]
-    each = zip(instances, hook, strict=True)
+    each = zip(model.instances, hook, strict=True)
     told = {f"{name}.{key}": value for name, (_, own) in each for key, value in own.items()}
     mean = np.array(list(told.values()))
     return Always(tuple(model.effects), tuple(told), mean, np.zeros((len(mean), len(mean))))

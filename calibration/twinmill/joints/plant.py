@@ -20,7 +20,7 @@ from twinmill.joints.action import Action, Usual
 from twinmill.joints.mjcf import Mjcf
 from twinmill.joints.series import Series
 from twinmill.joints.states import Run, with_run
-from twinmill.model.parameters import effect_names, instance_of, key_of
+from twinmill.model.parameters import instance_of, key_of, numbered
 
 CLOCK = "clock.offset_s"  # by which positions are stamped later than commands
 STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
@@ -48,6 +48,11 @@ class JointModel:
         self.catalogue, self.effects = catalogue, list[str]()
         self._numbers = dict(numbers)
 
+    @property
+    def instances(self) -> list[str]:
+        """Names of the effects in their order, each once: `coulomb@elbow`, `coulomb@elbow#2`."""
+        return numbered(self.effects)
+
     def copy(self) -> "JointModel":
         """Another one that may be changed."""
         other = JointModel(self.catalogue, self._numbers)
@@ -57,13 +62,13 @@ class JointModel:
     def add_effect(self, name: str) -> None:
         """Adds one of the catalogue at its default."""
         self.effects.append(name)
-        instance = effect_names(self)[-1]  # type: ignore[arg-type]
+        instance = self.instances[-1]
         for p in self.catalogue[name].parameters:
             self._numbers[f"{instance}.{p.key}"] = p.value
 
     def remove_effect(self, index: int) -> None:
         """Takes the effect at that place out."""
-        instance = effect_names(self)[index]  # type: ignore[arg-type]
+        instance = self.instances[index]
         name = self.effects.pop(index)
         for p in self.catalogue[name].parameters:
             del self._numbers[f"{instance}.{p.key}"]
@@ -88,7 +93,7 @@ class JointModel:
         for name in self._numbers:
             if instance_of(name) == "base":
                 self.catalogue[name].act(action, {"value": self.get(name)})
-        for instance in effect_names(self):  # type: ignore[arg-type]
+        for instance in self.instances:
             own = {key_of(n): v for n, v in self.own(instance).items()}
             self.catalogue[instance.split("#")[0]].act(action, own)
 
@@ -312,7 +317,7 @@ class Steps:
         for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
             if instance_of(name) in ("base", "clock"):
                 found = found + (value - NEUTRAL.get(name, 1.0)) * self._column(model, name)
-        for instance in effect_names(model):  # type: ignore[arg-type]
+        for instance in model.instances:
             kind = instance.split("#")[0]
             own, effect = model.own(instance, other), model.catalogue[kind]
             if effect.changes == "force":

@@ -14,8 +14,8 @@ from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import ModelFile, quantity_names
 from twinmill.model.parameters import (
     ParameterEstimate,
+    card_of,
     catalogue_name,
-    catalogue_of,
     effect_names,
 )
 
@@ -152,16 +152,15 @@ def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
 
 
 def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
-    entries, stds = catalogue_of(fitted.model), {e.name: e.std for e in fitted.estimates}
+    stds = {e.name: e.std for e in fitted.estimates}
     old = list(document.get("effect", []))
     tables = tomlkit.aot()
     instances = zip(effect_names(fitted.model), fitted.model.texts, strict=True)
     for i, (instance, texts) in enumerate(instances):
         table = tomlkit.table() if i >= len(old) else old[i]
-        name = catalogue_name(instance)
-        table["name"] = name
+        table["name"] = catalogue_name(instance)
         table.update({key: text for key, text in texts.items() if text})
-        keys = [p["name"] for p in entries[name]["parameters"]]
+        keys = [p["name"] for p in card_of(fitted.model, instance)["parameters"]]
         for key in keys:
             table[key] = _short(fitted.model.get(f"{instance}.{key}"))
         known = {

@@ -3,11 +3,11 @@
 
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 import twinmill_native as native
 
@@ -54,8 +54,11 @@ PHASE = "phase"  # role of where a formula's period is when a log begins
 NO_SIZE = (*WHERE_OR_WHEN, "radius", PHASE)  # roles that say nothing of how strong an effect is
 EFFECT_STEP = 0.05  # times the distance of an effect's default from its neutral value
 UNKNOWN = 20.0  # so many times what is known of the size of a formula's number it may be
-# `sin(0.2*t + p1)`, `cos(t/5 - p3)`: a number that ends the angle of a wave of the time.
-IN_A_WAVE = re.compile(r"\b(?:sin|cos)\(([^()]*\bt\b[^()]*)[+-]\s*(p[0-3])\s*\)")
+# `sin(0.2*t + p1)`, `cos(t/5 - p3)`: what ends the angle of a wave of the time.
+IN_A_WAVE = re.compile(r"\b(?:sin|cos)\(([^()]*\bt\b[^()]*)[+-]\s*([A-Za-z]\w*)\s*\)")
+RATES = {"state_rate": "s", "second_rate": "r"}  # texts of a formula, and states of which they are
+FORMULAS = ("formula", *RATES)  # those of its texts that compute
+FORMULA_NUMBERS = ("p0", "p1", "p2", "p3")  # where its author has no names for them
 
 
 @dataclass(frozen=True)
@@ -186,7 +189,7 @@ def acting_by_wheel_angle(model: native.Model) -> list[str]:
     return [
         instance
         for instance, texts in zip(effect_names(model), model.texts, strict=True)
-        if catalogue_name(instance) in phased or any("angle" in words(t) for t in texts.values())
+        if catalogue_name(instance) in phased or "angle" in words_of(texts)
     ]
 
 
@@ -211,9 +214,9 @@ def phases(model: native.Model) -> list[Parameter]:
 
 
 def _phase_keys(texts: Mapping[str, str]) -> list[str]:
-    """Those of p0 to p3 that are phases in an effect's texts."""
-    whole = " ".join(texts.values())
-    at = [key for _, key in IN_A_WAVE.findall(whole)]
+    """Numbers of a formula that are phases in an effect's texts."""
+    whole = " ".join(texts.get(key, "") for key in FORMULAS)
+    at = [key for _, key in IN_A_WAVE.findall(whole) if key in numbers_of(texts)]
     return [k for k in dict.fromkeys(at) if len(re.findall(rf"\b{k}\b", whole)) == at.count(k)]
 
 
@@ -254,11 +257,10 @@ def take_alignment(model: native.Model, of: native.Model) -> None:
 
 def unevenness(model: native.Model, wheel: str) -> float:
     """Ripple of a wheel over its angle, relative to its speed; 0 if only a formula describes it."""
-    cards = catalogue_of(model)
     own = [
         model.get(f"{instance}.{p['name']}")
         for instance in acting_by_wheel_angle(model)
-        for p in cards[catalogue_name(instance)]["parameters"]
+        for p in card_of(model, instance)["parameters"]
         if p["name"].startswith(f"{wheel}_")
     ]
     return math.hypot(*own)
@@ -326,14 +328,52 @@ def catalogue_of(model: native.Model) -> dict[str, dict[str, Any]]:
     return _of_kind[kind]
 
 
-def effect_names(model: native.Model) -> list[str]:
-    """Instance names of a model's effects in their order: `dead_zone`, `dead_zone#2`."""
+class Instances(Protocol):
+    """A model that names its effects; the twin's, or one of joints."""
+
+    @property
+    def instances(self) -> Sequence[str]:
+        """Names of its effects in their order, each once."""
+        ...
+
+
+def effect_names(model: Instances) -> list[str]:
+    """Instance names of a model's effects in their order.
+
+    They are `dead_zone` and `dead_zone#2`; `equation#air` is a formula that its author calls air.
+    """
+    return list(model.instances)
+
+
+def numbered(names: Sequence[str]) -> list[str]:
+    """Names of which each stands once: the second `dead_zone` is `dead_zone#2`."""
     seen: dict[str, int] = {}
-    names = []
-    for name in model.effects:
+    told = []
+    for name in names:
         seen[name] = seen.get(name, 0) + 1
-        names.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
-    return names
+        told.append(name if seen[name] == 1 else f"{name}#{seen[name]}")
+    return told
+
+
+def card_of(model: native.Model, instance: str) -> dict[str, Any]:
+    """Card of one effect of a model, with the parameters that it has there.
+
+    Those of a formula have the names and units that its author gave them.
+    """
+    card = catalogue_of(model)[catalogue_name(instance)]
+    if not card["texts"]:
+        return card
+    place = effect_names(model).index(instance)
+    own: dict[str, Any] = model.cards[place]
+    return {**own, "equation": equation_of(model.texts[place])}
+
+
+def equation_of(texts: Mapping[str, str]) -> str:
+    """Formula of an effect in one line, with what it is added to and the rates of its states."""
+    rates = [f"d{of}/dt = {texts[key]}" for key, of in RATES.items() if texts.get(key)]
+    start = f"{' = '.join(list(RATES.values())[: len(rates)])} = 0 at the start"
+    to = texts["adds_to"]
+    return ", ".join([f"{to}' = {to} + {texts['formula']}", *rates, *([start] if rates else [])])
 
 
 def newest_instance(model: native.Model, effect: str) -> str:
@@ -410,11 +450,11 @@ def effect_parameters(
     in the model.
     """
     place = effect_names(model).index(instance)
-    texts, name = model.texts[place], catalogue_name(instance)
+    texts = model.texts[place]
     own = _phase_keys(texts)
     found = []
-    for p in catalogue_of(model)[name]["parameters"]:
-        if texts and not any(p["name"] in words(text) for text in texts.values()):
+    for p in card_of(model, instance)["parameters"]:
+        if texts and p["name"] not in words_of(texts):
             continue
         if p["name"] in own or (p["role"] == DURATION and not gradual):
             continue
@@ -468,6 +508,21 @@ def duty_table(model: native.Model) -> list[str]:
 def words(formula: str) -> set[str]:
     """Names of parameters and signals in a formula."""
     return set(re.findall(r"[A-Za-z_]\w*", formula))
+
+
+def words_of(texts: Mapping[str, str]) -> set[str]:
+    """Names of numbers and signals in the formulas of an effect."""
+    return words(" ".join(texts.get(key, "") for key in FORMULAS))
+
+
+def numbers_of(texts: Mapping[str, str]) -> tuple[str, ...]:
+    """Names of a formula's numbers: those in the list `drag s/m, ratio` of its texts, or p0 to p3.
+
+    The twin, which reads that list, refuses what is no list of names.
+    """
+    listed = texts.get("numbers", "")
+    own = (entry.split() for entry in listed.split(","))
+    return tuple(words[0] for words in own if words) or FORMULA_NUMBERS
 
 
 def stated_names(model: native.Model, robot_id: int) -> set[str]:

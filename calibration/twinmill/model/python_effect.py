@@ -8,6 +8,7 @@ export to C++ have it at their usual speed.
 
 import inspect
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -17,10 +18,11 @@ import numpy as np
 import twinmill_native as native
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from twinmill.model.parameters import effect_names
+from twinmill.model.parameters import FORMULA_NUMBERS, effect_names
 
-PLACES = ("p0", "p1", "p2", "p3")  # numbers that a formula may have
+PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # names that the twin's formulas can have
 STATES = ("state_rate", "second_rate")
+EQUATION = ("adds_to", "formula", *STATES)  # those of the texts that compute
 TRIED = np.random.default_rng(1).uniform(0.05, 0.4, (16, 32))  # signals, as of slow robots
 
 # numpy's functions in the words of muParser.
@@ -76,9 +78,9 @@ class Number:
     high: float = math.inf
     prior: tuple[float, float] | None = None
 
-    def text(self, place: str) -> str:
+    def text(self, name: str) -> str:
         """The number, within its range, as a formula has it."""
-        text = place if self.low == -math.inf else f"max({place},{_number(self.low)})"
+        text = name if self.low == -math.inf else f"max({name},{_number(self.low)})"
         return text if self.high == math.inf else f"min({text},{_number(self.high)})"
 
 
@@ -144,12 +146,13 @@ class PythonEffect:
         self.adds_to, self.numbers = adds_to, dict(numbers)
         self._function = function
         self.__module__, self.__qualname__ = function.__module__, function.__qualname__
-        if not 1 <= len(self.numbers) <= len(PLACES):
+        if not 1 <= len(self.numbers) <= len(FORMULA_NUMBERS):
             raise ValueError(
                 f"{self.name}: has {len(self.numbers)} numbers; an effect has one to four."
             )
         self.texts = {"adds_to": adds_to, "formula": self._formula(function)}
         self.texts |= {key: self._formula(rate) for key, rate in rates.items() if rate is not None}
+        self.texts |= self._named()
         self._check_neutral()
 
     @property
@@ -159,26 +162,26 @@ class PythonEffect:
         return {
             "name": self.name,
             "summary": about,
-            "equation": "; ".join(f"{key}: {text}" for key, text in self.texts.items()),
+            "equation": "; ".join(
+                f"{key}: {self.texts[key]}" for key in EQUATION if key in self.texts
+            ),
             "parameters": [{"name": name, **vars(n)} for name, n in self.numbers.items()],
         }
 
     @property
     def priors(self) -> dict[str, tuple[float, float]]:
-        """By the places that numbers have in the formula."""
-        placed = zip(PLACES, self.numbers.values(), strict=False)
-        return {place: number.prior for place, number in placed if number.prior is not None}
+        """Mean and standard deviation of those numbers of which something is known before."""
+        return {name: n.prior for name, n in self.numbers.items() if n.prior is not None}
 
     def names(self, model: native.Model) -> dict[str, str]:
-        """Names of its numbers in a model, by their own names.
+        """Names of its numbers in a model, as `equation#air.drag`, by their own names.
 
         Raises:
             ValueError: the model does not have the effect.
         """
         for instance, texts in zip(effect_names(model), model.texts, strict=True):
             if all(texts.get(key) == text for key, text in self.texts.items()):
-                places = zip(self.numbers, PLACES, strict=False)
-                return {name: f"{instance}.{place}" for name, place in places}
+                return {name: f"{instance}.{name}" for name in self.numbers}
         raise ValueError(f"{self.name}: the model does not have this effect; add it first.")
 
     def __call__(self, *signals: Any, **named: Any) -> Any:
@@ -191,9 +194,29 @@ class PythonEffect:
     def __repr__(self) -> str:
         return f"PythonEffect({self.name}: {self.adds_to} + {self.texts['formula']})"
 
+    def _named(self) -> dict[str, str]:
+        """Texts that name the effect and its numbers; a lambda has no name.
+
+        Raises:
+            ValueError: a number has a name or unit that a formula cannot have.
+        """
+        for name, number in self.numbers.items():
+            if not PLAIN.fullmatch(name):
+                raise ValueError(
+                    f"{self.name}: its number '{name}' must be called by letters of English, "
+                    "figures and underscores, since a formula has this name."
+                )
+            if "," in number.unit:
+                raise ValueError(
+                    f"{self.name}: the unit '{number.unit}' of {name} has a comma, which parts "
+                    "numbers in a model's file; write it without."
+                )
+        named = {"called": self.name} if PLAIN.fullmatch(self.name) else {}
+        units = (f"{name} {number.unit}".strip() for name, number in self.numbers.items())
+        return {**named, "numbers": ", ".join(units)}
+
     def _formula(self, function: Callable[..., Any]) -> str:
-        placed = zip(self.numbers.items(), PLACES, strict=False)
-        own = {name: number.text(place) for (name, number), place in placed}
+        own = {name: number.text(name) for name, number in self.numbers.items()}
         return _text(function(*(Symbol(own.get(name, name)) for name in _arguments(function))))
 
     def _check_neutral(self) -> None:
@@ -247,7 +270,7 @@ def python_effect(
         ... def air(vx, drag):
         ...     return -drag * vx * abs(vx)
         >>> air
-        PythonEffect(air: vx_mps + (((-max(p0,0.0))*vx)*abs(vx)))
+        PythonEffect(air: vx_mps + (((-max(drag,0.0))*vx)*abs(vx)))
     """
     rates = dict(zip(STATES, (state_rate, second_rate), strict=True))
     return partial(PythonEffect, adds_to=adds_to, numbers=numbers, rates=rates)

@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.typing import RcKeyType
 
     from twinmill.report.picture import Picture
@@ -48,8 +51,14 @@ class Svg(str):
     picture: Picture
 
 
-def draw(height_in: float, paint: Callable[..., None], **grid) -> Svg:
-    """Paints axes laid out by `grid` (as for subplots) and gives the SVG element."""
+def draw(height_in: float, paint: Callable[..., None], **grid: Any) -> Svg:
+    """Paints axes laid out by `grid` (as for subplots) and gives the SVG element.
+
+    Args:
+        height_in: of the figure, in inches.
+        paint: is given the axes, or an array of them where there are several.
+        grid: as `Figure.subplots` has it.
+    """
     from twinmill.report.picture import Picture
 
     picture = Picture.of(STYLE, (WIDTH_IN, height_in), lambda p: paint(p.subplots(**grid)))
@@ -58,7 +67,12 @@ def draw(height_in: float, paint: Callable[..., None], **grid) -> Svg:
     return svg
 
 
-def plain_ticks(axis) -> None:
+def each_of(panels: Axes | np.ndarray) -> list[Axes]:
+    """Axes that a painter is given, row by row, however many they are."""
+    return list(np.ravel(np.asarray(panels, object)))
+
+
+def plain_ticks(axis: Axis) -> None:
     """Numbers without exponents on a logarithmic axis."""
     from matplotlib.ticker import LogLocator
 

@@ -12,6 +12,7 @@ from twinmill.charts.embedded import Shown, embedded
 from twinmill.fitting.compare import Comparison, RobotComparison
 from twinmill.predict.detections import all_detections
 from twinmill.predict.regimes import HORIZON
+from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.report.tables import number
 
 STRETCH_S = 20.0  # that can be looked at without getting lost
@@ -26,14 +27,14 @@ def charts(
         result: its models' predictions are shown.
         beside: another model of each robot of the result with its label, or None; or nothing.
     """
-    places = [k for k, r in enumerate(result.robots) if isinstance(r, RobotComparison)]
-    robots = [result.robots[k] for k in places]
-    others = [beside[k] if beside else None for k in places]
+    own = [(k, r) for k, r in enumerate(result.robots) if isinstance(r, RobotComparison)]
+    robots = [robot for _, robot in own]
+    others = [beside[k] if beside else None for k, _ in own]
     return partial(_drawn, result.shown, robots, others) if robots else None
 
 
 def _drawn(
-    begin: RobotComparison,
+    begin: RobotComparison | SteadyComparison,
     robots: list[RobotComparison],
     others: list[tuple[str, native.Model] | None],
 ) -> str:

@@ -3,7 +3,7 @@
 
 from dataclasses import replace
 
-from twinmill.fitting.compare import GOOD, SUSPECT, Comparison
+from twinmill.fitting.compare import GOOD, SUSPECT, Comparison, RobotComparison
 from twinmill.model.parameters import catalogue_of
 from twinmill.predict.steady_errors import ON_BENCH, SteadyComparison
 from twinmill.report import detections, steady, tables
@@ -26,14 +26,14 @@ def steady_comparisons(comparison: Comparison) -> list[SteadyComparison]:
 
 def facts(comparison: Comparison) -> list[tuple[str, str]]:
     """Log, model and settings of a comparison: label and text."""
-    if isinstance(comparison.shown, SteadyComparison):
-        return steady.facts(steady_comparisons(comparison), comparison.model_name)
-    return tables.facts(comparison)
-
-
-def _of_shown(comparison: Comparison) -> list[Table]:
-    """Errors and regimes of the robot that is shown; of several it is named."""
     robot = comparison.shown
+    if isinstance(robot, SteadyComparison):
+        return steady.facts(steady_comparisons(comparison), comparison.model_name)
+    return tables.facts(comparison, robot)
+
+
+def _of_shown(comparison: Comparison, robot: RobotComparison) -> list[Table]:
+    """Errors and regimes of the robot that is shown; of several it is named."""
     made = [tables.errors(robot), tables.where(robot)]
     if len(comparison.robots) == 1:
         return made
@@ -42,9 +42,9 @@ def _of_shown(comparison: Comparison) -> list[Table]:
 
 def robot_tables(comparison: Comparison) -> list[Table]:
     """Errors and regimes: of the robot that is shown, then of all tables."""
-    made = []
-    if not isinstance(comparison.shown, SteadyComparison):
-        made += _of_shown(comparison)
+    made, shown = [], comparison.shown
+    if not isinstance(shown, SteadyComparison):
+        made += _of_shown(comparison, shown)
     if sheets := steady_comparisons(comparison):
         made += [table for kind in steady.kinds(sheets) for table in steady.tables(kind)]
     if comparison.detections:

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Predicted and measured detections of cameras, as tables and as a figure."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +13,9 @@ from twinmill.predict.detection_errors import SHOWN, Confusion, DetectionCompari
 from twinmill.report.canvas import draw
 from twinmill.report.html import Figure
 from twinmill.report.tables import Cell, Table, number, tone
+
+if TYPE_CHECKING:
+    pass
 
 BINS = 6
 COLUMNS = ["seen\nboth", "missed", "false", "unseen\nboth", "agree"]
@@ -105,7 +111,7 @@ def field_of_view(detections: DetectionComparison, title: str = "What the camera
         for kind in kinds:
             shares[kind][r, b] = cell[f"{kind}_share"]
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         for axes, kind in zip(panels, kinds, strict=True):
             mesh = axes.pcolormesh(
                 bearings, ranges, shares[kind], cmap="viridis", vmin=0, vmax=1, rasterized=False

@@ -16,6 +16,7 @@ from twinmill.diagnosis.outliers import Outlier, in_words
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
+from twinmill.fitting.not_shown import robot_of
 from twinmill.fitting.settings import FLOOR_SETTINGS
 from twinmill.listing import listed
 from twinmill.model.parameters import ParameterEstimate, catalogue
@@ -412,7 +413,7 @@ def found_models(diagnosis: Diagnosis) -> list[tuple[str, native.Model] | None]:
     }
     beside = []
     for own in diagnosis.opened:
-        label, models = off.get(own.measurement.track.robot_id, (common, iter(())))
+        label, models = off.get(robot_of(own), (common, iter(())))
         model = next(models, own.model) if own.floor else own.model
         beside.append((label, model) if label else None)
     return beside

@@ -107,7 +107,7 @@ def _galleries(hunt: Hunt, shown: list[Entry], present: list[str]) -> list[Figur
 def _gallery(hunt: Hunt, kind: str, best: list[Entry]) -> Figure:
     rows = -(-len(best) // ACROSS)
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         for axes in panels.flat:
             axes.set_axis_off()
         for axes, entry in zip(panels.flat, best, strict=False):
@@ -170,6 +170,5 @@ def _measured(entry: Entry) -> list[Cell]:
     """Its measures in their units."""
     values = dict(zip(MEASURES, entry.measures, strict=True))
     values |= {name: 10 ** values[name] for name in LOGARITHMS}
-    if not entry.mix.odd_count:
-        values["odd_ratio"] = None
-    return [Cell(number(value, 2)) for value in values.values()]
+    told = {**values, **({} if entry.mix.odd_count else {"odd_ratio": None})}
+    return [Cell(number(value, 2)) for value in told.values()]

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot's numbers over its calibrations: sentences, the page, and the picture."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.report import show
-from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw
+from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw, each_of
 from twinmill.report.html import Figure, Section
-from twinmill.report.tables import Cell, Table, number
+from twinmill.report.tables import Cell, Table, Tone, number
 from twinmill.runs.drift import FEWEST_BEFORE, Drift, Series
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 NOTE = (
     "The band of a number is where the next calibration of an unchanged robot lies, by those "
@@ -60,7 +68,7 @@ def numbers(result: Drift) -> Table:
     """Each number: its course, the last value, and its band."""
     rows = []
     for s in result.series:
-        tone = "bad" if s.left else ""
+        tone: Tone = "bad" if s.left else ""
         band = "-" if np.isnan(s.low[-1]) else f"{number(s.low[-1])} to {number(s.high[-1])}"
         rows.append(
             [
@@ -116,7 +124,7 @@ def section(result: Drift) -> Section:
     )
 
 
-def _logs(logs) -> str:
+def _logs(logs: Sequence[tuple[str, str]]) -> str:
     return ", ".join(path for path, _ in logs)
 
 
@@ -126,8 +134,9 @@ def courses(result: Drift) -> Figure:
 
     dates = np.array([c.date.replace(tzinfo=None) for c in result.calibrations])
 
-    def paint(panels) -> None:
-        for axes, s in zip(np.ravel(panels), result.series, strict=True):
+    def paint(panels: Axes | np.ndarray) -> None:
+        every = each_of(panels)
+        for axes, s in zip(every, result.series, strict=True):
             at = dates[s.days]
             axes.fill_between(at, s.low, s.high, color=FLOOR, alpha=0.18, lw=0)
             reach = 1.96 * s.stds
@@ -138,8 +147,8 @@ def courses(result: Drift) -> Figure:
             unit = "" if s.last.unit == "1" else f" ({s.last.unit})"
             axes.set_title(f"{s.last.name}{unit}", loc="left")
         locator = AutoDateLocator(maxticks=6)
-        np.ravel(panels)[-1].xaxis.set_major_locator(locator)
-        np.ravel(panels)[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
+        every[-1].xaxis.set_major_locator(locator)
+        every[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))
 
     count = len(result.series)
     return Figure(
@@ -149,7 +158,7 @@ def courses(result: Drift) -> Figure:
     )
 
 
-def _limits(axes, s: Series, reach: np.ndarray) -> None:
+def _limits(axes: Axes, s: Series, reach: np.ndarray) -> None:
     """A band of few calibrations is so wide that it would hide the points."""
     low, high = float((s.values - reach).min()), float((s.values + reach).max())
     margin = 0.6 * (high - low) or 1.0

@@ -1,16 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of errors: how they grow, when they come, and what each step took away."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twinmill.fitting.compare import GOOD, MISSING, RobotComparison
+from twinmill.predict.regimes import Regime
 from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
-from twinmill.report.canvas import BEFORE, FLOOR, PREDICTED, draw, legend_above, plain_ticks
+from twinmill.report.canvas import (
+    BEFORE,
+    FLOOR,
+    PREDICTED,
+    draw,
+    each_of,
+    legend_above,
+    plain_ticks,
+)
 from twinmill.report.html import Figure
 from twinmill.report.tables import SHOWN, WORST, number
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 TONES = {"good": "#009e73", "warn": "#e69f00", "bad": "#d55e00"}
 
@@ -23,9 +38,9 @@ def error_growth(models: Sequence[tuple[str, RobotComparison]]) -> Figure:
         (c, *named) for c, named in enumerate(CHANNELS) if np.isfinite(floors[:, c]).any()
     ]
 
-    def paint(panels) -> None:
-        panels = np.atleast_1d(panels)
-        for (c, channel, unit), axes in zip(shown_channels, panels, strict=True):
+    def paint(panels: Axes | np.ndarray) -> None:
+        every = each_of(panels)
+        for (c, channel, unit), axes in zip(shown_channels, every, strict=True):
             factor, shown = SHOWN[unit]
             floor = floors[:, c] * factor
             found = [rms(robot.errors)[:, c] * factor for _, robot in models]
@@ -43,15 +58,15 @@ def error_growth(models: Sequence[tuple[str, RobotComparison]]) -> Figure:
             )
             plain_ticks(axes.xaxis)
             plain_ticks(axes.yaxis)
-        legend_above(panels[0], 3)
-        panels[-1].set_xlabel("horizon (s)")
+        legend_above(every[0], 3)
+        every[-1].set_xlabel("horizon (s)")
 
     return Figure(
         draw(2.0 * len(shown_channels), paint, nrows=len(shown_channels), sharex=True),
         "Errors over the horizon",
-        "Errors grow with the horizon. Inside the green band an error cannot be distinguished "
-        "from noise: a line along its edge is as good as this log can show. The scale is "
-        "logarithmic.",
+        "RMS errors grow with the horizon. Inside the green band an error cannot be distinguished "
+        "from noise: its edge is the noise floor, one standard deviation of what noise alone "
+        "causes, and a line along it is as good as this log can show. The scale is logarithmic.",
     )
 
 
@@ -59,14 +74,15 @@ def regimes(
     robot: RobotComparison | SteadyComparison, of: str = "Predictions half a second ahead"
 ) -> Figure:
     """Error over floor by what the robot was doing."""
-    shown, labels, groups = [], [], {}
+    shown, labels = [], []
+    groups: dict[str, list[Regime]] = {}
     for regime in robot.where:
         groups.setdefault(regime.group, []).append(regime)
     for group, members in groups.items():
         shown += members[:WORST]
         labels += [f"{group}: {r.regime}" for r in members[:WORST]]
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         at = np.arange(len(shown))
         ratios = np.array([r.ratio for r in shown])
         colours = [
@@ -117,7 +133,7 @@ def waterfall(scores: list[tuple[str, float]], judged: str = HELD_OUT) -> Figure
     """
     values = np.array([score for _, score in scores])
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         at = np.arange(len(scores))
         low = min(0.9, 0.9 * values.min())
         axes.barh(at, values - low, left=low, color="#d9d9d9", height=0.62)

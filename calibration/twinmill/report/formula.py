@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A formula for what is left, in words and drawn over the data."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +17,9 @@ from twinmill.diagnosis.taking import Taken
 from twinmill.diagnosis.units import ADDS_TO, NAMES
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
 from twinmill.report.html import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PARTS = {
     "motion": "share of all speeds",
@@ -104,7 +110,7 @@ def figures(rest: Rest) -> Sequence[Figure]:
     found, curve = rest.proven, rest.proven.curve
     to = found.forms[0].adds_to
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         axes.errorbar(
             curve.at,
             curve.left,

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from twinmill.arguments import option
 from twinmill.fitting.compare import Comparison
-from twinmill.inference.answer import Answer, Named
+from twinmill.inference.answer import Answer, Named, units_of
 from twinmill.inference.infer import Inference
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
@@ -23,7 +23,7 @@ from twinmill.report.canvas import FLOOR, PREDICTED, draw
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import beside, robot_pictures
-from twinmill.report.tables import VERDICTS, Cell, Table, number, tone
+from twinmill.report.tables import VERDICTS, Cell, Table, number, of_unit, tone
 
 if TYPE_CHECKING:
     from twinmill.inference.better import Better
@@ -33,6 +33,17 @@ ONE_BY_ONE = (
     "alone may be its own gains. For all results of one robot, give its logs alone."
 )
 SHOWN = 0.01  # probability of an effect that is listed; --json has all
+SHARES = (
+    "Shares are of the squared error that the refitted base leaves above the noise: an effect's is "
+    "that of the change that it makes by itself, a dependence's what it removes beside these "
+    "effects. What changes the same motion overlaps, so they do not add up to 100 %."
+)
+SCORES = (
+    "Scores are RMS errors of predictions 0.1 to 2 s ahead over the noise floor. The models are "
+    "the most probable ones by steps of 0.1 s and what was known before, not those with the least "
+    "score, so a score may also rise; what has no name is in none of them."
+)
+SEVERAL = "Several dependences may be there at once: their probabilities do not add up to 100 %."
 
 
 def sentence(answer: Answer) -> str:
@@ -105,7 +116,7 @@ def section(
         [
             *([probabilities(one.answer)] if one else []),
             *(figure for left in (one.left if one else ()) for figure in unnamed.figures(left)),
-            waterfall(scores, "on the logs that were judged"),
+            _fall(scores),
             *robot_pictures(before, errors),
         ],
         _tables(one) if one else [_robots(results)],
@@ -125,6 +136,12 @@ def _joined(each: Sequence[Comparison]) -> Comparison:
     """One comparison of the robots of several."""
     robots = [robot for one in each for robot in one.robots]
     return replace(each[0], robots=robots, warnings=[w for one in each for w in one.warnings])
+
+
+def _fall(scores: list[tuple[str, float]]) -> Figure:
+    """Fall of the score, with what the three models are."""
+    drawn = waterfall(scores, "on the logs that were judged")
+    return replace(drawn, caption=f"{drawn.caption} {SCORES}")
 
 
 def _verdicts(results: Sequence[Inference]) -> list[str]:
@@ -188,7 +205,8 @@ def _robots(results: Sequence[Inference]) -> Table:
     rows = []
     for result in results:
         numbers = "; ".join(
-            f"{f.effect}.{name} {number(value)} ± {number(std, 2)}"
+            f"{f.effect}.{name} {number(value)} ± {number(std, 2)} "
+            f"{of_unit(units_of(f.effect).get(name, ''))}".rstrip()
             for f in result.answer.findings
             for name, (value, std) in f.numbers.items()
         )
@@ -204,9 +222,11 @@ def terminal(result: Inference) -> RenderableType:
     )
     if result.finds:
         scores += f", {number(result.after.score)} with what was found"
+    falls = result.before.score >= result.refitted.score >= result.after.score
     return Group(
         Text(sentence(result.answer), show.STYLES[VERDICTS[result.answer.verdict]]),
         Text(scores),
+        *([] if falls else [Text(SCORES)]),
         Text(),
         *map(show.table, _tables(result)),
         *map(Text, (*_formula(result), *_known(result))),
@@ -298,11 +318,12 @@ def _effects(findings: list[Named]) -> Table:
                     Cell(name),
                     Cell(number(value)),
                     Cell(f"± {number(std, 2)}"),
+                    Cell(of_unit(units_of(f.effect).get(name, ""))),
                     Cell("" if k else str(catalogue()[f.effect]["summary"])),
                 ]
             )
-    columns = ["effect", "probability", "number", "value", "std", "what it is"]
-    return Table("Missing effects", columns, rows, words=(0, 2, 5))
+    columns = ["effect", "probability", "number", "value", "std", "unit", "what it is"]
+    return Table("Missing effects", columns, rows, words=(0, 2, 5, 6))
 
 
 def _others(answer: Answer) -> Table | None:
@@ -318,5 +339,10 @@ def _others(answer: Answer) -> Table | None:
 
 def _dependences(answer: Answer) -> Table:
     rows = [[Cell(word), Cell(percent(p), bar=p)] for word, p in answer.depends_on.items()]
-    note = f"The first explains {percent(answer.share)} of the squared error above the noise."
-    return Table("The residual depends on", ["", "probability"], rows, note=note)
+    return Table("The residual depends on", ["", "probability"], rows, note=of_rest(answer))
+
+
+def of_rest(answer: Answer) -> str:
+    """Share of the likeliest dependence, in a sentence, and what its shares and chances are of."""
+    several = f" {SEVERAL}" if len(answer.depends_on) > 1 else ""
+    return f"The first removes {percent(answer.share)}.{several} {SHARES}"

@@ -14,7 +14,7 @@ from twinmill.joints.explain import JointExplanation
 from twinmill.joints.importers.import_joints import ImportedJoints
 from twinmill.joints.next import Excitation, sure
 from twinmill.report import show
-from twinmill.report.inference import percent, sentence
+from twinmill.report.inference import SHARES, of_rest, percent, sentence
 from twinmill.report.tables import Cell, Table, number
 
 QUESTIONS = 8  # that are listed, those first that stay open; --json has all
@@ -39,7 +39,7 @@ def diagnosis(found: JointDiagnosis) -> RenderableType:
         parts += [show.table(Table("Not ruled out", ["effect", "probability"], rows))]
     if answer.depends_on:
         rows = [[Cell(word), Cell(percent(p), bar=p)] for word, p in answer.depends_on.items()]
-        note = f"The first explains {percent(answer.share)} of the squared error above the noise."
+        note = of_rest(answer)
         parts += [
             show.table(Table("The residual depends on", ["", "probability"], rows, note=note))
         ]
@@ -153,5 +153,5 @@ def _effects(found: JointDiagnosis) -> Table:
                 ]
             )
     columns = ["effect", "probability", "takes", "number", "value", "std", "held by", "what it is"]
-    note = "takes: of the squared error above the noise; hook: a Python file that `explain` writes."
+    note = f"takes: its share. {SHARES} hook: a Python file that `explain` writes."
     return Table("Missing effects", columns, rows, words=(0, 3, 6, 7), note=note)

@@ -2,6 +2,7 @@
 """Pictures of a log: paths, speeds, bits, commands; one painter per picture."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -60,8 +61,15 @@ class Drawing:
             axes.plot(x, y, "o", ms=6, color=color, zorder=3)
             front = (np.cos(theta_rad), np.sin(theta_rad))
             axes.quiver(x, y, *front, color=color, width=0.004, scale=18, zorder=3)
-            words = {"xytext": (7, 5), "textcoords": "offset points", "fontsize": 8}
-            axes.annotate(recorded.name, (x, y), color=color, fontweight="bold", **words)
+            axes.annotate(
+                recorded.name,
+                (x, y),
+                xytext=(7, 5),
+                textcoords="offset points",
+                fontsize=8,
+                color=color,
+                fontweight="bold",
+            )
         axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", adjustable="datalim")
         axes.xaxis.set_major_locator(MaxNLocator(8))
 
@@ -69,7 +77,8 @@ class Drawing:
         """Forward velocity of each robot over time, in m/s, from poses."""
         self._velocity(axes, 0, 1.0, "forward (m/s)")
         if len(self.tracked) > 1:
-            legend_above(axes, min(int(axes.figure.get_figwidth()), len(self.tracked)))
+            width_in = axes.figure.bbox.width / axes.figure.dpi
+            legend_above(axes, min(int(width_in), len(self.tracked)))
 
     def turn(self, axes: Axes) -> None:
         """Turn rate of each robot over time, in rad/s, counter-clockwise, from poses."""
@@ -135,7 +144,7 @@ class Drawing:
         unknown = (last < 0) | (t_s - stamps_s[np.maximum(last, 0)] > silent_s)
         return np.where(unknown[:, None], np.nan, values[np.maximum(last, 0)])
 
-    def _strip(self, rows: int) -> dict:
+    def _strip(self, rows: int) -> dict[str, Any]:
         return {
             "aspect": "auto",
             "interpolation": "none",

@@ -125,19 +125,20 @@ def share_figure(found: Sensitivity) -> Figure:
 
 def _turned_figure(found: Sensitivity) -> list[Figure]:
     """One run before and after each of the changes that matter most."""
-    picked = [j for j in found.of(MATTERS, UNSURE) if j.worst.turned is not None][:PAIRS]
+    unsure = ((j, j.worst.turned) for j in found.of(MATTERS, UNSURE))
+    picked = [(j, seed) for j, seed in unsure if seed is not None][:PAIRS]
     if not picked:
         return []
 
-    def paint(panels) -> None:
-        for pair, result in zip(panels.T, picked, strict=True):
+    def paint(panels: np.ndarray) -> None:
+        for pair, (result, seed) in zip(panels.T, picked, strict=True):
             outcome = result.worst
             for axes, text in zip(
                 pair, (found.request.model_text, outcome.change.text), strict=True
             ):
                 cell = replace(found.request, model_text=text).cell(())
                 length_s = found.request.duration_s
-                trace = native.trace_world(cell, outcome.turned, length_s, TRACE_EVERY_S)
+                trace = native.trace_world(cell, seed, length_s, TRACE_EVERY_S)
                 paint_paths(axes, trace[-int(TRACE_S / TRACE_EVERY_S) :], FLOOR)
             pair[0].set_title(f"{label(result)}\nbefore", fontsize=7.5)
             pair[1].set_title("after", fontsize=7.5)

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figure of motion: where on the floor it differs from what was predicted."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from twinmill.fitting.compare import RobotComparison
@@ -9,6 +13,9 @@ from twinmill.predict.residual import rotate
 from twinmill.predict.windows import HORIZONS_S
 from twinmill.report.canvas import PREDICTED, draw
 from twinmill.report.html import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 CELLS = 9  # of the floor map along its longer side
 
@@ -26,11 +33,11 @@ def floor_map(robot: RobotComparison) -> Figure:
     span = max(float(np.ptp(place, axis=0).max(initial=0)), 0.2)
     scale = 0.9 * span / CELLS / largest
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         from matplotlib.ticker import MaxNLocator  # see canvas: only where something is drawn
 
         tip = place + scale * mean
-        axes.scatter(*place.T, s=4 + 2 * np.sqrt(count), color="#bbbbbb", zorder=2)
+        axes.scatter(place[:, 0], place[:, 1], s=4 + 2 * np.sqrt(count), color="#bbbbbb", zorder=2)
         axes.quiver(
             *place.T,
             *(tip - place).T,

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of a planned run: its commands, its path, and the power for each effect."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.patches import Rectangle
 
@@ -8,6 +12,9 @@ from twinmill.experiment.design import ENOUGH_CHI2, Plan
 from twinmill.experiment.power import percent
 from twinmill.report import Figure
 from twinmill.report.canvas import BEFORE, FLOOR, MEASURED, PREDICTED, draw, legend_above
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WHEELS = ("front left", "front right", "rear left", "rear right")
 VELOCITIES = ("forward (m/s)", "left (m/s)", "turn (rad/s)")
@@ -23,7 +30,7 @@ def commands(plan: Plan) -> Figure:
     names = WHEELS if duties else VELOCITIES
     told = told * (100 if duties else 1)
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         for column, axes in enumerate(panels):
             axes.fill_between(t_s, told[:, column], step="post", color=BEFORE, alpha=0.3, lw=0)
             axes.step(t_s, told[:, column], where="post", color=BEFORE, lw=1)
@@ -46,7 +53,7 @@ def floor(plan: Plan) -> Figure:
     thin = max(1, round(EVERY_S / float(np.median(np.diff(plan.pose_t_s)))))
     along_m, across_m = plan.limits.floor_m
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         corner = (-along_m / 2, -across_m / 2)
         axes.add_patch(Rectangle(corner, along_m, across_m, fill=False, ec=MEASURED, lw=1.5))
         for k, path in enumerate(plan.paths[1:]):
@@ -73,7 +80,7 @@ def margins(plan: Plan) -> Figure:
     before = np.maximum([c.margin_before for c in plan.chances], LEAST_CHI2)
     after = np.maximum([c.margin for c in plan.chances], LEAST_CHI2)
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         at = np.arange(len(names))
         low = LEAST_CHI2 / 2
         axes.barh(at - 0.2, before - low, left=low, height=0.36, color="#bdbdbd", label="before")

@@ -2,7 +2,9 @@
 """Pictures of a phase diagram: map, probability, what the swarm does, and a map to play with."""
 
 import json
+from collections.abc import Sequence
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -13,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from scipy.interpolate import CubicSpline
 
 from twinmill.report import Figure
-from twinmill.report.canvas import WIDTH_IN, draw
+from twinmill.report.canvas import WIDTH_IN, Svg, draw
 from twinmill.swarm.axes import Axis
 from twinmill.swarm.classes import COLORS, WORDS, interval
 from twinmill.swarm.experiments import Experiment
@@ -77,7 +79,7 @@ def slice_words(phase: Phase, at: dict[str, float]) -> str:
 
 
 def map_figure(
-    phase: Phase, at: dict[str, float], runs: list[Experiment], worth: list[dict]
+    phase: Phase, at: dict[str, float], runs: list[Experiment], worth: list[dict[str, Any]]
 ) -> Figure:
     """The class of each cell, as the paper draws it."""
     cells, x, y = _grid(phase, at)
@@ -114,7 +116,7 @@ def maps_figure(phases: dict[str, Phase], title: str, caption: str) -> Figure:
     cells, x, y = _grid(first, {})
     rows = -(-len(phases) // MAPS_ACROSS)
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         for axes in panels.flat[len(phases) :]:
             axes.set_axis_off()
         for axes, (name, phase) in zip(panels.flat, phases.items(), strict=False):
@@ -172,11 +174,16 @@ def _paint_cell(
 
 
 def _mark(
-    axes: Axes, phase: Phase, cells: np.ndarray, runs: list[Experiment], *, worth: list[dict]
+    axes: Axes,
+    phase: Phase,
+    cells: np.ndarray,
+    runs: list[Experiment],
+    *,
+    worth: list[dict[str, Any]],
 ) -> None:
     shown = set(cells.flat)
 
-    def place(point) -> tuple[float, float]:
+    def place(point: Sequence[float]) -> tuple[float, float]:
         return point[0], point[1] if len(point) > 1 else 0.5
 
     for run in runs:
@@ -240,7 +247,7 @@ def thumbnail_figure(phase: Phase, at: dict[str, float]) -> Figure:
         for k in sorted(set(phase.mode[cells.flat].tolist()))
     ]
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         for axes, (k, cell) in zip(np.ravel(panels), picks, strict=True):
             paint_paths(axes, _typical(phase, cell, k), COLORS[CLASSES[k]])
             where = phase.where(cell, 2).replace(", ", "\n")
@@ -296,7 +303,7 @@ def paint_paths(axes: Axes, trace: np.ndarray, color: str, odd: int = 0) -> None
         spine.set_visible(True)
 
 
-def around(points: np.ndarray) -> dict:
+def around(points: np.ndarray) -> dict[str, tuple[float, float]]:
     """Limits of a square with all (T, n, 2) points in it."""
     low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
     half = 0.54 * float((high - low).max())
@@ -317,7 +324,7 @@ def slider_figure(phase: Phase) -> Figure:
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     script = files("twinmill.report").joinpath("slider.js").read_text()
     return Figure(
-        f'<div id="phase"></div><script>const PHASE={text};\n{script}</script>',
+        Svg(f'<div id="phase"></div><script>const PHASE={text};\n{script}</script>'),
         "Move through all axes",
         "Choose what goes along and up; the sliders set the rest. Point at a cell for its counts.",
     )

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two runs of one robot: sentences, and the page with both on one axis of time."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Sequence
 from functools import partial
 from importlib.resources import files
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import twinmill_native as native
 from rich.console import Group, RenderableType
 from rich.text import Text
 
@@ -16,14 +21,17 @@ from twinmill.fitting.opening import Opened
 from twinmill.predict.regimes import HORIZON
 from twinmill.predict.windows import HORIZONS_S
 from twinmill.report import show
-from twinmill.report.canvas import MEASURED, PREDICTED, draw
+from twinmill.report.canvas import MEASURED, PREDICTED, draw, each_of
 from twinmill.report.html import Figure, Section
-from twinmill.report.tables import Cell, Table, number
+from twinmill.report.tables import Cell, Table, Tone, number
 from twinmill.runs.changes import MOSTLY, Change
 from twinmill.runs.compare import Named, RunComparison
 from twinmill.runs.difference import follows_charge
 from twinmill.runs.rate import runs_for
 from twinmill.runs.reference import CHARGE_STD
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 SHOWN = {"1": (100.0, "%"), "s": (1000.0, "ms")}  # unit: factor, as a person reads it
 HINT = (
@@ -184,7 +192,7 @@ def numbers(result: RunComparison) -> Table:
     for change in result.alarm.tested.changes():
         factor, unit = SHOWN[change.kind.unit]
         low, high = change.interval
-        tone = "bad" if change.kind.key in named else ""
+        tone: Tone = "bad" if change.kind.key in named else ""
         half, most = (result.alarm.shown(change, share) for share in (0.5, MOSTLY))
         rows.append(
             [
@@ -203,7 +211,7 @@ def numbers(result: RunComparison) -> Table:
 def section(result: RunComparison) -> Section:
     """The page: what changed, both runs over one time, and all differences."""
     first, second = (o.measurement for o in (result.first, result.second))
-    tone = "bad" if result.changed else "good"
+    tone: Tone = "bad" if result.changed else "good"
     return Section(
         f"{second.log_name} against {first.log_name}",
         [
@@ -226,8 +234,8 @@ def intervals(result: RunComparison) -> Figure:
     units = [u for u in SHOWN if any(c.kind.unit == u for c in changes)]
     counts = [sum(c.kind.unit == u for c in changes) for u in units]
 
-    def paint(panels) -> None:
-        for axes, unit in zip(np.ravel(panels), units, strict=True):
+    def paint(panels: Axes | np.ndarray) -> None:
+        for axes, unit in zip(each_of(panels), units, strict=True):
             own = [c for c in changes if c.kind.unit == unit][::-1]
             factor, words = SHOWN[unit]
             for row, change in enumerate(own):
@@ -261,10 +269,9 @@ def intervals(result: RunComparison) -> Figure:
 def _charts(result: RunComparison) -> str:
     """A piece of HTML with all its data, drawn by a script in it."""
     runs = (result.first, result.second)
-    starts = [start_s(o.measurement.track) for o in runs]
+    starts = [start_s(o.track) for o in runs]
     speeds = [
-        measured_speed(o.measurement.track)["speed"] - [s, 0, 0, 0]
-        for o, s in zip(runs, starts, strict=True)
+        measured_speed(o.track)["speed"] - [s, 0, 0, 0] for o, s in zip(runs, starts, strict=True)
     ]
     errors = [_errors(o, result, k) - [starts[k], 0, 0, 0] for k, o in enumerate(runs)]
     horizon = HORIZONS_S[HORIZON]
@@ -282,7 +289,7 @@ def _charts(result: RunComparison) -> str:
         "panels": panels,
         "marks": np.round(_marks(result) - starts[1], 2).tolist(),
         "since": [
-            round(n.onset.at_s + float(result.second.data.start_s[0]) - starts[1], 2)
+            round(n.onset.at_s + float(result.second.trajectory.start_s[0]) - starts[1], 2)
             for n in result.changes
             if not n.onset.from_start
         ],
@@ -303,7 +310,12 @@ def start_s(track: Track) -> float:
     return float(track.command_t_s[moving[0]]) if moving.size else float(track.pose_t_s[0])
 
 
-def _panels(series: list[np.ndarray], titles, units, factors) -> list[dict]:
+def _panels(
+    series: list[np.ndarray],
+    titles: Sequence[str],
+    units: Sequence[str],
+    factors: Sequence[float],
+) -> list[dict[str, Any]]:
     found = []
     for k, (title, unit, factor) in enumerate(zip(titles, units, factors, strict=True), 1):
         curves = [{"t": _rounded(s[:, 0], 2), "v": _rounded(factor * s[:, k], 3)} for s in series]
@@ -322,7 +334,7 @@ def _errors(opened: Opened, result: RunComparison, run: int) -> np.ndarray:
     return np.column_stack([data.start_s, np.where(data.keep[:, None], errors, np.nan)])
 
 
-def _model(result: RunComparison, run: int, changed: bool):
+def _model(result: RunComparison, run: int, changed: bool) -> native.Model:
     """The fit's model of a run, with the first run's numbers or with what is told as changed."""
     whole, model = result.whole, result.whole.fit.models[run].copy()
     if run == 0:

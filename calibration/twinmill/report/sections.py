@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results of calibration to sections of a report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import Comparison, RobotComparison
 from twinmill.fitting.fit import FitResult
+from twinmill.predict.detection_errors import DetectionComparison
+from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.report import comparisons, detections, steady, tables
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import error_growth, regimes, waterfall
@@ -39,19 +41,21 @@ def fit_section(result: FitResult) -> Section:
     """Section on one fit: the pictures of a comparison, beside the old model's errors."""
     log_name = result.after.shown.measurement.log_name
     return _of_both(
-        result,
+        (result.before, result.after),
         f"{result.before.model_name} fitted to {log_name}",
+        quantities=tables.parameters(result.parameters, result.held),
         more=comparisons.robot_tables(result.after),
     )
 
 
 def added_section(result: AddResult) -> Section:
     """The page of an added effect: scores on data fitted to and held out, and estimates."""
-    if result.of_camera:
-        return _camera_section(result)
+    if not (both := result.of_motion):
+        return _camera_section(result, result.of_detections)
     section = _of_both(
-        result,
-        f"{result.label} added to {result.before.model_name}",
+        both,
+        f"{result.label} added to {both[0].model_name}",
+        quantities=tables.parameters(result.parameters),
         more=tables.held_out(result),
     )
     held_out = [
@@ -61,27 +65,32 @@ def added_section(result: AddResult) -> Section:
     return replace(section, score=[*section.score, *held_out])
 
 
-def _of_both(result: FitResult | AddResult, title: str, more: list[Table]) -> Section:
-    """Section that pages of fitted models share; `more` tables stand at the end."""
-    before, after = beside(result.after, result.before), result.after.shown
+def _of_both(
+    both: tuple[Comparison, Comparison], title: str, *, quantities: Table, more: list[Table]
+) -> Section:
+    """Section that pages of fitted models share.
+
+    Args:
+        both: comparisons before and after.
+        title: of the section.
+        quantities: that were fitted.
+        more: tables at the end.
+    """
+    before, after = both
     return Section(
         title,
-        [_score("before", result.before.score), _score("after", result.after.score)],
-        result.after.verdict,
-        comparisons.facts(result.after),
-        robot_pictures(result.after, [("before", before), ("after", after)]),
-        [
-            tables.parameters(result.parameters),
-            *tables.robots(result.after, result.before),
-            *more,
-        ],
-        charts=_before_and_after(result),
-        next_step=comparisons.advice(result.after, fitted=True),
-        warnings=result.after.warnings,
+        [_score("before", before.score), _score("after", after.score)],
+        after.verdict,
+        comparisons.facts(after),
+        robot_pictures(after, [("before", beside(after, before)), ("after", after.shown)]),
+        [quantities, *tables.robots(after, before), *more],
+        charts=charts(after, [("before", r.model) for r in before.robots]),
+        next_step=comparisons.advice(after, fitted=True),
+        warnings=after.warnings,
     )
 
 
-def _camera_section(result: AddResult) -> Section:
+def _camera_section(result: AddResult, detected: DetectionComparison) -> Section:
     before, after = number(result.heldout_refit.score), number(result.heldout_after.score)
     return Section(
         f"{result.effect} added to {result.model_name}",
@@ -90,8 +99,8 @@ def _camera_section(result: AddResult) -> Section:
             _score("detections after", result.after.score),
         ],
         f"Held out: {before} without, {after} with.",
-        figures=[detections.field_of_view(result.after)],
-        tables=[tables.parameters(result.parameters), *detections.confusion_tables(result.after)],
+        figures=[detections.field_of_view(detected)],
+        tables=[tables.parameters(result.parameters), *detections.confusion_tables(detected)],
     )
 
 
@@ -101,24 +110,22 @@ def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> 
     return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
 
 
-def _before_and_after(result: FitResult | AddResult) -> Callable[[], str] | None:
-    """Charts of the new model, the old one beside."""
-    return charts(result.after, [("before", r.model) for r in result.before.robots])
-
-
-def beside(shown: Comparison, other: Comparison) -> RobotComparison:
+def beside(shown: Comparison, other: Comparison) -> RobotComparison | SteadyComparison:
     """With the other model, the robot that is shown of the first."""
     pairs = zip(shown.robots, other.robots, strict=True)
     return next(same for own, same in pairs if own is shown.shown)
 
 
-def robot_pictures(result: Comparison, models: Sequence[tuple] = ()) -> list[Figure]:
+def robot_pictures(
+    result: Comparison, models: Sequence[tuple[str, RobotComparison | SteadyComparison]] = ()
+) -> list[Figure]:
     """When the model fails the robot that is shown, and where; errors over time with `models`."""
     robot, sheets = result.shown, comparisons.steady_comparisons(result)
     own = []
-    if robot not in sheets:
+    if isinstance(robot, RobotComparison):
         own = [*([regimes(robot)] if robot.where else []), floor_map(robot)]
-        own += [error_growth(models)] if models else []
+        logs = [(label, r) for label, r in models if isinstance(r, RobotComparison)]
+        own += [error_growth(logs)] if logs else []
     if len(result.robots) > 1:
         own = [replace(f, title=f"{f.title}: {robot.measurement.label}") for f in own]
     if sheets:

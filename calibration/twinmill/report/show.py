@@ -2,6 +2,7 @@
 """Renderings of results for a person at the terminal."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -49,7 +50,7 @@ def fit(result: FitResult, not_written: str = "") -> RenderableType:
         _change("score", result.before.score, result.after.score),
         score_line("", result.after, number_too=False),
         Text(),
-        table(tables.parameters(result.parameters)),
+        table(tables.parameters(result.parameters, result.held)),
         *(table(t) for t in tables.robots(result.after, result.before)),
         *warned([*result.notes, *result.after.warnings]),
         _written(result.path, not_written),
@@ -64,14 +65,15 @@ def added(result: AddResult, not_written: str = "") -> RenderableType:
         result: of the addition.
         not_written: as of `fit`.
     """
-    if result.of_camera:
+    if not (both := result.of_motion):
         return _added_to_camera(result, not_written)
+    before, after = both
     own = result.added
     rest = len(result.parameters) - len(own)
     return Group(
-        _facts(comparisons.facts(result.after)),
+        _facts(comparisons.facts(after)),
         Text(),
-        _change("score", result.before.score, result.after.score),
+        _change("score", before.score, after.score),
         _change(
             "held out",
             result.heldout_refit.score,
@@ -79,15 +81,15 @@ def added(result: AddResult, not_written: str = "") -> RenderableType:
             "without and with the effect, all parameters refitted",
         ),
         *warned(result.notes),
-        score_line("", result.after, number_too=False),
+        score_line("", after, number_too=False),
         Text(),
         table(tables.parameters(own)),
         Text(f"  and {rest} more refitted (the JSON has all).", "dim"),
-        *(table(t) for t in tables.robots(result.after, result.before)),
+        *(table(t) for t in tables.robots(after, before)),
         *(table(t) for t in tables.held_out(result)),
-        *warned(result.after.warnings),
+        *warned(after.warnings),
         _written(result.path, not_written),
-        _next(result.after, fitted=True),
+        _next(after, fitted=True),
     )
 
 
@@ -103,12 +105,12 @@ def _added_to_camera(result: AddResult, not_written: str) -> RenderableType:
         *warned(result.notes),
         Text(),
         table(tables.parameters(result.parameters)),
-        *(table(t) for t in detections.confusion_tables(result.after)),
+        *(table(t) for t in detections.confusion_tables(result.of_detections)),
         _written(result.path, not_written),
     )
 
 
-def effect(entry: dict) -> RenderableType:
+def effect(entry: dict[str, Any]) -> RenderableType:
     """One card of the catalogue."""
     labels = ("equation", "stage", "leaves out", "measure by", "reference")
     keys = ("equation", "stage", "leaves_out", "measure", "reference")
@@ -123,7 +125,7 @@ def effect(entry: dict) -> RenderableType:
     )
 
 
-def robots(entry: dict) -> str:
+def robots(entry: dict[str, Any]) -> str:
     """Kinds of robots that an effect is defined for."""
     *others, last = entry["drives"]
     return f"commanded by {' or '.join([', '.join(others), last] if others else [last])}"

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison with a steady-state table as tables and as a figure, all its robots together."""
 
+from __future__ import annotations
+
 from collections import defaultdict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from twinmill.counted import counted
 from twinmill.predict.steady_errors import SteadyComparison
-from twinmill.report.canvas import MEASURED, draw, legend_above
+from twinmill.report.canvas import MEASURED, draw, each_of, legend_above
 from twinmill.report.html import Figure
 from twinmill.report.tables import Cell, Table, number, tone
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 STANDING = " Standing side: rim speed predicted where a side was seen to stand still."
 BY_VENDOR = (
@@ -142,9 +148,12 @@ def cells(robots: list[SteadyComparison]) -> Table:
     )
 
 
-def _by_input(robots: list[SteadyComparison]) -> list[tuple]:
+Entry = tuple[tuple[float, ...], np.ndarray, np.ndarray, np.ndarray, bool, float]
+
+
+def _by_input(robots: list[SteadyComparison]) -> list[Entry]:
     """Input; measured, predicted and spread by column; whether a side stood still; RMS ratio."""
-    groups: dict[tuple, list[tuple[SteadyComparison, int]]] = defaultdict(list)
+    groups: dict[tuple[float, ...], list[tuple[SteadyComparison, int]]] = defaultdict(list)
     for robot in robots:
         for u, inputs in enumerate(robot.measurement.inputs):
             groups[tuple(inputs)].append((robot, u))
@@ -177,9 +186,9 @@ def values(robots: list[SteadyComparison]) -> Figure:
     """Each input once per robot: what the model says, across, and what was measured, up."""
     shown = _measured(robots)
 
-    def paint(panels) -> None:
-        panels = np.atleast_1d(panels)
-        for axes, c in zip(panels, shown, strict=True):
+    def paint(panels: Axes | np.ndarray) -> None:
+        every = each_of(panels)
+        for axes, c in zip(every, shown, strict=True):
             name, unit = robots[0].modelled.channels[c]
             for k, robot in enumerate(robots):
                 sheet = robot.measurement
@@ -200,7 +209,7 @@ def values(robots: list[SteadyComparison]) -> Figure:
             ends = [np.nanmin(known), np.nanmax(known)]
             axes.plot(ends, ends, color=MEASURED, lw=1, ls="--")
             axes.set(xlabel=f"predicted {name}, {unit}", ylabel=f"measured {name}, {unit}")
-        legend_above(panels[0], len(robots))
+        legend_above(every[0], len(robots))
 
     return Figure(
         draw(3.2 * len(shown), paint, nrows=len(shown)),

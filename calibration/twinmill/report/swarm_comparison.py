@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded swarm against the twin's, for reports and notebooks."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from twinmill.defaults import FALSE_ALARMS
 from twinmill.report import Figure, Section
 from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw, plain_ticks
 from twinmill.swarm.compare import BLOCK_S, COMPARED, SwarmComparison, plain
+
+if TYPE_CHECKING:
+    pass
 
 NOTE = (
     "The twin runs from the recorded start with many seeds. The chance that a true model is called "
@@ -44,7 +51,7 @@ def bands(result: SwarmComparison) -> Figure:
     j, names = result.test, result.names
     low, high = plain(j.low, names), plain(j.high, names)
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         for k, (axes, name) in enumerate(zip(panels, names, strict=True)):
             axes.plot(result.t_s, result.twins[:, :, k].T, color=FLOOR, lw=0.4, alpha=0.35)
             axes.fill_between(result.t_s, low[:, k], high[:, k], color=FLOOR, alpha=0.15, lw=0)

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Page about a swarm: its class, its metrics over time, its paths."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import twinmill_native as native
 
@@ -9,6 +13,9 @@ from twinmill.report.canvas import MEASURED, PREDICTED, draw, plain_ticks
 from twinmill.report.log_figures import paint_bodies
 from twinmill.swarm.classes import COLORS, WORDS
 from twinmill.swarm.metrics import SwarmSeries
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LAST_S = 10.0
 NOTE = (
@@ -64,7 +71,7 @@ def _bits(series: SwarmSeries) -> list[tuple[str, str]]:
 def _over_time(series: SwarmSeries) -> Figure:
     colors = [COLORS[name] for name in series.classes]
 
-    def paint(panels) -> None:
+    def paint(panels: np.ndarray) -> None:
         strip, *rest = panels
         strip.scatter(series.t_s, np.zeros(len(colors)), c=colors, marker="s", s=40, lw=0)
         strip.set(ylim=(-1, 1), yticks=[])
@@ -114,14 +121,15 @@ def _color_word(name: str) -> str:
 def _paths(series: SwarmSeries) -> Figure:
     last = series.t_s > series.t_s[-1] - LAST_S
 
-    def paint(axes) -> None:
+    def paint(axes: Axes) -> None:
         paint_bodies(axes, series.bodies)
         for k, robot in enumerate(series.robots):
             path = series.pose[last, k]
             odd = robot in series.odd
             axes.plot(path[:, 0], path[:, 1], lw=1.2, color=PREDICTED if odd else MEASURED)
-            end = {"xytext": (5, 5), "textcoords": "offset points"}
-            axes.annotate(str(robot), path[-1, :2], fontsize=8, **end)
+            axes.annotate(
+                str(robot), path[-1, :2], xytext=(5, 5), textcoords="offset points", fontsize=8
+            )
             axes.plot(*path[-1, :2], "o", ms=4, color=PREDICTED if odd else MEASURED)
         axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
 

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tables that a person reads, as plain data: the terminal and the HTML report show the same."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from twinmill.data.measurement import Measurement
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
+from twinmill.fitting.fit import Held
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
 from twinmill.predict.noise import LEAST, Noise
 from twinmill.predict.regimes import HORIZON, Regime
@@ -81,10 +83,14 @@ def tone(score: float) -> Tone:
     return "good" if score <= GOOD else "warn" if score <= MISSING else "bad"
 
 
-def facts(comparison: Comparison) -> list[tuple[str, str]]:
-    """Log and model of a comparison: label and text."""
-    robot = comparison.shown
-    measurement, noise = robot.measurement, robot.modelled.noise
+def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str]]:
+    """Log and model of a comparison: label and text.
+
+    Args:
+        comparison: of one robot or more.
+        robot: the one that is shown.
+    """
+    measurement, noise = robot.measurement, robot.modelled.known_noise
     track = measurement.track
     others = len(comparison.robots) - 1
     why = "which the model misses most" if comparison.about is None else "which it was added to"
@@ -227,7 +233,8 @@ def errors(robot: RobotComparison) -> Table:
         "Prediction errors",
         columns,
         rows,
-        "RMS error of predictions that start from measured poses; ratio: error over noise floor.",
+        "RMS error of predictions that start from measured poses; noise floor: one standard "
+        "deviation of what noise alone causes; ratio: error over noise floor.",
     )
 
 
@@ -252,13 +259,14 @@ def where(robot: RobotComparison) -> Table:
         "Where it fails",
         ["by", "while", "error over noise floor", "share of error"],
         rows,
-        f"Horizon of {HORIZONS_S[HORIZON]:g} s; the {WORST} worst of each kind.",
+        f"Horizon of {HORIZONS_S[HORIZON]:g} s; the {WORST} worst of each kind. Each kind sorts "
+        "the same squared error anew: its shares, with those not listed, are 100 % at most.",
         (0, 1),
     )
 
 
-def parameters(estimates: list[ParameterEstimate]) -> Table:
-    """Fitted quantities with their uncertainty."""
+def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) -> Table:
+    """Fitted quantities with their uncertainty, then those that were held."""
     rows = []
     for e in estimates:
         told = e.seen or e.together
@@ -278,6 +286,10 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
                 Cell(remark, "warn" if doubt else "dim"),
             ]
         )
+    for h in held:
+        remark = "; ".join(words for words in (h.words, "held") if words)
+        cells = (h.name, number(h.value), "-", of_unit(h.unit), remark)
+        rows.append([Cell(text, "dim") for text in cells])
     together = any(e.together for e in estimates)
     return Table(
         "Fitted quantities",
@@ -286,6 +298,11 @@ def parameters(estimates: list[ParameterEstimate]) -> Table:
         TOGETHER if together else "",
         words=(0, 3, 4),
     )
+
+
+def of_unit(unit: str) -> str:
+    """A unit for people; nothing for a pure number."""
+    return "" if unit == "1" else unit.replace("^2", "²")
 
 
 def estimate(e: ParameterEstimate) -> str:
@@ -343,7 +360,7 @@ def steps(scores: list[tuple[str, float]]) -> Table:
     )
 
 
-def catalogue(entries: list[dict]) -> Table:
+def catalogue(entries: list[dict[str, Any]]) -> Table:
     """The effects in the order of the signal path."""
     order = ("duty", "wheel", "ground", "world", "observe", "view", "decide")
     ranked = sorted(entries, key=lambda e: order.index(e["stage"]))
@@ -357,7 +374,7 @@ def catalogue(entries: list[dict]) -> Table:
     )
 
 
-def effect_parameters(entry: dict) -> Table:
+def effect_parameters(entry: dict[str, Any]) -> Table:
     """Parameters of an effect's card: unit, default, bounds and meaning."""
     rows = [
         [

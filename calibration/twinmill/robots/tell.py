@@ -130,7 +130,15 @@ class Order:
 
 
 def make_command(verb: int, behavior: str = "", start_utime_us: int = 0):
-    """A command of this instant to all robots, with a number that nobody can guess."""
+    """A command to all robots, stamped now, and not signed yet.
+
+    Its sequence number is random, so that nobody can guess it.
+
+    Args:
+        verb: of swarm_command_t, such as START or STOP.
+        behavior: lookup table to select, or script to play.
+        start_utime_us: when to start, us since the Unix epoch; 0: now.
+    """
     command = VERBS()
     command.utime_us = time.time_ns() // 1000
     command.seq = secrets.randbelow(2**31)
@@ -261,7 +269,10 @@ def _say_signed(fleet: Fleet, order: Order, robot_id: int) -> None:
 
 
 def arm(fleet: Fleet, robots: set[int], timeout_s: float = ARM_S) -> list[Answer]:
-    """Lets robots that were stopped be started again."""
+    """Releases robots from the stop that they were told, so that a later start is obeyed.
+
+    They stay at rest until then.
+    """
     command = make_command(SIGNED_VERBS.VERB_ARM)
     return tell(fleet, command, robots, until_s=time.monotonic() + timeout_s)
 

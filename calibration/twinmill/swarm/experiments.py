@@ -105,10 +105,15 @@ def nearest_cell(point: tuple[float, ...], phase: Phase) -> int | None:
 
 
 def agreement(experiments: list[Experiment]) -> dict[str, Any]:
-    """How many runs ended as the diagram says, with a 95 % interval (Clopper and Pearson 1934).
+    """Number of recorded runs that ended in the class that the phase diagram predicts.
 
-    `expected` is the agreement that the model itself would have with runs of its own: a real
-    swarm can hardly do better.
+    Args:
+        experiments: recorded runs, with what the cell of the diagram nearest to each predicts.
+
+    Returns:
+        `agree` of `of` runs within the diagram, `outside`: runs beyond its axes, which are not
+        counted; `low` and `high`: the 95 % interval of the probability to agree (Clopper and
+        Pearson 1934); `rows`: the runs one by one.
     """
     inside = [e for e in experiments if e.cell is not None]
     agree = sum(e.predicted == e.observed for e in inside)
@@ -124,13 +129,31 @@ def agreement(experiments: list[Experiment]) -> dict[str, Any]:
 
 
 def entropy_bits(share: np.ndarray) -> np.ndarray:
-    """(C,) of (C, classes) probabilities."""
+    """Shannon entropy of each of C distributions, in bits.
+
+    Args:
+        share: (C, K) probabilities of K classes; each row adds up to 1.
+
+    Returns:
+        (C,) 0 where one class is certain, log2 K where all are equally probable.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         return -np.nansum(share * np.log2(share), axis=1)
 
 
 def divergence_bits(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(C,) Jensen-Shannon divergence: what one run is expected to tell of which model is right."""
+    """Information that one run in a cell is expected to give on which of two models is right.
+
+    It is the Jensen-Shannon divergence of their predictions, the two models being equally probable
+    before.
+
+    Args:
+        a: (C, K) probabilities of K classes in C cells by the first model.
+        b: (C, K) the same by the second.
+
+    Returns:
+        (C,) bits, 0 where both predict alike to 1 where their predictions exclude each other.
+    """
     return entropy_bits((a + b) / 2) - (entropy_bits(a) + entropy_bits(b)) / 2
 
 

@@ -5,13 +5,14 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import twinmill_native as native
 
 from twinmill.arguments import option
 from twinmill.files import alone_in, check_new_folder, made_folder
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import effect_names, words
+from twinmill.model.parameters import effect_names, words_of
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.behaviors import parse_table
 from twinmill.swarm.request import PLANTS, Request
@@ -25,7 +26,7 @@ MOST_SEEDS = 2**63 - 1  # of 64 bits with a sign
 
 
 def make_request(
-    behavior: str, model: str, axes: list[str], tables: list[str] | None = None, **rest
+    behavior: str, model: str, axes: list[str], tables: list[str] | None = None, **rest: Any
 ) -> Request:
     """Checks everything before the long work.
 
@@ -71,7 +72,7 @@ def _unnamed(model: native.Model) -> dict[str, str]:
         for row in model.values()
         if texts
         and row["name"].rpartition(".")[0] == name
-        and row["name"].rpartition(".")[2] not in words(" ".join(texts.values()))
+        and row["name"].rpartition(".")[2] not in words_of(texts)
     }
 
 
@@ -91,7 +92,7 @@ def _check_size(request: Request) -> None:
 
 def sweep(
     request: Request, folder: Path, workers: int | None = None, dask: str | None = None
-) -> dict:
+) -> dict[str, Any]:
     """Runs what is missing of a sweep and joins it.
 
     Returns:
@@ -148,7 +149,7 @@ def run_missing(
     return len(parts) - len(todo)
 
 
-def _summary(request: Request, folder: Path, begin_s: float) -> dict:
+def _summary(request: Request, folder: Path, begin_s: float) -> dict[str, Any]:
     _, table = read_sweep(folder)
     wall_s = time.monotonic() - begin_s
     kernels = Counter(table["kernel"].to_pylist())

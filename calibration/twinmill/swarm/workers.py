@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import Any
 
 import twinmill_native as native
 
@@ -11,7 +12,7 @@ from twinmill.programs import available_cores
 from twinmill.swarm.request import Request, run_part
 from twinmill.version import __version__
 
-Done = tuple[int, dict[str, list]]
+Done = tuple[int, dict[str, list[Any]]]
 CONNECT_S = 15
 
 
@@ -36,7 +37,7 @@ def run_here(request: Request, parts: dict[int, range], workers: int | None) -> 
                 future.cancel()
 
 
-def _run_remote(text: str, worlds: range) -> dict[str, list]:
+def _run_remote(text: str, worlds: range) -> dict[str, list[Any]]:
     """On a worker of the cluster."""
     request = Request.from_json(text)
     if __version__ != request.version:

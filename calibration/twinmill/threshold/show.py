@@ -23,7 +23,18 @@ def draw(
     before: list[PictureResult],
     after: list[PictureResult],
 ) -> None:
-    """Writes one row a picture: itself with the ball marked, and what both limits make of it."""
+    """Writes a figure that compares two colour thresholds on some photographs of a ball.
+
+    Each row is one picture: the photograph with the ball's outline, then the pixels that the limits
+    before and after take for the ball. Hits, misses and false pixels differ in colour.
+
+    Args:
+        path: of the new figure.
+        pictures: photographs; the first few are shown.
+        balls: where the ball is in each, px.
+        before: result of the old limits on each.
+        after: result of the new ones.
+    """
     rows = range(min(SHOWN, len(pictures)))
     figure = Figure(figsize=(12, 3.3 * len(rows)), layout="constrained")
     for row in rows:

@@ -14,8 +14,7 @@ from twinmill.model.parameters import (
     Parameter,
     all_effect_parameters,
     base_parameters,
-    catalogue_name,
-    catalogue_of,
+    card_of,
     effect_names,
     instance_of,
     key_of,
@@ -89,7 +88,7 @@ def knobs(model_file: ModelFile, told: ModelFile, opened: Sequence[Opened]) -> l
     words = {
         f"{instance}.{p['name']}": p["doc"]
         for instance in effect_names(model)
-        for p in catalogue_of(model)[catalogue_name(instance)]["parameters"]
+        for p in card_of(model, instance)["parameters"]
     }
     known = {**BASE_WORDS, **words}
     return [_worded(k, known.get(k.name, "")) for k in [*base, *effects, *others]]

@@ -10,10 +10,18 @@
 
 #include "effects/effect.h"
 #include "effects/nearest.h"
+#include "effects/own_numbers.h"
 #include "effects/remember.h"
 
 namespace twin
 {
+
+// A number of a formula, which it names.
+struct NamedNumber
+{
+    std::string name;
+    double value;
+};
 
 // A parsed formula, the rates of its states if it has any, and the places where all look for the
 // values of their names. Evaluating writes them: one thread at a time, as for the states.
@@ -22,7 +30,7 @@ class Formula
 public:
     // `rates`: of the states `s` and `r`, as many as there are. `values`: that the text has, 1
     // or 2.
-    Formula(std::span<const char *const> names, std::span<const double> parameters,
+    Formula(std::span<const char *const> names, std::span<const NamedNumber> numbers,
             const std::string &text, std::span<const std::string> rates, int values);
 
     // Places in the list of names that the texts use.
@@ -44,7 +52,7 @@ private:
     double Finite(double value);
     static double Along(const mu::Parser &parser, int k);
     void Define(mu::Parser &parser, std::span<const char *const> names,
-                std::span<const double> parameters);
+                std::span<const NamedNumber> numbers);
     // `one`: a single value is enough, however many the formula has.
     void Parse(mu::Parser &parser, std::span<const char *const> names, const std::string &key,
                const std::string &text, bool one, int values);
@@ -104,7 +112,11 @@ constexpr TextParameter kTexts[] = {
      "ds/dt, of the same names and s; then the formula may name s, at rim_mps of each wheel"},
     {"second_rate", "",
      "dr/dt of a second state r, where both rates may name s and r: what swings, with state_rate r"},
+    {"called", "", "name of the effect, as air; its numbers are then equation#air.p0 and so on"},
+    {"numbers", "",
+     "names and units of the formula's numbers in the place of p0 to p3, as in 'drag s/m, ratio'"},
 };
+constexpr size_t kCalled = 4, kNumbers = 5;  // places of these texts
 
 // A name in formulas, and its value for wheel k.
 template <class S>
@@ -329,6 +341,39 @@ const Quantity &FindQuantity(const std::string &name)
          "unknown name " + Quoted(token) + ", " + NearestKnown(token, known) + ",");
 }
 
+// Raises where the author's name of a number means something else in the formula or in the file.
+void CheckNumber(const std::string &name, const std::string &text, const Quantity &quantity)
+{
+    const auto is = [&](const char *other) { return name == other; };
+    const bool in_formula = std::ranges::any_of(quantity.names, is) || name == "s" || name == "r" ||
+                            mu::Parser().GetFunDef().contains(name);
+    const bool in_file =
+        std::ranges::any_of(kEffectKeys, is) ||
+        std::ranges::any_of(kTexts, is, [](const TextParameter &own) { return own.name; });
+    if (in_formula || in_file)
+        Fail("numbers", text, -1,
+             "'" + name + "' means something else in a " + (in_formula ? "formula" : "model file") +
+                 "; take another name");
+}
+
+// The formula's numbers: as its author calls them, else p0 to p3.
+std::vector<NamedNumber> Named(std::span<const double> values, const std::string &text,
+                               const Quantity &quantity)
+{
+    std::vector<NamedNumber> numbers;
+    for (const OwnNumber &own : OwnNumbers(text, std::size(kParameters)))
+    {
+        CheckNumber(own.name, text, quantity);
+        numbers.push_back({own.name, 0});
+    }
+    if (numbers.empty())
+        for (const ParameterSpec &usual : kParameters)
+            numbers.push_back({usual.name, 0});
+    for (size_t i = 0; i < std::min(numbers.size(), values.size()); ++i)
+        numbers[i].value = values[i];
+    return numbers;
+}
+
 EffectSpec::Compiled Compile(std::span<const double> values, std::span<const std::string> texts)
 {
     const Quantity &quantity = FindQuantity(texts[0]);
@@ -340,22 +385,27 @@ EffectSpec::Compiled Compile(std::span<const double> values, std::span<const std
         Fail("state_rate", rate, -1,
              "what is added to " + texts[0] + " has no state; leave it empty, or add to " +
                  (duty ? "rim_mps" : "omega_radps"));
+    const std::string &called = texts[kCalled];
+    if (!called.empty() && !IsPlainName(called))
+        Fail("called", called, -1,
+             "this is no name; write one with letters, figures and underscores");
     const auto rates = texts.subspan(2, rate.empty() ? 0 : second.empty() ? 1 : 2);
+    const std::vector<NamedNumber> numbers = Named(values, texts[kNumbers], quantity);
     return {quantity.act,
-            std::make_shared<Formula>(quantity.names, values, texts[1], rates, quantity.values)};
+            std::make_shared<Formula>(quantity.names, numbers, texts[1], rates, quantity.values)};
 }
 
 }  // namespace
 
-Formula::Formula(std::span<const char *const> names, std::span<const double> parameters,
+Formula::Formula(std::span<const char *const> names, std::span<const NamedNumber> numbers,
                  const std::string &text, std::span<const std::string> rates, int values)
     : values_(names.size()), rates_(rates.size())
 {
-    Define(formula_, names, parameters);
+    Define(formula_, names, numbers);
     Parse(formula_, names, "formula", text, values == 1, values);
     for (size_t i = 0; i < rates.size(); ++i)
     {
-        Define(rates_[i], names, parameters);
+        Define(rates_[i], names, numbers);
         Parse(rates_[i], names, kTexts[2 + i].name, rates[i], true, values);
     }
 }
@@ -376,10 +426,10 @@ double Formula::Along(const mu::Parser &parser, int k)
 }
 
 void Formula::Define(mu::Parser &parser, std::span<const char *const> names,
-                     std::span<const double> parameters)
+                     std::span<const NamedNumber> numbers)
 {
-    for (size_t i = 0; i < parameters.size(); ++i)
-        parser.DefineConst(kParameters[i].name, parameters[i]);
+    for (const NamedNumber &number : numbers)
+        parser.DefineConst(number.name, number.value);
     for (size_t i = 0; i < names.size(); ++i)
         parser.DefineVar(names[i], &values_[i]);
     constexpr const char *kStates[] = {"s", "r"};

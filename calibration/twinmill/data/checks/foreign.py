@@ -68,7 +68,22 @@ def _largest_rise(values: np.ndarray) -> slice:
 
 
 def foreign_stretches(track: Track, search: Search, own: Explained) -> list[tuple[float, float]]:
-    """From the first command that is not followed to one that is again, s of capture's clock."""
+    """Stretches in which the robot moves by other commands than those that the log has.
+
+    So does one that is carried, or that somebody else commands. A stretch is reported where the
+    robot moves much, for long and over many changes of the command, and no scale factor of the
+    commands explains that; and only if it follows the commands in most of the log.
+
+    Args:
+        track: of the log.
+        search: measured motion against the commands, by lateness.
+        own: how the commands are read, with the gain and the lateness at which they then explain
+            the motion best.
+
+    Returns:
+        Begin and end of each, s on the capture's clock, in their order: from the last change of the
+        command before it to the first after it.
+    """
     compared, changes_s = Compared.of(search, own), _changes_s(track) + own.late_s  # as felt
     t_s, free, found = compared.t_s, np.ones(len(compared.t_s), bool), []
     for _ in range(CHECKS.foreign_most):

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -68,7 +69,7 @@ class Entry:
         behavior = self.mix.behavior(self.name)
         return f"twin_run --plant planar --model {MODEL} --n {self.mix.n} --behavior {behavior}"
 
-    def to_json(self) -> dict:
+    def to_json(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "name": self.name,
@@ -197,19 +198,19 @@ def _shares(hunt: Hunt, found: list[Entry], rows: np.ndarray, start_m2: float) -
 
 
 def offer(found: list[Entry], in_mujoco: bool) -> list[Entry]:
-    """Names those that hold; by kind, the surest first.
+    """Behaviours that came out again in repeated runs, each with a name: `milling_1`.
 
     Args:
-        found: all entries.
-        in_mujoco: whether only what ran there is offered.
+        found: all entries of the archive; the `name` of those that are offered is set.
+        in_mujoco: take only those that were repeated in MuJoCo, too.
 
     Returns:
-        Them alone. What does not hold keeps no name.
+        Those that are offered, by kind of behaviour and within a kind the most reliable first.
     """
     order = list(KIND_COLORS)
     ran = [entry for entry in found if not in_mujoco or entry.mujoco is not None]
     offered = sorted(_surest(ran), key=lambda e: order.index(e.kind))
-    numbers: Counter = Counter()
+    numbers: Counter[str] = Counter()
     for entry in offered:
         numbers[entry.kind] += 1
         entry.name = f"{SLUGS.get(entry.kind, entry.kind)}_{numbers[entry.kind]}"

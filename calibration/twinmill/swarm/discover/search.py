@@ -9,6 +9,7 @@ import json
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import twinmill_native as native
 from ribs.archives import GridArchive
-from ribs.emitters import EvolutionStrategyEmitter, GaussianEmitter
+from ribs.emitters import EmitterBase, EvolutionStrategyEmitter, GaussianEmitter
 from ribs.schedulers import Scheduler
 
 from twinmill.arguments import option
@@ -96,7 +97,7 @@ class Elites:
     cells: int
 
 
-def _scheduler(seed: int, genes: int) -> Scheduler:
+def _scheduler(seed: int, genes: int) -> tuple[Scheduler, GridArchive]:
     bounds = list(MEASURES.values())
     archive = GridArchive(
         solution_dim=genes,
@@ -105,13 +106,19 @@ def _scheduler(seed: int, genes: int) -> Scheduler:
         extra_fields={"place": ((), np.int64)},
         seed=seed,
     )
-    common = {"bounds": [(0.0, 1.0)] * genes, "batch_size": BATCH, "x0": np.full(genes, 0.5)}
-    emitters = [
-        EvolutionStrategyEmitter(archive, sigma0=STEP, seed=seed + 1, **common),
-        EvolutionStrategyEmitter(archive, sigma0=STEP, seed=seed + 2, **common),
-        GaussianEmitter(archive, sigma=STEP, seed=seed + 3, **common),
+    bounded, middle = [(0.0, 1.0)] * genes, np.full(genes, 0.5)
+    emitters: list[EmitterBase] = [
+        EvolutionStrategyEmitter(
+            archive, sigma0=STEP, seed=seed + k, bounds=bounded, batch_size=BATCH, x0=middle
+        )
+        for k in (1, 2)
     ]
-    return Scheduler(archive, emitters)
+    emitters.append(
+        GaussianEmitter(
+            archive, sigma=STEP, seed=seed + 3, bounds=bounded, batch_size=BATCH, x0=middle
+        )
+    )
+    return Scheduler(archive, emitters), archive
 
 
 class GenerationStore:
@@ -174,22 +181,23 @@ def search(hunt: Hunt, folder: Path, generations: int, tell: Callable[[int, int]
 def _searched(
     hunt: Hunt, store: GenerationStore, generations: int, tell: Callable[[int, int], None]
 ) -> Elites:
-    scheduler, kept = _scheduler(hunt.seed, gene_count(hunt.bits)), []
+    scheduler, archive = _scheduler(hunt.seed, gene_count(hunt.bits))
+    kept: list[np.ndarray] = []
     seeds = range(hunt.request.first_seed, hunt.request.first_seed + hunt.request.seeds)
     for generation in range(generations):
         genes = scheduler.ask()
         mixes = [decode(one, hunt.n, hunt.bits) for one in genes]
-        rows = store.rows(generation, genes, lambda mixes=mixes: hunt.run(mixes, seeds))
+        rows = store.rows(generation, genes, partial(hunt.run, mixes, seeds))
         found, alike = measures(rows)
         scheduler.tell(alike, found, place=len(kept) * PER_GENERATION + np.arange(len(genes)))
         kept.append(rows)
-        tell((generation + 1) * PER_GENERATION, len(scheduler.archive))
-    data = scheduler.archive.data()
+        tell((generation + 1) * PER_GENERATION, len(archive))
+    data = archive.data()
     order = np.lexsort((data["index"], -data["objective"]))
     return Elites(
         data["solution"][order],
         data["objective"][order],
         data["measures"][order],
         np.concatenate(kept)[data["place"][order]],
-        scheduler.archive.cells,
+        int(archive.cells),
     )

@@ -11,7 +11,14 @@ import twinmill_native as native
 
 from twinmill.arguments import option
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import NO_SIZE, NORMAL_95, catalogue_name, catalogue_of, effect_names
+from twinmill.model.parameters import (
+    NO_SIZE,
+    NORMAL_95,
+    card_of,
+    catalogue_name,
+    catalogue_of,
+    effect_names,
+)
 from twinmill.model.ranges import Quantity, ranges
 from twinmill.swarm.matters.hidden import Hidden
 from twinmill.swarm.model_text import for_all_robots, with_effect, with_robot, with_values
@@ -99,7 +106,7 @@ def factors(
 
 def neutral(model: native.Model, instance: str) -> dict[str, float]:
     """Values at which an effect of the model does nothing, by parameter."""
-    parameters = catalogue_of(model)[catalogue_name(instance)]["parameters"]
+    parameters = card_of(model, instance)["parameters"]
     return {p["name"]: p["neutral"] for p in parameters if p["role"] not in NO_SIZE}
 
 

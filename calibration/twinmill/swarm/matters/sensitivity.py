@@ -114,7 +114,14 @@ class Sensitivity:
 
 
 def folder_of(request: Request, folder: Path) -> Path:
-    """Where the runs of a request are kept: by what they depend on."""
+    """Folder of the runs of a request, named by the hash of all that their results depend on.
+
+    A request that is made again finds its runs there.
+
+    Args:
+        request: model, cells, seeds and the like.
+        folder: that holds such folders.
+    """
     return folder / "runs" / request.sha256[:16]
 
 

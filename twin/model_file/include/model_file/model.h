@@ -115,8 +115,11 @@ public:
     // Finds `name` in the working directory, then among the installed models; reads it.
     static Model Load(const std::string &name);
 
+    // Names of its effects in their order: "dead_zone", "dead_zone#2"; "equation#air" of a formula
+    // that its author calls air.
+    std::vector<std::string> Instances() const;
     // Every number of the model under its full name: "base.forward_gain", "dead_zone.width",
-    // "dead_zone#2.width".
+    // "dead_zone#2.width", "equation#air.drag".
     std::vector<Parameter> Parameters() const;
     // One of them. Throws std::invalid_argument if there is none of that name; so does Get().
     Parameter Find(const std::string &name) const;
