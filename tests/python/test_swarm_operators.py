@@ -51,7 +51,8 @@ def robot(robot_id: int, mode: int = TELEMETRY.MODE_STOPPED, link_timeout_ms: in
     """One that has just said all that it is."""
     link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
     link.session, link.mode, link.armed, link.link_timeout_ms = SESSION, mode, 1, link_timeout_ms
-    telemetry.mode, link.utime_us = mode, time.time_ns() // 1000
+    telemetry.mode = mode
+    telemetry.utime_us = link.utime_us = time.time_ns() // 1000
     now_s = time.monotonic()
     return Robot(robot_id, telemetry=telemetry, heard_s=now_s + 60, link=link, link_s=now_s)
 
@@ -337,7 +338,7 @@ def test_a_start_that_is_called_off_tells_nobody_to_stop_who_was_told_nothing(mo
 
 def telemetry(mode: int) -> bytes:
     said = turbopi.telemetry_t()
-    said.mode = mode
+    said.mode, said.utime_us = mode, time.time_ns() // 1000
     return said.encode()
 
 
