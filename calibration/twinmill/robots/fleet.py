@@ -185,7 +185,7 @@ class Robot:
 
     @property
     def _said_mode(self) -> str:
-        """Of its newest telemetry, however old that is."""
+        """As its newest telemetry says, however old that is."""
         if not self.telemetry:
             return ""
         mode = self.telemetry.mode
