@@ -284,6 +284,7 @@ def unknown_mode(robot: Robot, key_file: Path, key: bytes) -> dict:
     def says():
         attacker = UdpBus(URL)
         while not over.is_set():
+            telemetry.utime_us = time.time_ns() // 1000  # else it is old news, and has no mode
             attacker.publish(f"R{ID + 2:02d}_TELEMETRY", telemetry.encode())
             time.sleep(0.03)
 

@@ -37,6 +37,7 @@ def link(**fields):
     """One of a moment after the start was accepted, which speaks for it."""
     said = turbopi.link_t()
     usual = {"session": SESSION, "session_us": 2_000_000, "armed": True, "counter": OWN}
+    usual["utime_us"] = time.time_ns() // 1000
     for name, value in (usual | fields).items():
         setattr(said, name, value)
     return said

@@ -37,6 +37,7 @@ def held(monkeypatch):
         link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
         link.counter = counter
         link.mode, link.stands, link.session, link.status_flags = mode, stands, session, flags
+        link.utime_us = time.time_ns() // 1000
         telemetry.mode = mode if said_mode is None else said_mode
         robot.link, robot.telemetry, robot.link_s = link, telemetry, time.monotonic()
 

@@ -4,21 +4,25 @@
 The truth is how the network and the robot here were made.
 """
 
+import json
 import time
 from collections import deque
+from dataclasses import replace
 
 import pytest
 import turbopi
 
+from twinmill.robots import hold, tell
 from twinmill.robots import key as keys
-from twinmill.robots import tell
-from twinmill.robots.fleet import Fleet
+from twinmill.robots.fleet import SIGNED_S, Fleet
+from twinmill.robots.hold import Held
+from twinmill_cli import swarm, swarm_door
 from twinmill_cli.swarm_door import check_clocks
-from twinmill_cli.swarm_end import clocks
-from twinmill_cli.swarm_verdict import of_status
+from twinmill_cli.swarm_end import clocks, times
+from twinmill_cli.swarm_verdict import Verdict, of_end, of_status, of_stop
 
 KEY, SESSION, STEP_S = bytes(range(32)), 7, 0.03
-STOPPED = turbopi.telemetry_t.MODE_STOPPED
+STOPPED, DRIVES = turbopi.telemetry_t.MODE_STOPPED, turbopi.telemetry_t.MODE_TABLE
 NEAR_S = 0.06  # a robot answers in its next step, and this machine may be busy
 
 
@@ -115,7 +119,7 @@ def test_a_clock_is_told_by_as_much_as_no_delay_explains(delay_s, ahead_s):
 
 def test_where_nothing_is_answered_both_are_said_to_be_possible(monkeypatch):
     monkeypatch.setattr(tell, "ASK_S", 0.2)
-    fleet = fleet_behind(delay_s=0.0, ahead_s=-2.0, answers=False)
+    fleet = fleet_behind(delay_s=0.0, ahead_s=-1.5, answers=False)
     tell.ask_clocks(fleet, {1})
     assert clocks(fleet, {1}) == (
         f"What is said comes late, {fleet.robots[1].late_s:.2f} s from R01: the network is late, "
@@ -167,3 +171,87 @@ def test_a_tool_that_was_halted_tells_neither():
     for _ in range(4):  # of some sixty that wait
         assert fleet._take_in(0)
         assert fleet.robots[1].age_s < NEAR_S and clocks(fleet, {1}) == ""
+
+
+class Recording(Air):
+    """Played here of a robot that was held and drove 27 s ago; nobody hears what is said."""
+
+    def __init__(self):
+        super().__init__(0.0, -27.0, answers=False, mode=DRIVES)
+
+    def publish(self, *_):
+        pass
+
+    def _say(self, channel: str, message, at_s: float) -> None:
+        super()._say(channel, message, at_s)
+        sealed, command = turbopi.signed_command_t(), turbopi.swarm_command_t()
+        sealed.robot_id, sealed.session, command.verb = 1, SESSION, sealed.VERB_HOLD
+        sealed.made_us = round(1e6 * (at_s - self.begin_s + 5))
+        sealed.command, sealed.tag = command.encode(), bytes(keys.TAG_BYTES)
+        sealed.command_size = len(sealed.command)
+        data = keys.sign(keys.of_robot(KEY, 1), sealed.encode())
+        self.on_its_way.append((at_s + self.delay_s, "SWARM_SIGNED", data))
+
+
+@pytest.mark.parametrize(
+    ("words", "begins"),
+    [
+        (["start", "--partial"], "NOBODY WAS HEARD TO START"),
+        (["start", "--partial", "--untethered"], "NOBODY WAS HEARD TO START"),
+        (["arm"], "Not all are known to be armed: R01 was not heard to obey (no answer"),
+        (["select", "milling"], "Not all are known to have done so: R01 was not heard to obey"),
+    ],
+)
+def test_no_command_believes_a_recording(monkeypatch, key_file, twinmill, words, begins):
+    """A robot that was off was said to drive, held by another, and in the end to stand."""
+    monkeypatch.setattr(tell, "ASK_S", 0.2)
+    monkeypatch.setattr(
+        swarm_door, "Fleet", lambda *_, **__: Fleet("", connect=lambda _: Recording(), key=KEY)
+    )
+    monkeypatch.setattr(swarm.tell, "STOP_S", 0.5)
+    monkeypatch.setattr(swarm.tell.stop, "__defaults__", (0.5,))
+    code, out, err = twinmill("swarm", *words, "--json", "--key", key_file)
+    told = json.loads(out)
+    assert code == 1 and not told["ok"] and told["sentence"].startswith(begins)
+    assert err.count("NOBODY KNOWS WHAT R01 DOES NOW") == 1 and "drives already" not in err
+    for untrue in ("Started at", "All stand", "They drive on", "stopped by another", "comes late"):
+        assert untrue not in told["sentence"] + err
+    if words[0] == "start":
+        assert told["drove_before"] == [] and told["start_utime_us"] is None
+        assert "0 robots were heard, and by old news alone R01." in told["sentence"]
+    (robot,) = told["robots"]
+    assert robot["is_old_news"] and robot["mode"] == "" and robot["clock_ahead_s"] is None
+
+
+def test_a_hold_of_half_an_hour_makes_no_old_news_of_who_is_there():
+    """Two clocks that nobody sets part meanwhile, so answers bound their difference no longer."""
+    fleet = fleet_behind(delay_s=0.0, ahead_s=-10.0)
+    tell.ask_clocks(fleet, {1})
+    robot = fleet.robots[1]
+    long_ago_s = time.monotonic() - 3600
+    robot.answered = replace(robot.answered, heard_s=long_ago_s)
+    assert robot.is_old_news and robot.mode == ""
+    tell.ask_once(fleet, {1})
+    fleet.listen(0.2)
+    assert not robot.is_old_news and robot.mode == "stopped"
+
+
+def test_who_held_a_robot_is_told_that_old_news_alone_is_heard_of_it(monkeypatch):
+    """A recording of a stop that is played: its robot drives on, out of hearing."""
+    monkeypatch.setattr(hold, "SETTLE_S", 0.0)
+    fleet = fleet_behind(delay_s=0.0, ahead_s=0.0, mode=DRIVES)
+    tell.ask_clocks(fleet, {1})
+    given = tell.answers(fleet, tell.make_command(tell.VERBS.VERB_START), {1})
+    held = Held(fleet, tell.Start(0, given, {1: SESSION}))
+    fleet.listen(0.1)
+    assert held.news() == []
+    old = Air(0.0, -27.0, answers=False)
+    old.begin_s += 27.0  # of the same session, by words of before
+    old.hear, fleet.bus = fleet.bus.hear, old
+    fleet.listen(SIGNED_S + 0.2)
+    said = [*held.news(), *held.news()]
+    assert said == [f"R01 {hold.OLD_NEWS.words}."] and not held.is_over
+    ended = of_end(Verdict(True, ""), held.ends(), of_stop(tell.stop(fleet, {1}, 0.4)))
+    assert not ended.ok and ended.sentence.startswith("NOT ALL STAND: R01")
+    assert "no answer, and what is heard of it is old news" in ended.sentence
+    assert clocks(fleet, {1}) == "" and times(fleet, {1}).startswith("NOBODY KNOWS WHAT R01 DOES")

@@ -4,6 +4,7 @@
 import json
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from twinmill.robots import key as keys
 from twinmill.robots import tell
 from twinmill.robots.fleet import GONE_S, MODES, TELEMETRY, Fleet, Robot, Step
 from twinmill.terminal import PlainConsole
-from twinmill_cli import characterise, swarm, swarm_door
+from twinmill_cli import characterise, swarm, swarm_door, swarm_stop
 from twinmill_cli.swarm_end import driving
 from twinmill_cli.swarm_screen import status_table
 from twinmill_cli.swarm_verdict import of_busy, of_countdown, of_start
@@ -51,7 +52,8 @@ def robot(robot_id: int, mode: int = TELEMETRY.MODE_STOPPED, link_timeout_ms: in
     """One that has just said all that it is."""
     link, telemetry = turbopi.link_t(), turbopi.telemetry_t()
     link.session, link.mode, link.armed, link.link_timeout_ms = SESSION, mode, 1, link_timeout_ms
-    telemetry.mode, link.utime_us = mode, time.time_ns() // 1000
+    telemetry.mode = mode
+    telemetry.utime_us = link.utime_us = time.time_ns() // 1000
     now_s = time.monotonic()
     return Robot(robot_id, telemetry=telemetry, heard_s=now_s + 60, link=link, link_s=now_s)
 
@@ -251,6 +253,89 @@ def test_a_twin_on_this_computer_is_not_to_be_flashed(hosts, words):
         swarm_door.refuse_doubles(fleet_of(double), {1})
 
 
+@pytest.mark.parametrize("verb", ["status", "stop"])
+def test_who_looks_or_stops_is_told_that_this_computer_is_one_of_the_two(
+    monkeypatch, key_file, twinmill, verb
+):
+    """Only a start said so; a recording that is played here makes two of each robot, too."""
+    double = robot(1)
+    for host in ("127.0.0.1", "10.9.0.2") * 2:
+        double.senders.add((host, 7667))
+    fleet = fleet_of(double)
+    fleet.send, fleet.hear = lambda *_: None, lambda: ""
+    monkeypatch.setattr(swarm, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(swarm, "RUN_PERIOD_S", 1.0)
+    monkeypatch.setattr(swarm_stop, "_say_first", lambda *_: fleet)
+    options = {"status": ["--once"], "stop": ["--timeout-s", "0.5"]}[verb]
+    for more in ([], ["--json"]):
+        _, out, _ = twinmill("swarm", verb, *options, "--key", key_file, *more)
+        said = json.loads(out)["sentence"] if more else " ".join(out.split())
+        assert said.count("127.0.0.1 is this computer: end what speaks here, a twin or a") == 1
+
+
+def test_both_ends_of_a_start_name_a_clock_that_is_off(monkeypatch):
+    """The start had named the 30 s of a clock that was set in its countdown; its end did not."""
+    ahead, said = robot(1, DRIVING), []
+    ahead.telemetry.utime_us = round((time.time() + 30) * 1e6)
+    ahead.recent.append(Step(time.monotonic() + 60, time.time(), ahead.telemetry))
+    answer = tell.Answer(1, True, True, "", "running", False, False, [])
+    stood = replace(answer, mode="stopped", stands=True)
+    monkeypatch.setattr(tell, "start", lambda *_, **__: tell.Start(0, [answer], {1: SESSION}))
+    monkeypatch.setattr(tell, "stop", lambda *_, **__: [stood])
+    monkeypatch.setattr(swarm, "_hold", _interrupted)
+    monkeypatch.setattr(swarm, "finish", lambda *given, **_: said.append(given[2].sentence))
+    voice = Voice()
+    kept = {"data": {"drove_before": []}, "as_json": True, "heard": "", "ends": str, "signals": []}
+    options = {"ahead_s": 0.1, "partial": False, "link_timeout_ms": 2000}
+    fleet = fleet_of(ahead)
+    fleet.addressed = {1}
+    ended = swarm._drive(fleet, {1}, "", voice, **kept, **options)
+    voice.end(1, [])
+    for sentence in (*said, ended.sentence):
+        assert "R01's clock is 30.00 s ahead of this computer's" in sentence
+    assert len(said) == 1 and ended.sentence.startswith("All stand.")
+
+
+def _interrupted(*_):
+    raise KeyboardInterrupt
+
+
+def test_how_to_call_a_start_off_is_said_while_that_can_be_done(monkeypatch, capfd):
+    """In a file or a pipe it stood below the start alone, when there was nothing to call off."""
+    said = []
+
+    def begin(*_, **__):
+        voice.wait(time.sleep)
+        said.append(capfd.readouterr().err)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tell, "start", begin)
+    monkeypatch.setattr(swarm, "finish", lambda *_, **__: None)
+    voice = Voice(as_json=True)
+
+    def ends(becomes: str = "stops them") -> str:
+        return f"`kill 77` {becomes}"
+
+    kept = {"data": {"drove_before": []}, "as_json": True, "heard": "", "ends": ends, "signals": []}
+    options = {"ahead_s": 5.0, "partial": False, "link_timeout_ms": 2000}
+    swarm._drive(fleet_of(robot(1)), {1}, "", voice, **kept, **options)
+    voice.end(1, [])
+    assert "R01: to start at " in said[0] and "`kill 77` calls that off." in said[0]
+
+
+def test_a_script_with_a_wrong_column_is_mended_in_its_file(tmp_path, key_file, twinmill):
+    """It was to be mended by an option that this command has not."""
+    script = tmp_path / "steps.csv"
+    script.write_text("t_s,fl_pct,fr_pct,rl,rr_pct\n0,30,30,30,30\n1,0,0,0,0\n")
+    words = ["--robot", "1", "--script", script, "--out", tmp_path / "o.lcmlog", "--key", key_file]
+    code, _, err = twinmill("characterise", *words)
+    assert code == 1 and "column rl_pct is missing (nearest is 'rl')" in err
+    assert "rename it in the file." in err and "--rename" not in err
+    script.write_text(script.read_text().replace("rl,", "rl_pct,"))
+    _, duties = characterise.read_script(script)
+    assert duties[0].tolist() == [30, 30, 30, 30]
+
+
 @pytest.mark.parametrize("verb", ["start", "arm", "select"])
 def test_a_stop_behind_another_verb_says_that_nothing_was_stopped(twinmill, verb):
     words = ["milling"] if verb == "select" else []
@@ -337,7 +422,7 @@ def test_a_start_that_is_called_off_tells_nobody_to_stop_who_was_told_nothing(mo
 
 def telemetry(mode: int) -> bytes:
     said = turbopi.telemetry_t()
-    said.mode = mode
+    said.mode, said.utime_us = mode, time.time_ns() // 1000
     return said.encode()
 
 

@@ -33,6 +33,7 @@ from twinmill_cli.swarm_verdict import (
     of_clocks,
     of_dry_run,
     of_end,
+    of_heard,
     of_select,
     of_start,
     of_stop,
@@ -488,3 +489,34 @@ def test_what_stopped_a_start_is_named_unless_a_key_did(signals, says):
 
 def test_each_signal_that_ends_a_start_has_a_name():
     assert all(told_of_signals([n]).count("SIG") == 1 for n in set(ENDING) - KEYS)
+
+
+def test_a_stop_that_is_not_confirmed_by_robots_that_stand_says_both():
+    """They stood by their lost links, said one sentence, and the next that not all stand."""
+    lost = answer(1, accepted=None, signed=False, reason="no answer", mode="stopped")
+    lost = replace(lost, lost_link=True, signs_standing=True)
+    told = of_stop([lost])
+    assert told.code == 1 and "NOT ALL STAND" not in told.sentence
+    assert told.sentence.startswith("NOT ALL HAVE CONFIRMED: R01: no stop was confirmed.")
+    assert "R01 signs all the same that it stands: R01 had lost its operator" in told.sentence
+    silent = replace(lost, robot_id=2, signs_standing=False)
+    assert of_stop([lost, silent]).sentence.startswith("NOT ALL STAND: R01, R02: no stop was")
+
+
+def test_who_stood_and_is_not_heard_any_more_is_told_with_both():
+    """Its own words, while the hold went on, were that it stood."""
+    silent = answer(1, accepted=None, signed=False, reason="no answer", mode="", last_heard_s=9.0)
+    ended = of_end(WELL, {"R01": LINK_LOST, "R02": DRIVES}, of_stop([silent, STANDS]))
+    assert ended.code == 1 and ended.sentence.startswith("NOT ALL STAND: R01")
+    assert ended.sentence.endswith("R01 stood before: it had lost its link to this command.")
+
+
+@pytest.mark.parametrize(
+    ("old", "words"),
+    [
+        ((), "1 robot was heard: R01. If"),
+        ((2, 3), "1 robot was heard: R01, and by old news alone R0"),
+    ],
+)
+def test_old_news_is_not_counted_as_heard(old, words):
+    assert of_heard([1], old).startswith(words)

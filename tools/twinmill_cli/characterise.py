@@ -178,7 +178,7 @@ def _read_velocities(path: Path) -> tuple[np.ndarray, np.ndarray]:
         ValueError: it is no such script.
     """
     try:
-        table = read_table(path, frozenset({"t_s", *TWIST}))
+        table = read_table(path, frozenset({"t_s", *TWIST}), can_rename=False)
         t_s = table.finite("t_s")
         twist = np.column_stack([table.finite(name) for name in TWIST])
     except LogError as error:
@@ -198,7 +198,7 @@ def read_script(path: Path) -> tuple[np.ndarray, np.ndarray]:
         ValueError: it is no script.
     """
     try:
-        table = read_table(path, frozenset({"t_s", *INPUTS, *DUTIES}))
+        table = read_table(path, frozenset({"t_s", *INPUTS, *DUTIES}), can_rename=False)
         columns = INPUTS if table.has(INPUTS[0]) else DUTIES
         t_s, values = table.finite("t_s"), [table.finite(name) for name in columns]
     except LogError as error:

@@ -13,6 +13,8 @@ OF_SEVERAL = {
     "its signature is": "their signatures are",
     "its signed answer has": "their signed answers have",
     "its word": "their word",
+    "reach it, and it may": "reach them, and they may",
+    "heard of it": "heard of them",
     "its link": "their link",
     "its operator": "their operator",
     "it had": "they had",

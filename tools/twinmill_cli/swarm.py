@@ -30,6 +30,7 @@ from twinmill_cli.swarm_door import (
     refuse_doubles,
     refuse_stopped,
     refuse_unheard,
+    say_old_news,
 )
 from twinmill_cli.swarm_signals import commanding, ended_by_signals, told_of_signals, what_ends
 from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
@@ -42,7 +43,8 @@ if working():  # not for --help
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
     from twinmill_cli.room import refuse_deleted, refuse_full
-    from twinmill_cli.swarm_end import addressed, clocks, driving, finish, placed
+    from twinmill_cli.swarm_double import doubles_here
+    from twinmill_cli.swarm_end import addressed, clocks, driving, finish, placed, times
     from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
         LEFT_ALONE,
@@ -146,10 +148,11 @@ def _start(
             "link_timeout_s": timeout_ms / 1e3,
         }
         code, voice = 1, Voice(as_json=as_json)
-        heard = "" if is_named else of_heard(sorted(asked))
+        old = {i for i in asked if (r := fleet.robots.get(i)) and r.is_old_news}
+        heard = "" if is_named else of_heard(sorted(asked - old), sorted(old))
 
-        def ends() -> str:
-            return what_ends(lcm_url, channel_prefix)
+        def ends(*becomes: str) -> str:
+            return what_ends(lcm_url, channel_prefix, *becomes)
 
         with ended_by_signals(fleet, voice.check_listener) as asked_to_end:
             try:
@@ -183,7 +186,7 @@ def _drive(
     data: dict[str, Any],
     as_json: bool,
     heard: str,
-    ends: Callable[[], str],
+    ends: Callable[..., str],
     signals: Sequence[int],
     **options: Any,
 ) -> Verdict:
@@ -197,17 +200,18 @@ def _drive(
         data: printed besides.
         as_json: how it is printed.
         heard: words on who is there, where nobody said who is meant.
-        ends: gives words on what stops robots that are held.
+        ends: gives words on what stops robots that are held; given "calls that off", on that.
         signals: that came, and come.
         options: of tell.start().
     """
-    begun, held, odd, halt = None, None, "", LastStop(voice, signals)
+    begun, held, halt = None, None, LastStop(voice, signals)
     instant_s = time.monotonic() + options["ahead_s"]
-    voice.show(lambda: countdown(asked, options["ahead_s"]))
+    ahead = countdown(asked, options["ahead_s"], ends("calls that off"))
+    voice.show_or_say(ahead)
     try:
         started = tell.start(fleet, asked, behavior, stopping=halt, **options)
         voice.clear()
-        odd = clocks(fleet, asked)
+        odd = times(fleet, asked)
         begun = of_start(started, ends(), drove_before=data["drove_before"]).more(heard).more(odd)
         held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
@@ -223,7 +227,7 @@ def _drive(
             return begun
         _hold(fleet, held, voice)
         ended = of_end(begun, held.states, None).more(heard).beside(driving(fleet, asked))
-        ended = ended.more("" if odd else clocks(fleet, asked))
+        ended = ended.more(times(fleet, asked))
     except BaseException as error:
         if held:
             held.settle()
@@ -241,7 +245,7 @@ def _drive(
             .more(of_remarks(given) if stopped.ok else "")
             .more(heard)
             .beside(driving(fleet, asked))
-            .more("" if odd else clocks(fleet, asked))
+            .more(times(fleet, asked))
         )
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
@@ -264,6 +268,7 @@ def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
     """Robots hear that somebody is there, until all stand by themselves."""
     try:
         while not held.is_over:
+            tell.ask_once(fleet, {robot.robot_id for robot in held.robots})
             fleet.listen(0.1)
             for sentence in held.news():
                 voice.say(sentence)
@@ -289,6 +294,7 @@ def _arm(
     with commanding("arm", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
         asked = tell.find(fleet, asked)
         refuse_doubles(fleet, asked)
+        say_old_news(fleet, asked)
         busy = tell.find_busy(fleet, asked)
         if busy:
             say(f"{of_busy(busy)}.")
@@ -316,6 +322,7 @@ def _select(
     check_bus(lcm_url, channel_prefix)
     with commanding("select", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
         asked = tell.find(fleet, asked)
+        say_old_news(fleet, asked)
         busy = tell.find_busy(fleet, asked)
         if busy:
             say(" ".join(filter(None, [of_countdown(busy, behavior), f"{of_busy(busy)}."])))
@@ -374,6 +381,7 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         say(f"this computer has no network ({fleet.fault}).")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
+    odd = " ".join(filter(None, [doubles_here(fleet, fleet.robots), odd]))
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
         data |= addressed(fleet, fleet.robots)

@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import errno
-import socket
-from contextlib import suppress
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -23,7 +21,8 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.key import load, of_operator
-    from twinmill_cli.swarm_verdict import of_busy, of_clocks, of_late
+    from twinmill_cli.swarm_double import remedy
+    from twinmill_cli.swarm_verdict import of_busy, of_clocks, of_late, of_old_news
 
     PREFIX_MAX = CHANNEL_MAX - len("R00_SIGNED_ACK")  # the longest of robots' channels
 
@@ -190,24 +189,17 @@ def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
         robot = fleet.robots[robot_id]
         if robot.is_double:
             hosts = robot.senders.hosts
-            own = [host for host in hosts if _is_here(host)]
-            mend = (
-                f"{own[0]} is this computer: end what speaks here, a twin or a recording, or give "
-                f"the twin {option('channel_prefix', 'TWIN_')}."
-                if own
-                else "give one another number, `twinmill robot flash HOST=ID`."
-            )
             raise ValueError(
-                f"two robots say that they are number {robot_id} ({', '.join(hosts)}): {mend}"
+                f"two robots say that they are number {robot_id} ({', '.join(hosts)}): "
+                f"{remedy(hosts)}."
             )
 
 
-def _is_here(host: str) -> bool:
-    """An address is one of this computer's: what goes there comes from there. Nothing is sent."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe, suppress(OSError):
-        probe.connect((host, 9))
-        return probe.getsockname()[0] == host
-    return False
+def say_old_news(fleet: Fleet, robots: set[int]) -> None:
+    """Says on stderr of which robots old news alone is heard, be they asked for an answer."""
+    tell.ask_clocks(fleet, robots)
+    if old := of_old_news(r for i in sorted(robots) if (r := fleet.robots.get(i))):
+        say(old)
 
 
 def refuse_stopped(fleet: Fleet, robots: set[int]) -> None:
@@ -220,7 +212,7 @@ def refuse_stopped(fleet: Fleet, robots: set[int]) -> None:
 
 
 def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: bool) -> None:
-    """Says on stderr whose clock would make the start no common one.
+    """Says on stderr of whom nothing is new, and whose clock would make the start no common one.
 
     Args:
         fleet: where they are.
@@ -233,6 +225,10 @@ def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: 
     """
     tell.ask_clocks(fleet, robots)
     known = [fleet.robots[i] for i in sorted(robots & set(fleet.robots))]
+    old = of_old_news(known)
+    if old and not may_differ:
+        raise ValueError(f"nothing was started: {old}")
+    known = [robot for robot in known if not robot.is_old_news]
     clocks_s = {robot.robot_id: robot.clock_s for robot in known}
     told = of_clocks({f"R{i:02d}": s for i, s in clocks_s.items()}, ahead_s)
     if any(abs(s) > tell.BEGUN_S for s in clocks_s.values()) and not may_differ:
@@ -249,5 +245,5 @@ def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: 
             f"nothing was started: {late} That all drive is to be known {tell.BEGUN_S:g} s after "
             "the instant; --partial starts those that do not refuse."
         )
-    for words in filter(None, [f"{told}." if told else "", late]):
+    for words in filter(None, [old, f"{told}." if told else "", late]):
         say(words)

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 
-from twinmill.robots.tell import OTHERS_S
+from twinmill.robots.tell import OTHERS_S, ask_once
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli.output import deliver, say
+from twinmill_cli.swarm_double import doubles_here
 from twinmill_cli.swarm_screen import answer_table
-from twinmill_cli.swarm_verdict import of_addressed, of_clocks_now, of_late
+from twinmill_cli.swarm_verdict import of_addressed, of_clocks_now, of_late, of_old_news
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -25,11 +26,18 @@ def driving(fleet: Fleet, asked: set[int]) -> list[str]:
     """Robots that drive and were not asked; nobody was asked where all were.
 
     Who says so is listened to for a moment: that word may have come late, or just before a stop of
-    somebody else.
+    somebody else. Whose clock is behind is asked, lest it be taken for old news.
     """
+    others = set(fleet.robots) - asked if asked else set()
     with fleet.unwatched():
-        fleet.listen(OTHERS_S, lambda: not _said_to_drive(fleet, asked))
+        ask_once(fleet, others)
+        fleet.listen(OTHERS_S, lambda: not _may_drive(fleet, others))
     return _said_to_drive(fleet, asked)
+
+
+def _may_drive(fleet: Fleet, others: set[int]) -> bool:
+    known = [fleet.robots[i] for i in others]
+    return any(r.says_that_it_drives or r.is_old_news for r in known)
 
 
 def _said_to_drive(fleet: Fleet, asked: set[int]) -> list[str]:
@@ -39,9 +47,24 @@ def _said_to_drive(fleet: Fleet, asked: set[int]) -> list[str]:
 
 def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
     """Sentences on clocks of some robots that are odd now, and on a late network; may be empty."""
-    known = [fleet.robots[i] for i in sorted(robots) if i in fleet.robots]
+    known = [r for i in sorted(robots) if (r := fleet.robots.get(i)) and not r.is_old_news]
     odd = of_clocks_now({f"R{r.robot_id:02d}": r.clock_s for r in known})
     return " ".join(filter(None, [odd, of_late(known)]))
+
+
+def old_news(fleet: Fleet, robots: Iterable[int]) -> str:
+    """Sentence on some robots that are told by old news alone; empty if none is."""
+    return of_old_news(r for i in sorted(robots) if (r := fleet.robots.get(i)))
+
+
+def times(fleet: Fleet, robots: Iterable[int]) -> str:
+    """Sentences on what is old news of some robots, and on clocks and network of the others.
+
+    Before them, that this computer speaks as one of them, as a recording that is played here does.
+    """
+    robots = set(robots)
+    told = [doubles_here(fleet, robots), old_news(fleet, robots), clocks(fleet, robots)]
+    return " ".join(filter(None, told))
 
 
 def addressed(fleet: Fleet, robots: Iterable[int]) -> dict[str, Any]:

@@ -15,11 +15,11 @@ from twinmill.robots.tell import CLOCK_WARN_S, Answer
 from twinmill.terminal import Fitting
 
 
-def countdown(robots: set[int], ahead_s: float) -> Text:
-    """Line of a start that is ahead: who, and when by this computer's clock."""
+def countdown(robots: set[int], ahead_s: float, ends: str) -> str:
+    """Line of a start that is ahead: who, when by this computer's clock, and what ends it."""
     names = ", ".join(f"R{i:02d}" for i in sorted(robots))
     at = time.strftime("%H:%M:%S", time.localtime(time.time() + ahead_s))
-    return Text(f"{names}: to start at {at}. Ctrl-C calls that off.")
+    return f"{names}: to start at {at}. {ends}."
 
 
 def answer_table(given: list[Answer]) -> Fitting:
@@ -81,14 +81,14 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
 
 def _clock(robot: Robot) -> Text:
     """How far it is ahead, a question mark where that may be the network's delay."""
-    if robot.late_s > CLOCK_WARN_S and not robot.has_answered:
+    if robot.late_s > CLOCK_WARN_S and not robot.has_answered and not robot.is_old_news:
         return Text(f"{-robot.late_s:+.2f} s?", "red")
     is_odd = abs(robot.clock_s) > CLOCK_WARN_S
     return Text(f"{round(robot.clock_s, 2) + 0:+.2f} s", "red" if is_odd else "")
 
 
 def _late(robot: Robot) -> list[str]:
-    is_late = robot.late_s > CLOCK_WARN_S and robot.has_answered
+    is_late = robot.late_s > CLOCK_WARN_S and robot.has_answered and not robot.is_old_news
     return [f"network {robot.late_s:.2f} s late"] if is_late else []
 
 

@@ -46,7 +46,8 @@ BECAME = {
 }
 
 
-BY_KEY = "Ctrl-C stops them"
+STOPS = "stops them"
+BY_KEY = f"Ctrl-C {STOPS}"
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
 
@@ -87,16 +88,22 @@ def _terminal() -> Iterator[int]:
         os.close(terminal)
 
 
-def what_ends(lcm_url: str, channel_prefix: str | None) -> str:
-    """Words on what stops robots that this program holds on a bus."""
+def what_ends(lcm_url: str, channel_prefix: str | None, becomes: str = STOPS) -> str:
+    """Words on what stops robots that this program holds on a bus.
+
+    Args:
+        lcm_url: of the bus.
+        channel_prefix: of the robots' channels there.
+        becomes: what that does, behind its name.
+    """
     if key_reaches():
-        return BY_KEY
+        return f"Ctrl-C {becomes}"
     bus = ["--lcm-url", lcm_url] if lcm_url != URL else []
     bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
     stop = shlex.join(["twinmill", "swarm", "stop", *bus])
     how = f"`{stop}`, or here `kill {os.getpid()}`"
     how += ", or closing this terminal, nohup or not" if _has_terminal() else ""
-    return f"No Ctrl-C reaches this command: {how}, stops them"
+    return f"No Ctrl-C reaches this command: {how}, {becomes}"
 
 
 def told_of_signals(signals: Sequence[int]) -> str:

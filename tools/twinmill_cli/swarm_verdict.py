@@ -168,12 +168,15 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
         return _of_standing(given, how, is_of_some=is_of_some)
     told = [f"{_names(unconfirmed)}: no stop was confirmed"] if unconfirmed else []
     told += [f"{_names(double)}: two robots have this number, one may drive"] if double else []
+    standing = [a for a in unconfirmed if a.signs_standing]
+    is_all = len(standing) == len(unconfirmed) and not double
     silent = [a for a in unconfirmed if a.reason == NEVER_HEARD]
     sure = [a for a in given if a not in unconfirmed and a not in double]
     return Verdict(
         False,
         _joined(
-            f"NOT ALL STAND: {'; '.join(told)}. {BY_HAND}",
+            f"NOT ALL {'HAVE CONFIRMED' if is_all else 'STAND'}: {'; '.join(told)}. {BY_HAND}",
+            _standing_unconfirmed(standing),
             how.key_fault if unconfirmed else "",
             *_reasons(unconfirmed, how),
             _besides(sure),
@@ -183,6 +186,19 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
             how.hint if silent or how.unheard else "",
         ),
     )
+
+
+def _standing_unconfirmed(given: list[Answer]) -> str:
+    """Sentence on robots that sign that they stand, and did not obey this stop; may be empty."""
+    if not given:
+        return ""
+    lost = [a for a in given if a.lost_link]
+    why = (
+        f": {_names(lost)} had lost {'its' if len(lost) == 1 else 'their'} operator" if lost else ""
+    )
+    words = several.of(given, "signs all the same that it stands")
+    other = "this stop may not reach it, and it may be started again"
+    return f"{_names(given)} {words}{why}; {several.of(given, other)}."
 
 
 def _reasons(given: list[Answer], how: Saying) -> list[str]:
@@ -216,12 +232,19 @@ def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdi
     return Verdict(True, _joined(words, more))
 
 
-def of_heard(robots: Iterable[int]) -> str:
-    """Sentence on how many were heard, where nobody said how many there are."""
-    names = [f"R{i:02d}" for i in robots]
+def of_heard(robots: Iterable[int], old: Iterable[int] = ()) -> str:
+    """Sentence on how many were heard, where nobody said how many there are.
+
+    Args:
+        robots: that were.
+        old: that were by old news alone, which is not to be counted.
+    """
+    names, of_old = ([f"R{i:02d}" for i in some] for some in (robots, old))
     were = "robot was" if len(names) == 1 else "robots were"
+    told = f": {', '.join(names)}" if names else ""
+    told += f", and by old news alone {', '.join(of_old)}" if of_old else ""
     return (
-        f"{len(names)} {were} heard: {', '.join(names)}. If you have more, name all of them, as "
+        f"{len(names)} {were} heard{told}. If you have more, name all of them, as "
         "--robots 1,2,3: whoever does not answer is named then."
     )
 
@@ -244,7 +267,8 @@ def of_old_news(robots: Iterable[Robot]) -> str:
     return (
         f"NOBODY KNOWS WHAT {', '.join(f'R{r.robot_id:02d}' for r in old)} "
         f"{'DOES' if len(old) == 1 else 'DO'} NOW: {each}. It may be a recording that is played "
-        "while the robot is off or drives elsewhere."
+        "while the robot is off or drives elsewhere; else the network is late, or its clock is "
+        "behind (NTP) and it hears nothing from here."
     )
 
 
@@ -347,8 +371,8 @@ def of_clocks_now(clock_s: dict[str, float]) -> str:
 
 
 def of_late(robots: Iterable[Robot]) -> str:
-    """Sentence on whose words come late; empty if nobody's do."""
-    late = [r for r in robots if r.late_s > CLOCK_WARN_S]
+    """Sentence on whose words come late; empty if nobody's do. Old news is none of them."""
+    late = [r for r in robots if r.late_s > CLOCK_WARN_S and not r.is_old_news]
     if not late:
         return ""
     each = ", ".join(f"{r.late_s:.2f} s from R{r.robot_id:02d}" for r in late)
@@ -391,20 +415,22 @@ def _then(s: float, ahead_s: float) -> str:
 def of_arm(given: list[Answer]) -> Verdict:
     """Who may be started."""
     wrong = _wrong(given)
-    return (
-        Verdict(False, f"Not all are armed: {wrong}.") if wrong else Verdict(True, "All are armed.")
-    )
+    if not wrong:
+        return Verdict(True, "All are armed.")
+    are = "are known to be armed" if _are_unknown(given) else "are armed"
+    return Verdict(False, f"Not all {are}: {wrong}.")
 
 
 def of_select(given: list[Answer], behavior: str) -> Verdict:
     """Who does what was chosen."""
     wrong = _wrong(given)
     if wrong:
-        did = "Not all" if any(a.accepted is not False for a in given) else "None"
+        did = "Not all did" if any(a.accepted is not False for a in given) else "None did"
+        did = "Not all are known to have done so" if _are_unknown(given) else did
         driving = [a for a in given if a.accepted is False and a.mode in DRIVING]
         words = several.of(driving, "goes on with what it did")
         more = f" {_names(driving)} {words}." if driving else ""
-        return Verdict(False, f"{did} did: {wrong}{_hint(given)}.{more}")
+        return Verdict(False, f"{did}: {wrong}{_hint(given)}.{more}")
     waiting = [a for a in given if a.reason]
     if waiting:
         words = f"{_names(waiting)} will not play {behavior}{_because(waiting)}"
@@ -416,9 +442,20 @@ def _wrong(given: list[Answer]) -> str:
     """Who did not obey, or is two of whom one may not have; empty where all did."""
     double = [a for a in given if a.is_double]
     wrong = [a for a in _disobeyed(given) if a not in double]
+    unknown = [a for a in wrong if a.is_old_news and a.accepted is None]
+    wrong = [a for a in wrong if a not in unknown]
     told = [f"{_names(wrong)} did not obey{_because(wrong)}"] if wrong else []
+    if unknown:
+        words = several.of(unknown, "was not heard to obey")
+        told.append(f"{_names(unknown)} {words}{_because(unknown)}")
     told += [f"{_names(double)}: two robots have this number, one may not obey"] if double else []
     return "; ".join(told)
+
+
+def _are_unknown(given: list[Answer]) -> bool:
+    """Whoever did not obey may have, for all that is known of now."""
+    wrong = _disobeyed(given)
+    return bool(wrong) and all(a.is_old_news and a.accepted is None for a in wrong)
 
 
 def of_start(
@@ -598,12 +635,13 @@ def of_end(
         stopped: what came of the stop; None: all stood by themselves before.
         was_confirmed: all had confirmed a start that was ended.
     """
-    if stopped and not stopped.ok:
-        return stopped
     early: dict[State, list[str]] = {}
     for name, state in states.items():
         if state.stands or state.before:
             early.setdefault(state, []).append(name)
+    if stopped and not stopped.ok:
+        stood = [_told_early(names, state, True) for state, names in early.items() if state.stands]
+        return stopped.more(_joined(*(f"{words}." for words in stood)))
     told = [_told_early(names, state, bool(stopped)) for state, names in early.items()]
     if begun is None:
         known = "all had confirmed it" if was_confirmed else "not all had confirmed it"

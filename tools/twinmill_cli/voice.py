@@ -117,6 +117,13 @@ class Voice:
         if self.is_idle:
             self.tell(self._draw)
 
+    def show_or_say(self, words: str) -> None:
+        """Draws words as show() does; where there is no terminal, says them instead."""
+        if self._console.is_terminal:
+            self.show(lambda: Text(words))
+        else:
+            self.say(words)
+
     def _draw(self) -> None:
         if self._live is None:
             self._live = Live(

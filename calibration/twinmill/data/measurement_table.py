@@ -140,6 +140,7 @@ class Table:
     zero: dict[str, float] = field(default_factory=dict)  # what stands for nothing, if not 0
     notes: list[str] = field(default_factory=list)  # sentences on how the file was read
     constants: frozenset[str] = frozenset()  # columns that the file lacks, of one value
+    can_rename: bool = True  # who asked for it may name its columns beside the file
 
     def under(self, sources: dict) -> "Table":
         """Table renamed and in other units; columns that nobody names stay."""
@@ -304,8 +305,8 @@ class Table:
         if self.header[:1] == [UNNAMED.format(1)]:
             return LogError(
                 f"{self.name}: its first line holds numbers and no names, so its columns are "
-                f"called {self.header[0]} to {self.header[-1]}; write a line of names above, or "
-                f"say what each is, as with {option('rename', {self.header[0]: column})}."
+                f"called {self.header[0]} to {self.header[-1]}; write a line of names above"
+                f"{self._or_rename(', or say what each is, as with ', self.header[0], column)}."
             )
         own = _quantity(column)
         same = [name for name in self.strange if own and _quantity(name) == own]
@@ -315,14 +316,18 @@ class Table:
         if not near:
             only = self.strange[0] if len(self.strange) == 1 else ""
             which = f"that {only}" if only else f"which of {', '.join(self.strange)}"
-            which = f", or say {which} holds it: {option('rename', {only or 'NAME': column})}"
+            which = self._or_rename(f", or say {which} holds it: ", only or "NAME", column)
             return LogError(
                 f"{self.name}: column {column} is missing; add it{which if self.strange else ''}."
             )
         return LogError(
-            f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename "
-            f"it in the file or with {option('rename', {near[0]: _in_unit_of(near[0], column)})}."
+            f"{self.name}: column {column} is missing (nearest is '{near[0]}'); rename it in the "
+            f"file{self._or_rename(' or with ', near[0], _in_unit_of(near[0], column))}."
         )
+
+    def _or_rename(self, before: str, old: str, new: str) -> str:
+        """The option that names a column anew, behind words; empty where there is none."""
+        return f"{before}{option('rename', {old: new})}" if self.can_rename else ""
 
 
 def _day_last(cell: str) -> str:
@@ -380,7 +385,7 @@ def read_header(path: Path) -> list[str]:
         return _with_index(_with_units(header, first) or header, first)
 
 
-def read_table(path: Path, known: frozenset[str]) -> Table:
+def read_table(path: Path, known: frozenset[str], *, can_rename: bool = True) -> Table:
     """Reads a table with one header row: comma-separated, or by another of DELIMITERS.
 
     Lines that begin with # are comments. A last row that was cut is left out.
@@ -388,6 +393,7 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     Args:
         path: of the file, `.gz` too.
         known: all columns that have a meaning.
+        can_rename: as of Table.
 
     Raises:
         LogError: unreadable, empty or ragged.
@@ -442,7 +448,8 @@ def read_table(path: Path, known: frozenset[str]) -> Table:
     if delimiter != "," or comma:
         more = ", and numbers have decimal commas" if comma else ""
         notes.append(f"{path.name}: cells are separated by {DELIMITERS[delimiter]}{more}.")
-    return Table(path.name, header, rows, np.array(line), known, notes=notes)
+    kept = {"notes": notes, "can_rename": can_rename}
+    return Table(path.name, header, rows, np.array(line), known, **kept)
 
 
 def _begin(text: Iterable[str]) -> tuple[Iterator[str], int, str, str]:

@@ -104,7 +104,7 @@ def read_steady_tables(path: Path) -> list[SteadyTable]:
         LogError: no such table, or a wrong cell, with its row.
     """
     path = Path(path)
-    readings = _readings(path, read_table(path, frozenset(COLUMNS)))
+    readings = _readings(path, read_table(path, frozenset(COLUMNS), can_rename=False))
     cells = _cells(readings)
     channels = [_channel(cells, readings, c) for c in range(len(readings.columns))]
     sha256 = hashlib.sha256(path.read_bytes()).hexdigest()

@@ -137,6 +137,8 @@ def _why(fleet: Fleet, robot: Robot, ack: Any) -> str:
     """Reason of one that has answered and is nobody else's; empty where it will start."""
     if not ack.accepted:
         return _why_not(fleet, robot, ack)
+    if robot.is_old_news:
+        return "not heard any more, but by old news"
     link, now_s = robot.link, time.monotonic()
     if _obeyed_a_stop(fleet, robot, ack.session, after_us=ack.session_us):
         return STOPPED

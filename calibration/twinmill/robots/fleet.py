@@ -101,7 +101,16 @@ class Answered:
     @property
     def most_now_s(self) -> float:
         """By so much at most now."""
-        return self.most_s + CLOCKS_PART * (time.monotonic() - self.heard_s)
+        return self.most_s + self._worn_s
+
+    @property
+    def is_worn(self) -> bool:
+        """Another is to be had before this one makes old news of what is new."""
+        return self._worn_s > SIGNED_S / 4
+
+    @property
+    def _worn_s(self) -> float:
+        return CLOCKS_PART * (time.monotonic() - self.heard_s)
 
 
 @dataclass(frozen=True)
@@ -133,6 +142,9 @@ class Heard:
 class Robot:
     """Last words of one robot.
 
+    What it signed, or said, too long ago is old news (`is_old_news`), and tells nothing of now:
+    no mode, that it drives, is armed or held, who commands it, nor an alarm.
+
     Attributes:
         telemetry, run: its newest messages.
         first_s, heard_s: when it said anything first and last, by time.monotonic().
@@ -140,6 +152,7 @@ class Robot:
         senders: of its telemetry.
         acks, signed_acks: by number of the command; the latter with the robot's signature.
         link, link_s: its newest link_t with its signature, and when that was heard.
+        signed_s: when anything with its signature was heard last, be it a copy of older words.
         answered: its quickest answer.
         took_s: from a command's first word to its first signed answer here, by its number.
         hold_s: when an operator was heard last, or said from here, that somebody is there.
@@ -158,6 +171,7 @@ class Robot:
     signed_acks: dict = field(default_factory=dict)
     link: Any = None
     link_s: float = 0.0
+    signed_s: float = 0.0
     answered: Answered | None = None
     took_s: dict[int, float] = field(default_factory=dict)
     hold_s: float = 0.0
@@ -166,7 +180,12 @@ class Robot:
 
     @property
     def mode(self) -> str:
-        """In words, or empty before the first telemetry."""
+        """In words, or empty where nobody knows: before the first telemetry, or by old news."""
+        return "" if self.is_old_news else self._said_mode
+
+    @property
+    def _said_mode(self) -> str:
+        """As its newest telemetry says, however old that is."""
         if not self.telemetry:
             return ""
         mode = self.telemetry.mode
@@ -193,7 +212,9 @@ class Robot:
         """Its newest telemetry says so, and its board takes what it is told."""
         t = self.telemetry
         return (
-            self.mode == "stopped" and not t.status_flags & MAY_MOVE and not any(t.wheel_duty_pct)
+            self._said_mode == "stopped"
+            and not t.status_flags & MAY_MOVE
+            and not any(t.wheel_duty_pct)
         )
 
     @property
@@ -236,12 +257,24 @@ class Robot:
 
     @property
     def is_old_news(self) -> bool:
-        """It is heard, and nobody knows that it said so just now: it may be elsewhere, and drive.
+        """When it was last heard, nobody knew that it said so just then: it may drive elsewhere.
 
-        Of a robot with another key its telemetry tells, which may be anybody's.
+        A recording that is played is, and so is what a network brings that late. Of a robot with
+        another key its telemetry tells, which may be anybody's.
         """
-        age_s = self.signed_ago_s if self.link else self.late_s
-        return self.is_here and age_s > SIGNED_S
+        if not self.link:
+            return self.late_s > SIGNED_S
+        silent_s = max(0.0, time.monotonic() - self.heard_s)
+        return self.signed_ago_s - silent_s > SIGNED_S
+
+    @property
+    def signs_only_old_news(self) -> bool:
+        """As `is_old_news`, and not by silence of its signature alone, beside words that are new.
+
+        Something old is heard then: with its signature, or without one.
+        """
+        comes_signed = self.signed_s > time.monotonic() - SIGNED_S
+        return self.is_old_news and (comes_signed or self.late_s > SIGNED_S)
 
     @property
     def old_news(self) -> str:
@@ -294,7 +327,7 @@ class Robot:
     @property
     def is_armed(self) -> bool | None:
         """It may be started; None if it has not signed that."""
-        return bool(self.link.armed) if self.link else None
+        return bool(self.link.armed) if self.link and not self.is_old_news else None
 
     @property
     def is_tethered(self) -> bool | None:
@@ -305,12 +338,14 @@ class Robot:
     def lost_link(self) -> bool:
         """It stands, as it has signed, because it had lost its operator."""
         link = self.link
-        return bool(link and link.status_flags & TELEMETRY.STATUS_LINK_LOST and not self.drives)
+        is_lost = bool(link) and bool(link.status_flags & TELEMETRY.STATUS_LINK_LOST)
+        return is_lost and not self.is_old_news and not self.drives
 
     @property
     def drives(self) -> bool:
         """It has signed so; one in a fault drives on once that is over."""
-        return bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
+        is_moving = bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
+        return is_moving and not self.is_old_news
 
     @property
     def drives_by_any_word(self) -> bool:
@@ -325,17 +360,17 @@ class Robot:
     @property
     def hears_operator(self) -> bool:
         """Somebody says that he is there for it, be it that it drives or that it is to."""
-        return time.monotonic() - self.hold_s < GONE_S
+        return time.monotonic() - self.hold_s < GONE_S and not self.is_old_news
 
     @property
     def hears_other_operator(self) -> bool:
         """Somebody else says that he is there for it."""
-        return time.monotonic() - self.other_hold_s < GONE_S
+        return time.monotonic() - self.other_hold_s < GONE_S and not self.is_old_news
 
     @property
     def is_double(self) -> bool:
         """Two robots speak as this one, as is heard here or by one of them."""
-        flags = self.telemetry.status_flags if self.telemetry else 0
+        flags = self.telemetry.status_flags if self.telemetry and not self.is_old_news else 0
         return self.senders.are_double or bool(flags & TELEMETRY.STATUS_DOUBLE)
 
     @property
@@ -343,7 +378,8 @@ class Robot:
         """Alarms about it that a person must know, loudest first."""
         hosts = ", ".join(self.senders.hosts)
         said = [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
-        said += [f"OLD NEWS: {self.old_news}"] if self.is_old_news else []
+        if self.is_old_news:
+            return [*said, f"OLD NEWS: {self.old_news}"]
         flags = self.telemetry.status_flags if self.telemetry else 0
         flags |= self.link.status_flags if self.link else 0
         return said + [words for flag, words in ALARMS if flags & flag]
@@ -437,7 +473,7 @@ class Robot:
             "signed": self.link is not None,
             "armed": self.is_armed,
             "tethered": self.is_tethered,
-            "held": None if self.is_old_news else self.is_held,
+            "held": self.is_held,
             "signed_ago_s": self.signed_ago_s if self.link else None,
             "link_timeout_s": self.link_timeout_s,
             "battery_V": t.battery_V if t else None,
@@ -565,6 +601,7 @@ class Fleet:
         """Believes what the robot of that number has signed; copies of older words are no news."""
         if not self.key or not keys.is_signed(keys.of_robot(self.key, robot.robot_id), data):
             return
+        robot.signed_s = time.monotonic()
         if kind == "SIGNED_ACK":
             robot.signed_acks[message.seq] = message
             self._on_answer(robot, message)
@@ -572,6 +609,8 @@ class Fleet:
         old = robot.link
         if not old or message.session != old.session or message.session_us > old.session_us:
             robot.link, robot.link_s = message, time.monotonic()
+            if robot.answered_now and robot.signed_ago_s < 0:
+                robot.answered = None  # this computer slept, and its clock did not go on
 
     def _on_answer(self, robot: Robot, ack: Any) -> None:
         """Keeps the quickest."""
@@ -634,8 +673,10 @@ class Fleet:
             session: in which it was told; all that it obeyed in a later one came after that.
 
         Returns:
-            The newest first.
+            The newest first; none by old news: it may have been told anything since.
         """
+        if robot.is_old_news:
+            return []
         since = self.counter if robot.link.session == session else 0
         heard = sorted(robot.commands.values(), key=lambda c: c.counter, reverse=True)
         return [

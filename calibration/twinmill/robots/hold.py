@@ -58,6 +58,11 @@ SILENT = State(
     "is not heard any more: nobody knows whether it stands",
     "had not been heard for a while",
 )
+OLD_NEWS = State(
+    "is told by old news alone, as a recording or a late network brings: nobody knows whether it "
+    "stands",
+    "had been told by old news alone for a while",
+)
 UNSIGNED = State(
     "signs nothing with this operator's key any more: nobody knows whether it stands",
     "had signed nothing with this operator's key for a while",
@@ -94,11 +99,16 @@ class Held:
     """
 
     def __init__(self, fleet: Fleet, begun: Start):
-        """Takes all of them that have signed that they start, or drive and have not refused it."""
+        """Takes all of them that have signed that they start, or drive and have not refused it.
+
+        Of who was told by old news alone nobody knows that it drives.
+        """
         self._fleet = fleet
         known = [fleet.robots[a.robot_id] for a in begun.answers if a.robot_id in fleet.robots]
         signed = {a.robot_id: bool(a.accepted) for a in begun.answers if a.signed}
-        self.robots = [r for r in known if r.link and signed.get(r.robot_id, r.mode != "stopped")]
+        linked = [r for r in known if r.link]
+        moving = {r.robot_id: r.mode != "stopped" and not r.is_old_news for r in linked}
+        self.robots = [r for r in linked if signed.get(r.robot_id, moving[r.robot_id])]
         self._sessions = {
             r.robot_id: begun.sessions.get(r.robot_id, r.link.session) for r in self.robots
         }
@@ -112,6 +122,8 @@ class Held:
         link = robot.link
         if robot.is_double:
             return DOUBLE
+        if robot.signs_only_old_news:
+            return OLD_NEWS
         if time.monotonic() - robot.link_s > SILENT_S:
             return UNSIGNED if robot.is_here else SILENT
         if robot.link_s < self._begin_s:
@@ -205,7 +217,7 @@ class Held:
 
     def _end(self, robot: Robot) -> State:
         told = self._told[robot.robot_id]
-        if told.stands or told.is_taken:
+        if told.stands or told.is_taken or robot.is_old_news:
             return told
         if robot.link.session != self._sessions[robot.robot_id]:
             return RESTARTED if told is not DRIVES_ANEW else told

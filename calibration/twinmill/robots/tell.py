@@ -49,6 +49,7 @@ STANDING = ("stopped", "fault")
 # Of looking a name up: nobody knows whether there is a machine of it.
 UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
 NEVER_HEARD = "was never heard"
+OLD_ANSWER = "no answer, and what is heard of it is old news"
 # It signs, and by its key: the packet with the signature was lost, or is late.
 UNSEALED = "answered, and its signed answer has not come"
 NO_KEY = "cannot be checked without the operator's key"
@@ -75,7 +76,9 @@ class Answer:
         link_timeout_s: of a start that it accepted: how long it drives on without hearing this
             operator, as it has signed since; 0: for ever.
         lost_link: it has signed that it stood because it had lost its operator.
-        clock_ahead_s: how far its clock is ahead of this computer's; None if it was never heard.
+        clock_ahead_s: how far its clock is ahead of this computer's; None if nothing new was heard.
+        is_old_news: nothing that is heard of it is of now; it has no mode then, and drives or not.
+        signs_standing: it signs so just now, be it that it has not confirmed a stop.
     """
 
     robot_id: int
@@ -90,6 +93,8 @@ class Answer:
     link_timeout_s: float | None = None
     lost_link: bool = False
     clock_ahead_s: float | None = None
+    is_old_news: bool = False
+    signs_standing: bool = False
 
     @property
     def is_driving(self) -> bool:
@@ -98,8 +103,8 @@ class Answer:
 
     @property
     def is_silent(self) -> bool:
-        """Nobody knows what it does: it was not heard, or not just now."""
-        return self.last_heard_s is None or self.last_heard_s > GONE_S
+        """Nobody knows what it does: it was not heard, or not just now, or by old news alone."""
+        return self.last_heard_s is None or self.last_heard_s > GONE_S or self.is_old_news
 
     @property
     def untethered(self) -> bool | None:
@@ -193,13 +198,13 @@ def ask_once(fleet: Fleet, robots: set[int]) -> None:
 
 
 def _unasked(fleet: Fleet, robots: set[int]) -> set[int]:
-    """Those that are late or old news, and have not answered."""
+    """Those that are late and have not answered, or old news, or soon will seem to be."""
     here = [fleet.robots[i] for i in robots & fleet.here()] if fleet.has_key else []
     return {
         r.robot_id
         for r in here
         if (r.age_s > CLOCK_WARN_S and not r.has_answered)
-        or (r.link and r.is_old_news and not r.answered_now)
+        or (r.link and (r.is_old_news or ((a := r.answered_now) and a.is_worn)))
     }
 
 
@@ -612,8 +617,12 @@ def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
 def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]:
     """Waits until those that have accepted drive. Returns those that do not, or are in a fault."""
     accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
-    fleet.listen(patience_s, lambda: not any(robot.mode in STANDING for robot in accepted))
-    return {robot.robot_id for robot in accepted if robot.mode in STANDING}
+
+    def waiting() -> set[int]:
+        return {r.robot_id for r in accepted if r.mode in STANDING or r.is_old_news}
+
+    fleet.listen(patience_s, lambda: not waiting())
+    return waiting()
 
 
 def _unanswering(fleet: Fleet, command, robots: set[int]) -> set[int]:
@@ -655,7 +664,9 @@ def _answer(robot: Robot, command, unsigned: str) -> Answer:
         last_heard_s=time.monotonic() - robot.heard_s if robot.heard_s else None,
         link_timeout_s=_link_timeout_s(robot, signed) if command.verb in STARTS else None,
         lost_link=robot.lost_link,
-        clock_ahead_s=robot.clock_s if robot.recent else None,
+        clock_ahead_s=robot.clock_s if robot.recent and not robot.is_old_news else None,
+        is_old_news=robot.is_old_news,
+        signs_standing=robot.signs_that_it_stands,
     )
 
 
@@ -683,7 +694,9 @@ def _stands(robot: Robot, command) -> bool:
 def _why_silent(robot: Robot, unsigned: str) -> str:
     if not robot.heard_s:
         return NEVER_HEARD
-    return "no answer" if robot.link or robot.signed_acks else unsigned
+    if not (robot.link or robot.signed_acks):
+        return unsigned
+    return OLD_ANSWER if robot.is_old_news else "no answer"
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:
