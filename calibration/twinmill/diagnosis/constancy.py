@@ -13,8 +13,8 @@ import twinmill_native as native
 
 from twinmill.data.track import command_at
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import PLACE, TIME
 from twinmill.diagnosis.trials import Trial
+from twinmill.formulas.term import PLACE, TIME
 from twinmill.model.parameters import (
     Parameter,
     catalogue_name,

@@ -18,10 +18,10 @@ from twinmill.diagnosis.rest import STEADY, Rest
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.search import PAUSE_S
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import CHANGE, COUPLING, PAST, PLACE, TIME
 from twinmill.diagnosis.ties import bends_speed, in_common, way_apart
 from twinmill.diagnosis.trials import REFIT, Trial, estimates_of
 from twinmill.fitting.compare import GOOD
+from twinmill.formulas.term import CHANGE, COUPLING, PAST, PLACE, TIME
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
     ParameterEstimate,

@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.diagnosis.columns import Columns
-from twinmill.diagnosis.forms import GAINS, Form, Motion, sized
 from twinmill.diagnosis.library import LEFT_OVER, norms
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.independence import (
@@ -20,6 +19,7 @@ from twinmill.fitting.independence import (
 )
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.formulas.forms import GAINS, Form, Motion, sized
 from twinmill.predict.windows import HORIZONS_S
 
 STRETCH_S = 8.0  # of one half, before one of the other

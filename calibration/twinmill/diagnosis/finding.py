@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from twinmill.defaults import Certainty
-from twinmill.diagnosis.term import TIME
+from twinmill.formulas.term import TIME
 from twinmill.model.parameters import ParameterEstimate, with_role
 
 HARDLY = 0.005  # a share that is told as less than a percent

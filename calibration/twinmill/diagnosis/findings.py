@@ -23,7 +23,6 @@ from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
 from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import TIME
 from twinmill.diagnosis.trials import (
     REFIT,
     State,
@@ -34,6 +33,7 @@ from twinmill.diagnosis.trials import (
     with_effects,
 )
 from twinmill.fitting.compare import MISSING
+from twinmill.formulas.term import TIME
 from twinmill.model.parameters import (
     CLOCK,
     LAG,

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from twinmill.diagnosis.forms import ROOM, Form, joined, summed
 from twinmill.diagnosis.known_physics import resembles
+from twinmill.formulas.forms import ROOM, Form, joined, summed
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,13 @@ from twinmill.diagnosis.evidence import (
     made,
 )
 from twinmill.diagnosis.families.of_time import beat_of
-from twinmill.diagnosis.forms import (
+from twinmill.diagnosis.formula import Formula
+from twinmill.diagnosis.formula_telling import TRIED, drives_back, stability, told
+from twinmill.diagnosis.recurring import Recurring
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.score_fit import ScoreFit
+from twinmill.formulas.forms import (
     MOST_NUMBERS,
     Form,
     Motion,
@@ -40,13 +46,7 @@ from twinmill.diagnosis.forms import (
     own_forms,
     sized,
 )
-from twinmill.diagnosis.formula import Formula
-from twinmill.diagnosis.formula_telling import TRIED, drives_back, stability, told
-from twinmill.diagnosis.recurring import Recurring
-from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import TIME, Term
-from twinmill.fitting.opening import Opened
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.formulas.term import TIME, Term
 from twinmill.model.parameters import drives_sideways
 
 FEWEST = 4  # stretches

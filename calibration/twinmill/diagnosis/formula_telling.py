@@ -9,18 +9,18 @@ import numpy as np
 
 from twinmill.chance import t_quantile
 from twinmill.diagnosis.evidence import Chosen, Evidence, Pool, Proof, Sums, best_of, made
-from twinmill.diagnosis.forms import (
+from twinmill.diagnosis.formula import Curve, Formula, Number
+from twinmill.diagnosis.recurring import comes_again
+from twinmill.diagnosis.settings import SETTINGS
+from twinmill.formulas.forms import (
     ANGLES,
     USUAL,
     Form,
     names_in,
     variable_of,
 )
-from twinmill.diagnosis.formula import Curve, Formula, Number
-from twinmill.diagnosis.recurring import comes_again
-from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import CHANNELS, SPEEDS
-from twinmill.diagnosis.units import units_of
+from twinmill.formulas.term import CHANNELS, SPEEDS
+from twinmill.formulas.units import units_of
 
 TRIED = np.linspace(-1, 1, 9)  # constants within a form's spread, and again within a fourth
 DRAWS = 40  # resamplings of the stretches

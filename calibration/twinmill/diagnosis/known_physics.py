@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from twinmill.diagnosis.forms import ROOM, STARTS, Form
 from twinmill.diagnosis.recurring import comes_again
-from twinmill.diagnosis.term import WAY
+from twinmill.formulas.forms import ROOM, STARTS, Form
+from twinmill.formulas.term import WAY
 
 AXES = {"vx": "driving", "vy": "driving sideways", "omega": "turning"}
 CHANNEL_OF = {"vx_mps": "vx", "vy_mps": "vy", "omega_radps": "omega"}

@@ -16,8 +16,11 @@ from twinmill.diagnosis.columns import Columns
 from twinmill.diagnosis.families import families_of
 from twinmill.diagnosis.families.family import Humps
 from twinmill.diagnosis.families.of_time import PARTS
-from twinmill.diagnosis.forms import MOST_POINTS, large
-from twinmill.diagnosis.term import (
+from twinmill.fitting.dependence import fading, rates
+from twinmill.fitting.floor import body_velocity_at
+from twinmill.fitting.opening import Opened
+from twinmill.formulas.forms import MOST_POINTS, large
+from twinmill.formulas.term import (
     CHANGE,
     CHANNELS,
     COUPLING,
@@ -34,9 +37,6 @@ from twinmill.diagnosis.term import (
     moves,
     times,
 )
-from twinmill.fitting.dependence import fading, rates
-from twinmill.fitting.floor import body_velocity_at
-from twinmill.fitting.opening import Opened
 from twinmill.model.parameters import effect_names, words
 from twinmill.predict.datasets import errors_of
 

@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.diagnosis.evidence import Evidence, Pool
-from twinmill.diagnosis.forms import SHORTEST_S, Form, on_and_off, sized
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import TIME
+from twinmill.formulas.forms import SHORTEST_S, Form, on_and_off, sized
+from twinmill.formulas.term import TIME
 
 BINS = 96
 POINTS = 4  # of each bin, at which it is looked up whether a form is there

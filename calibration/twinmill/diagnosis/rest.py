@@ -24,7 +24,6 @@ from twinmill.diagnosis.library import LEFT_OVER, library
 from twinmill.diagnosis.moments import Events, Moment, events_of
 from twinmill.diagnosis.place import comes_again
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import COUPLING, PLACE, TIME, WAY, Term
 from twinmill.diagnosis.wander import Wander, wandering
 from twinmill.fitting.boosting import squares
 from twinmill.fitting.compare import GOOD
@@ -32,6 +31,7 @@ from twinmill.fitting.floor import NoiseFloor
 from twinmill.fitting.independence import LONGEST, fresh_shares
 from twinmill.fitting.opening import Opened, thinned
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.formulas.term import COUPLING, PLACE, TIME, WAY, Term
 from twinmill.predict.datasets import Trajectory, thinning
 
 MOST_BLOCKS = 200

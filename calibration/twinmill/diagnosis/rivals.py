@@ -19,9 +19,9 @@ from twinmill.diagnosis.finding import Finding, doubted
 from twinmill.diagnosis.rest import Formulas, Products, formulas_of
 from twinmill.diagnosis.rounds import Search
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT, Trial, without_effect
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import Term
 from twinmill.model.parameters import is_local, with_role
 
 

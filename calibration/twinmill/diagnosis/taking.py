@@ -13,10 +13,10 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.diagnosis.finding import Finding
-from twinmill.diagnosis.forms import LEAST_DAMPED, MOST_DAMPED, MOST_NUMBERS, Form, tunable
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.fitting.score_fit import ScoreFit
+from twinmill.formulas.forms import LEAST_DAMPED, MOST_DAMPED, MOST_NUMBERS, Form, tunable
 from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     NORMAL_95,

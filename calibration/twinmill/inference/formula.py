@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from twinmill.diagnosis.forms import HEADING, MOST_NUMBERS, ROOM, Form, joined, own_forms
-from twinmill.diagnosis.forms import STARTS as REST
-from twinmill.diagnosis.term import CHANGE, COUPLING, PAST, PLACE, STILL, TIME, WAY, times
-from twinmill.diagnosis.units import units_of
+from twinmill.formulas.forms import HEADING, MOST_NUMBERS, ROOM, Form, joined, own_forms
+from twinmill.formulas.forms import STARTS as REST
+from twinmill.formulas.term import CHANGE, COUPLING, PAST, PLACE, STILL, TIME, WAY, times
+from twinmill.formulas.units import units_of
 from twinmill.inference.discrepancy import CHANCE, SIZES
 from twinmill.inference.discrepancy import TIME as OF_TIME
 from twinmill.inference.evidence import Linear, gains_by_size

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from twinmill.arguments import option
-from twinmill.diagnosis.forms import ANGLES
 from twinmill.diagnosis.formula import Formula
 from twinmill.diagnosis.rest import Rest
 from twinmill.diagnosis.settings import SETTINGS
 from twinmill.diagnosis.taking import Taken
-from twinmill.diagnosis.units import ADDS_TO, NAMES
+from twinmill.formulas.forms import ANGLES
+from twinmill.formulas.units import ADDS_TO, NAMES
 from twinmill.report.canvas import MEASURED, PREDICTED, draw, legend_above
 from twinmill.report.html import Figure
 

@@ -6,9 +6,9 @@ import pytest
 
 from twinmill.diagnosis.constancy import RIM, OneHeading, changes_of
 from twinmill.diagnosis.diagnose import diagnose, first_state
-from twinmill.diagnosis.term import PLACE
 from twinmill.diagnosis.trials import fitted, with_effects
 from twinmill.fitting.opening import judged, open_measurements
+from twinmill.formulas.term import PLACE
 
 BIAS_RAD = 0.06
 

@@ -18,14 +18,14 @@ from scipy.stats import linregress
 
 from twinmill.data.measurement import load_measurements
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.forms import PAST, Form, Motion, State, joined, own_forms, sized
 from twinmill.diagnosis.formula_search import _by_f, _by_signs
 from twinmill.diagnosis.known_physics import resembles
-from twinmill.diagnosis.term import CHANGE
-from twinmill.diagnosis.units import units_of
 from twinmill.fitting.compare import compare
 from twinmill.fitting.floor import body_velocity_at
 from twinmill.fitting.opening import open_measurements
+from twinmill.formulas.forms import PAST, Form, Motion, State, joined, own_forms, sized
+from twinmill.formulas.term import CHANGE
+from twinmill.formulas.units import units_of
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names
 from twinmill.programs import find_program

@@ -28,10 +28,10 @@ from twinmill.diagnosis.rest import (
 )
 from twinmill.diagnosis.result import Diagnosis
 from twinmill.diagnosis.settings import SETTINGS
-from twinmill.diagnosis.term import Term
 from twinmill.diagnosis.trials import REFIT
 from twinmill.diagnosis.verdict import VerdictInputs
 from twinmill.diagnosis.wander import Wander
+from twinmill.formulas.term import Term
 from twinmill.model.parameters import ParameterEstimate
 from twinmill.predict.noise import ChannelNoise, Noise
 from twinmill.predict.windows import HORIZONS_S

@@ -10,11 +10,11 @@ import pytest
 from twinmill.diagnosis.diagnose import diagnose
 from twinmill.diagnosis.explain import explain
 from twinmill.diagnosis.finding import Finding, of_all, part_of_all
-from twinmill.diagnosis.forms import Form, Motion
 from twinmill.diagnosis.formula import Formula, Number
 from twinmill.diagnosis.formula_telling import drives_back
 from twinmill.diagnosis.moments import Moment, every_s, sentence
 from twinmill.fitting.compare import compare
+from twinmill.formulas.forms import Form, Motion
 from twinmill.model.model_file import ModelFile
 
 LAGS_S = (0.09, 0.12, 0.15, 0.18)  # the base has 0.09

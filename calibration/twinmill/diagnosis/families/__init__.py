@@ -18,8 +18,8 @@ from twinmill.diagnosis.families.of_room import of_course, of_places, of_pushes
 from twinmill.diagnosis.families.of_speed import across_axes, of_speed
 from twinmill.diagnosis.families.of_time import beat_of, of_beat, of_drift
 from twinmill.diagnosis.families.of_wheels import of_rims, of_wheels
-from twinmill.diagnosis.term import STILL
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import STILL
 
 COURSES = (1, 2, 4)  # times a turn
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from twinmill.diagnosis.term import STILL, TYPICAL, Term, displaced_by
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import STILL, TYPICAL, Term, displaced_by
 
 HUMPS = 8  # over the range of a speed, or of a place
 MOST = 0.99  # quantile of a speed up to which humps reach

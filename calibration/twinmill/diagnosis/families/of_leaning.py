@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from twinmill.diagnosis.families.family import MOST, Family
-from twinmill.diagnosis.term import CHANGE, CHANNELS, COUPLING, TYPICAL, Term
 from twinmill.fitting.dependence import in_curves, led_by, while_speeding_up
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import CHANGE, CHANNELS, COUPLING, TYPICAL, Term
 
 # From (N, 3) velocities and (N,) lengths of steps to (N, 2) m/s^2.
 Lean = Callable[[np.ndarray, np.ndarray], np.ndarray]

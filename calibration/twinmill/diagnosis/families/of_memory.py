@@ -11,10 +11,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from twinmill.diagnosis.families.family import Family
-from twinmill.diagnosis.term import CHANNELS, PAST, SPEEDS, STILL, SWELL, TYPICAL, Term
 from twinmill.fitting.dependence import HELD, WOUND, lagged, missing, wound
 from twinmill.fitting.floor import told_velocity_at
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import CHANNELS, PAST, SPEEDS, STILL, SWELL, TYPICAL, Term
 from twinmill.model.parameters import LAG
 
 

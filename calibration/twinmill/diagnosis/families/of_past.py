@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.diagnosis.families.family import Family
-from twinmill.diagnosis.term import CHANGE, CHANNELS, SPEEDS, TYPICAL, Term
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import CHANGE, CHANNELS, SPEEDS, TYPICAL, Term
 
 AGO_S = (0.0, 0.15, 0.3, 0.5, 0.8, 1.2, 1.8)  # since the change: ends of ranges
 

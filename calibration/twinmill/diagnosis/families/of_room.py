@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 
 from twinmill.diagnosis.families.family import HUMPS, Family, Humps, pushed
-from twinmill.diagnosis.term import CHANNELS, PLACE, SWELL, TYPICAL, Term, moves, times
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import CHANNELS, PLACE, SWELL, TYPICAL, Term, moves, times
 
 LEAST_M = 0.15  # between the middles of two humps over the place
 SQUARES = 3  # along each side

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from twinmill.diagnosis.families.family import MOST, Family, Humps
-from twinmill.diagnosis.term import CHANNELS, COUPLING, SPEEDS, STILL, SWELL, TYPICAL, Term
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import CHANNELS, COUPLING, SPEEDS, STILL, SWELL, TYPICAL, Term
 
 TURN = TYPICAL["omega_radps"]
 

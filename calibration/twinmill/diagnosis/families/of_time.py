@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from twinmill.diagnosis.families.family import Family, pushed
-from twinmill.diagnosis.term import CHANNELS, SPEEDS, SWELL, TIME, TYPICAL, Term, moves
 from twinmill.fitting.opening import Opened
+from twinmill.formulas.term import CHANNELS, SPEEDS, SWELL, TIME, TYPICAL, Term, moves
 
 PARTS = (0.2, 0.35, 0.5, 0.65, 0.8)  # of the time of all logs: where something may have changed
 DRIFTS = 5  # waves of a drift, the slowest over the whole log

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinmill.diagnosis.families.family import MOST, Family, Humps
-from twinmill.diagnosis.term import SWELL, TYPICAL, Term
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.wheel_angles import TIMES, Wheel
+from twinmill.formulas.term import SWELL, TYPICAL, Term
 
 
 def of_wheels(opened: Sequence[Opened]) -> list[Family]:

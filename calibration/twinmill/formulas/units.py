@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-from twinmill.diagnosis.forms import A, C, D, Form, L
+from twinmill.formulas.forms import A, C, D, Form, L
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,10 @@ from types import CodeType, MappingProxyType
 
 import numpy as np
 
-from twinmill.diagnosis.term import (
+from twinmill.filters import Swing, faded
+from twinmill.fitting.opening import Opened
+from twinmill.fitting.response import Response
+from twinmill.formulas.term import (
     CHANGE,
     CHANNELS,
     PAST,
@@ -31,9 +34,6 @@ from twinmill.diagnosis.term import (
     displaced_by,
     times,
 )
-from twinmill.filters import Swing, faded
-from twinmill.fitting.opening import Opened
-from twinmill.fitting.response import Response
 from twinmill.model.parameters import words
 
 STARTS = "starts"
