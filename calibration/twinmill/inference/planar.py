@@ -197,7 +197,7 @@ def _changes(steps: Steps, model: native.Model, effects: Sequence[str]) -> np.nd
 
 
 def _missed_by_kernels(prior: Prior, always: Always, found: list[Kernel]) -> Iterator[Missed]:
-    """What each kernel of the base's discrepancy changes, at the mean of its weights."""
+    """Change by each kernel of the base's discrepancy, at the mean of its weights."""
     sizes, first = dict(always.kernels), 0
     for kernel in found:
         if kernel.name in sizes:
