@@ -41,7 +41,7 @@ SHARES = (
 SCORES = (
     "Scores are RMS errors of predictions 0.1 to 2 s ahead over the noise floor. The models are "
     "the most probable ones by steps of 0.1 s and what was known before, not those with the least "
-    "score, so a score may also rise; what has no name is in none of them."
+    "score, so a score may also rise; what has no name is in them by its formula alone."
 )
 SEVERAL = "Several dependences may be there at once: their probabilities do not add up to 100 %."
 
