@@ -20,8 +20,11 @@ from twinmill.model.parameters import (
     CLOCK,
     CLOCK_RATE,
     LAG,
+    WHERE_OR_WHEN,
+    Parameter,
     base_parameters,
     duty_table,
+    effect_names,
     effect_parameters,
     gains_of,
     instance_of,
@@ -136,6 +139,8 @@ def base_prior(
     names = [*gains_of(model)]
     names += [LAG] * (model.get(LAG) > 0)
     names += [CLOCK, CLOCK_RATE]
+    of_effects = _fitted_effects(model, model_file)
+    names += [p.name for p in of_effects]
     table = duty_table(model_file.model)
     cov = _told(model_file, [*table, *names], same_clock, known)
     if table:
@@ -145,7 +150,10 @@ def base_prior(
         weights = block_diag(fine.weights, np.eye(rest))
         cov = weights @ cov @ weights.T + np.diag(np.r_[fine.std_mps, np.zeros(rest)] ** 2)
     own = [p for name in effects for p in effect_parameters(model, newest_instance(model, name))]
-    parts = [*base_parameters(model, names), *own]
+    base = names[: len(names) - len(of_effects)]
+    parts = [*base_parameters(model, base), *of_effects, *own]
+    drifts = [(PRIORS.sheet * p.value) ** 2 for p in of_effects]
+    cov += np.diag(np.r_[np.zeros(len(base)), drifts])
     cov = block_diag(cov, np.diag([size_std(p) ** 2 for p in own]))
     names += [p.name for p in own]
     value = np.array([p.value for p in parts])
@@ -159,6 +167,17 @@ def base_prior(
         np.zeros((0, 0, 3)),
         np.array([0 if n in (CLOCK, CLOCK_RATE) else 2 if n == LAG else 1 for n in names]),
     )
+
+
+def _fitted_effects(model: native.Model, model_file: ModelFile) -> list[Parameter]:
+    """Numbers of the file's effects that a fit told, but for places and times of one log."""
+    known = set(model_file.covariance.names)
+    return [
+        p
+        for instance in effect_names(model_file.model)
+        for p in effect_parameters(model, instance)
+        if p.name in known and p.role not in WHERE_OR_WHEN
+    ]
 
 
 def _told(model_file: ModelFile, names: Sequence[str], same_clock: bool, known: bool) -> np.ndarray:
