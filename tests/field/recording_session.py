@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording of robots is played while the robot itself drives on, out of hearing.
+"""A recording of robots is played while the robot itself drives on, out of hearing, or stands.
 
 Usage: recording_session.py FOLDER, in a network of its own, with TURBOPI set. R03 is recorded as
-its operator holds and stops it; then it drives by itself, and its network goes away. Prints, as
-JSON, what the tool says while that recording is played here, and how the wheels turned.
+its operator holds and stops it; then it drives by itself, and its network goes away. That recording
+is played here. Once the robot is back, and stopped, it is played on another computer; first from
+the middle of a count to a start on. Prints, as JSON, what the tool says, and how the wheels turned.
 """
 
 import json
+import pickle
 import subprocess
 import sys
 import threading
@@ -30,6 +32,14 @@ COMMANDS = {
     "arm": ("arm", "--json"),
     "status": ("status", "--json"),
 }
+BESIDE = {
+    "again": ("start", "--arm", "--json"),
+    "once more": ("start", "--arm", "--json", "--robots", str(ID)),
+    "armed": ("arm", "--json", "--robots", str(ID)),
+    "looked at": ("status", "--json"),
+    "stopped": ("stop", "--json", "--timeout-s", "3"),
+}
+COUNT_S = 4.0  # to the start in which the recording begins
 
 
 @contextmanager
@@ -76,10 +86,38 @@ def play(said: list, over: threading.Event) -> None:
     bus.close()
 
 
+def command_of(key_file: Path, words: tuple[str, ...]) -> list[str]:
+    return [sys.executable, "-c", COMMAND, "swarm", *words, "--key", str(key_file)]
+
+
 def told(key_file: Path, words: tuple[str, ...]) -> dict:
-    command = [sys.executable, "-c", COMMAND, "swarm", *words, "--key", str(key_file)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command_of(key_file, words), capture_output=True, text=True, timeout=60)
     return {"code": done.returncode, "object": json.loads(done.stdout or "{}"), "err": done.stderr}
+
+
+def told_beside(folder: Path, key_file: Path, said: list) -> dict:
+    """What is told while the recording is played on another computer than the robot's and this."""
+    recording = folder / "recording"
+    recording.write_bytes(pickle.dumps(said))
+    player = Machine()
+    player.cable("wlan1", 2)
+    play_there = [*player.enter, sys.executable, __file__, "--play", str(recording)]
+    words = ("start", "--arm", "--json", "--in-s", str(COUNT_S))
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    playing = None
+    try:
+        counting = subprocess.Popen(command_of(key_file, words), **pipes)
+        first = next(line for line in counting.stderr if "to start at" in line)
+        playing = subprocess.Popen(play_there)
+        out, err = counting.communicate(timeout=60)
+        row = {"code": counting.returncode, "object": json.loads(out), "err": first + err}
+        found = {"count": row}
+        return found | {name: told(key_file, words) for name, words in BESIDE.items()}
+    finally:
+        if playing:
+            playing.kill()
+            playing.wait()
+        player.end()
 
 
 def main(folder: Path) -> dict:
@@ -101,10 +139,21 @@ def main(folder: Path) -> dict:
             machine.cable("wlan0", 1)
             time.sleep(1)
             tell.stop(Fleet(URL, key=key), {ID})
+            begin_s = time.monotonic()
+            found |= told_beside(folder, key_file, said)
+            found["stood"] = all(d == ZERO for t, d in robot.rows() if t > begin_s)
     finally:
         machine.end()
     return found
 
 
+def play_for_ever(recording: str) -> None:
+    said = pickle.loads(Path(recording).read_bytes())
+    while True:
+        play(said, threading.Event())
+
+
 if __name__ == "__main__":
+    if sys.argv[1] == "--play":
+        play_for_ever(sys.argv[2])
     print(json.dumps(main(Path(sys.argv[1]))))

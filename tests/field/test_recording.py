@@ -40,3 +40,23 @@ def test_a_partial_start_that_reached_nobody_says_so(session):
     assert told["drove_before"] == [] and told["start_utime_us"] is None
     (robot,) = told["robots"]
     assert (robot["accepted"], robot["mode"], robot["stands"]) == (None, "", False)
+
+
+NAMED = "Two robots say that they are number 3 (10.0.1.2, 10.0.2.2): what 10.0.2.2 says is "
+
+
+@pytest.mark.parametrize("name", ["count", "again", "once more", "armed", "looked at", "stopped"])
+def test_a_robot_that_stands_beside_its_recording_is_not_started(session, name):
+    """Who of the two was heard first had decided whether it drove for a second."""
+    row = session[name]
+    assert session["stood"] and row["code"] == 1 and not row["object"].get("ok")
+    said = everything_said(row)
+    assert NAMED in said and "may be a recording that is played there" in said
+    for untrue in ("Started at", "drives already", "held by", "robot flash", "All stand"):
+        assert untrue not in said, said
+
+
+def test_a_recording_that_begins_in_a_count_calls_the_start_off(session):
+    told = session["count"]["object"]
+    assert told["called_off"] and told["start_utime_us"] is None
+    assert told["sentence"].startswith("Called off: R03 was heard as two robots of one number.")

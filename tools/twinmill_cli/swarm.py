@@ -43,7 +43,7 @@ if working():  # not for --help
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
     from twinmill_cli.room import refuse_deleted, refuse_full
-    from twinmill_cli.swarm_double import doubles_here
+    from twinmill_cli.swarm_double import doubles
     from twinmill_cli.swarm_end import addressed, clocks, driving, finish, placed, times
     from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
@@ -300,7 +300,7 @@ def _arm(
             say(f"{of_busy(busy)}.")
         with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
             given = tell.arm(fleet, asked)
-        verdict = of_arm(given)
+        verdict = of_arm(given).more(doubles(fleet, asked))
         decide(verdict.code)
         return finish("arm", given, verdict, {}, fleet=fleet, as_json=as_json)
 
@@ -323,12 +323,13 @@ def _select(
     with commanding("select", lambda: join(lcm_url, channel_prefix, key), as_json=as_json) as fleet:
         asked = tell.find(fleet, asked)
         say_old_news(fleet, asked)
+        tell.hear_doubles(fleet, asked)
         busy = tell.find_busy(fleet, asked)
         if busy:
             say(" ".join(filter(None, [of_countdown(busy, behavior), f"{of_busy(busy)}."])))
         command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
-        verdict = of_select(given, behavior)
+        verdict = of_select(given, behavior).more(doubles(fleet, asked))
         decide(verdict.code)
         return finish("select", given, verdict, {}, fleet=fleet, as_json=as_json)
 
@@ -381,7 +382,7 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         say(f"this computer has no network ({fleet.fault}).")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
-    odd = " ".join(filter(None, [doubles_here(fleet, fleet.robots), odd]))
+    odd = " ".join(filter(None, [doubles(fleet, fleet.robots), odd]))
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
         data |= addressed(fleet, fleet.robots)

@@ -21,7 +21,7 @@ if working():  # not for --help
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.key import load, of_operator
-    from twinmill_cli.swarm_double import remedy
+    from twinmill_cli.swarm_double import doubles
     from twinmill_cli.swarm_verdict import of_busy, of_clocks, of_late, of_old_news
 
     PREFIX_MAX = CHANNEL_MAX - len("R00_SIGNED_ACK")  # the longest of robots' channels
@@ -185,14 +185,9 @@ def names(robots: Iterable[int]) -> str:
 
 def refuse_doubles(fleet: Fleet, robots: set[int]) -> None:
     """Raises ValueError if two robots have one number: a command would reach either or both."""
-    for robot_id in sorted(robots & set(fleet.robots)):
-        robot = fleet.robots[robot_id]
-        if robot.is_double:
-            hosts = robot.senders.hosts
-            raise ValueError(
-                f"two robots say that they are number {robot_id} ({', '.join(hosts)}): "
-                f"{remedy(hosts)}."
-            )
+    tell.hear_doubles(fleet, robots)
+    if told := doubles(fleet, robots):
+        raise ValueError(told)
 
 
 def say_old_news(fleet: Fleet, robots: set[int]) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import socket
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -11,23 +12,37 @@ from typing import TYPE_CHECKING
 from twinmill.arguments import option
 
 if TYPE_CHECKING:
-    from twinmill.robots.fleet import Fleet
+    from twinmill.robots.fleet import Fleet, Robot
 
 
-def remedy(hosts: Sequence[str]) -> str:
-    """Words on what makes one robot of two, without a full stop.
-
-    Args:
-        hosts: addresses of the machines that speak as it.
-    """
-    return _of_here(hosts) or "give one another number, `twinmill robot flash HOST=ID`"
+def doubles(fleet: Fleet, robots: Iterable[int]) -> str:
+    """Sentences on those of some robots that are two of one number; empty if none is."""
+    known = [r for i in sorted(robots) if (r := fleet.robots.get(i)) and r.is_double]
+    return " ".join(map(_told, known))
 
 
-def doubles_here(fleet: Fleet, robots: Iterable[int]) -> str:
-    """Sentence on this computer, where it speaks as one of some robots beside another machine."""
-    known = [r for i in sorted(robots) if (r := fleet.robots.get(i)) and r.senders.are_double]
-    words = dict.fromkeys(_of_here(robot.senders.hosts) for robot in known)
-    return " ".join(f"{each}." for each in words if each)
+def _told(robot: Robot) -> str:
+    hosts = robot.senders.hosts
+    return (
+        f"Two robots say that they are number {robot.robot_id} ({', '.join(hosts)}): "
+        f"{_remedy(robot)}."
+    )
+
+
+def _remedy(robot: Robot) -> str:
+    """Words on what makes one robot of two, without a full stop."""
+    return (
+        _of_here(robot.senders.hosts)
+        or "; ".join(itertools.starmap(_of_old, sorted(robot.older_s.items())))
+        or "give one another number, `twinmill robot flash HOST=ID`"
+    )
+
+
+def _of_old(host: str, older_s: float) -> str:
+    return (
+        f"what {host} says is {older_s:.0f} s older, and may be a recording that is played there: "
+        "end that (else its clock is behind)"
+    )
 
 
 def _of_here(hosts: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from rich.console import Group
 from twinmill.robots.tell import OTHERS_S, ask_once
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli.output import deliver, say
-from twinmill_cli.swarm_double import doubles_here
+from twinmill_cli.swarm_double import doubles
 from twinmill_cli.swarm_screen import answer_table
 from twinmill_cli.swarm_verdict import of_addressed, of_clocks_now, of_late, of_old_news
 
@@ -60,10 +60,10 @@ def old_news(fleet: Fleet, robots: Iterable[int]) -> str:
 def times(fleet: Fleet, robots: Iterable[int]) -> str:
     """Sentences on what is old news of some robots, and on clocks and network of the others.
 
-    Before them, that this computer speaks as one of them, as a recording that is played here does.
+    Before them, which are two of one number, as a recording that is played makes them.
     """
     robots = set(robots)
-    told = [doubles_here(fleet, robots), old_news(fleet, robots), clocks(fleet, robots)]
+    told = [doubles(fleet, robots), old_news(fleet, robots), clocks(fleet, robots)]
     return " ".join(filter(None, told))
 
 

@@ -34,7 +34,7 @@ if working():  # not for --help
     from twinmill.data.bus import open_bus
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
-    from twinmill_cli.swarm_double import doubles_here
+    from twinmill_cli.swarm_double import doubles
     from twinmill_cli.swarm_end import driving, finish
     from twinmill_cli.swarm_verdict import Saying, Verdict, of_dry_run, of_stop
     from twinmill_cli.voice import Voice
@@ -188,7 +188,7 @@ def stop(
             key_fault=deaf or (f"No robot's signature could be checked: {fault}" if fault else ""),
         )
         verdict = of_stop(given, how, is_of_some=bool(asked)).beside(beside)
-        verdict = verdict.more(of_dry_run(given)).more(doubles_here(fleet, fleet.robots))
+        verdict = verdict.more(of_dry_run(given)).more(doubles(fleet, fleet.robots))
         code = WRONG_COMMAND_LINE if misread else verdict.code
         if misread:
             verdict = Verdict(False, f"{misread} {verdict.sentence}")

@@ -11,7 +11,7 @@ from typing import Any
 
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
-from twinmill.robots.countdown import NONE_BEGUN, STOPPED
+from twinmill.robots.countdown import DOUBLE, NONE_BEGUN, STOPPED
 from twinmill.robots.fleet import DRIVING, DRY_RUN, Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
@@ -250,12 +250,12 @@ def of_heard(robots: Iterable[int], old: Iterable[int] = ()) -> str:
 
 
 def of_status(robots: Sequence[Robot]) -> Verdict:
-    """Who is heard; it went well where somebody is, and all of that is new."""
+    """Who is heard; it went well where somebody is, all of that is new, and of one robot each."""
     if not robots:
         return Verdict(False, "No robot is heard.")
     heard = f"Heard: {', '.join(f'R{r.robot_id:02d}' for r in robots)}."
     old = of_old_news(robots)
-    return Verdict(not old, _joined(heard, old))
+    return Verdict(not old and not any(r.is_double for r in robots), _joined(heard, old))
 
 
 def of_old_news(robots: Iterable[Robot]) -> str:
@@ -486,6 +486,7 @@ def of_start(
     silent = [a for a in waiting if a.is_silent and a.accepted is not False]
     idle = [a for a in waiting if a not in silent]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
+    double = [a for a in given if a.is_double]
     theirs = [a for a in unsure if a.robot_id in begun.untold]
     before = [a for a in unsure if a.robot_id in drove_before and a not in theirs]
     unsure = [a for a in unsure if a not in theirs and a not in before]
@@ -498,6 +499,7 @@ def of_start(
         f"{_unheard(begun.late)} in time, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
+        f"{_names(double)}: two robots have this number, one may stand" if double else "",
         _unconfirmed(unsure, "drives without having confirmed it"),
         _unconfirmed(before, "drove before, and has not confirmed it"),
         _unconfirmed(theirs, "was told nothing by this start, and drives by somebody else's word"),
@@ -592,7 +594,8 @@ def _of_called_off(begun: Start) -> Verdict:
     if begun.stopped:
         whom = "The others" if taken or untold else "All"
         stopped = of_stop(begun.stopped, is_of_some=bool(taken or untold)).sentence
-        is_of_all = any(w.startswith((STOPPED, NONE_BEGUN)) for w in begun.dropouts.words.values())
+        of_all = (STOPPED, NONE_BEGUN, DOUBLE)
+        is_of_all = any(w.startswith(of_all) for w in begun.dropouts.words.values())
         more = "" if is_of_all else "; --partial starts some"
         words += f" {whom} were told to stop: {stopped} They must be armed before they start"
         words += f" (--arm){more}."

@@ -12,6 +12,7 @@ from twinmill.robots.fleet import GONE_S, SIGNED_S, TELEMETRY, Fleet, Heard, Rob
 
 ARM = turbopi.signed_command_t.VERB_ARM
 STOPPED = "stopped by another command"
+DOUBLE = "heard as two robots of one number"  # which refuses a start before it is said
 NOT_BEGUN = "not driving when the others had begun"
 NONE_BEGUN = "not driving when the instant of the start was past"  # clocks may have been set
 UNHEARD = "told something by another operator who was not heard here"
@@ -53,13 +54,16 @@ def find_dropouts(
 ) -> Dropouts:
     """Robots for which a start is over, by what they have signed, or not, since they were armed.
 
+    Or as they turn out to be two of one number.
+
     Who refuses it for a reason of his own is none of them.
 
     Args:
         fleet: where they are.
         robots: of whom it is asked.
         seq: the start's number.
-        only_stopped: who does not begin is left behind; but a stop is meant for all.
+        only_stopped: who does not begin is left behind; but a stop is meant for all, and two robots
+            of one number are no start's.
         link_timeout_ms: that was sent with it; None: nobody is judged by it.
     """
     words, taken = {}, set()
@@ -70,7 +74,8 @@ def find_dropouts(
         if why and (why == STOPPED or not only_stopped):
             words[robot.robot_id] = why
             taken |= {robot.robot_id} if whose else set()
-    return Dropouts(words, frozenset(taken))
+    double = {i: DOUBLE for i in robots if (r := fleet.robots.get(i)) and r.is_double}
+    return Dropouts(double | words, frozenset(taken))
 
 
 def stopped_by_another(fleet: Fleet, robots: set[int], seq: int) -> dict[int, str]:

@@ -75,12 +75,19 @@ class Step(NamedTuple):
         heard_s, heard_utime_s: when it was taken in, by time.monotonic() and time.time().
         telemetry: telemetry_t.
         waited_s: for so long at most it had waited here, as while this program was halted.
+        host: address of the machine that sent it; empty where the bus cannot tell.
     """
 
     heard_s: float
     heard_utime_s: float
     telemetry: Any
     waited_s: float = 0.0
+    host: str = ""
+
+    @property
+    def age_s(self) -> float:
+        """How old it was when it came, by both clocks; not that it had waited here."""
+        return self.heard_utime_s - self.waited_s - self.telemetry.utime_us / 1e6
 
 
 @dataclass(frozen=True)
@@ -349,7 +356,12 @@ class Robot:
 
     @property
     def drives_by_any_word(self) -> bool:
-        """It has signed so, or says so unsigned, as a robot of another key: anybody may say it."""
+        """It has signed so, or says so unsigned, as a robot of another key: anybody may say it.
+
+        What it signs just now rules: what says more unsigned is another that has its number.
+        """
+        if self.link and self.signed_ago_s < SIGNED_S:
+            return self.drives
         return self.drives or self.says_that_it_drives
 
     @property
@@ -414,14 +426,20 @@ class Robot:
 
     @property
     def age_s(self) -> float:
-        """How old the freshest of what it says is when it comes, by both clocks; NaN without any.
+        """As of the freshest Step of what it says; NaN without any."""
+        return min((step.age_s for step in self.recent), default=float("nan"))
 
-        Not that it had waited here.
+    @property
+    def older_s(self) -> dict[str, float]:
+        """How much older all is that a machine says as it than what another does, by its address.
+
+        Of machines of which that is old news alone: each may play a recording.
         """
-        return min(
-            (s.heard_utime_s - s.waited_s - s.telemetry.utime_us / 1e6 for s in self.recent),
-            default=float("nan"),
-        )
+        ages_s: dict[str, float] = {}
+        for step in self.recent:
+            ages_s[step.host] = min(step.age_s, ages_s.get(step.host, math.inf))
+        older_s = {host: age_s - self.age_s for host, age_s in ages_s.items()}
+        return {host: s for host, s in older_s.items() if s > SIGNED_S}
 
     @property
     def late_s(self) -> float:
@@ -592,8 +610,10 @@ class Fleet:
         else:
             robot.telemetry = message
             waited_s = max(0.0, now_s - self._empty_s)
-            robot.recent.append(Step(now_s, time.time(), message, waited_s))
-            robot.senders.add(getattr(self.bus, "sender", None))
+            sender = getattr(self.bus, "sender", None)
+            host = sender[0] if sender else ""
+            robot.recent.append(Step(now_s, time.time(), message, waited_s, host))
+            robot.senders.add(sender)
             while robot.recent[0].heard_s < now_s - WINDOW_S:
                 robot.recent.popleft()
 
@@ -608,6 +628,12 @@ class Fleet:
             return
         old = robot.link
         if not old or message.session != old.session or message.session_us > old.session_us:
+            if (
+                old
+                and old.session == message.session
+                and robot.session_us < (message.session_us - FRESH_US)
+            ):  # what was heard before was a recording; so were the holds that were fresh by it
+                robot.hold_s, robot.other_hold_s = 0.0, -math.inf
             robot.link, robot.link_s = message, time.monotonic()
             if robot.answered_now and robot.signed_ago_s < 0:
                 robot.answered = None  # this computer slept, and its clock did not go on

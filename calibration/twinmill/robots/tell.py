@@ -220,6 +220,13 @@ def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
     return [robot for robot in known if robot.drives_by_any_word or robot.hears_operator]
 
 
+def hear_doubles(fleet: Fleet, robots: set[int]) -> list[Robot]:
+    """Those of some robots that are two of one number. All that speak as them are heard by then."""
+    known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
+    fleet.listen(OTHERS_S, lambda: any(robot.is_double for robot in known))
+    return [robot for robot in known if robot.is_double]
+
+
 def all_linked(fleet: Fleet, robots: set[int]) -> bool:
     """All of some robots were heard, and have signed how they may be commanded."""
     return all(i in fleet.robots and fleet.robots[i].link for i in robots)
@@ -495,9 +502,10 @@ def start(
     """Starts robots at one instant of their clocks; all of them or, unless partial, none.
 
     Up to the instant a robot may drop out: it starts anew, is not heard any more, is stopped by
-    another, be it before it could accept, or told something else. Then all others are told to stop,
-    and if one does not begin with them, too. Robots that another operator is to start instead are
-    left to him, and those alone that were told nothing: they may drive for somebody else.
+    another, be it before it could accept, told something else, or heard as two of its number. Then
+    all others are told to stop, and if one does not begin with them, too. Robots that another
+    operator is to start instead are left to him, and those alone that were told nothing: they may
+    drive for somebody else.
 
     From the instant on they are held: as long as the fleet listens, they hear that the operator is
     there. Where this raises, as the fleet's watch does, they may drive: who calls it stops them.

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Two robots of one number, one may be a recording: who is heard first decides nothing."""
+
+import time
+
+import pytest
+import turbopi
+
+from twinmill.robots import key as keys
+from twinmill.robots import tell
+from twinmill.robots.fleet import FRESH_US, TELEMETRY, Fleet
+from twinmill_cli import swarm_door
+from twinmill_cli.swarm_double import doubles
+
+KEY, SESSION = bytes(range(32)), 7
+ROBOT, PLAYER = ("198.51.100.1", 7667), ("198.51.100.2", 7667)  # RFC 5737: nobody has these
+SLOWEST_S = 0.1  # LONGEST_WAIT_US of firmware/app/loop.c: a robot that stands speaks that often
+RECORDED_S = 60.0  # so long ago
+
+
+class Bus:
+    """A robot that stands and signs so, and what a player says beside it from some time on."""
+
+    def __init__(self, player_s: float):
+        begin_s = time.monotonic()
+        self.sender, self.said = None, []
+        self._next = {ROBOT: begin_s, PLAYER: begin_s + player_s}
+
+    def subscribe(self, _, handler):
+        self._hear = handler
+
+    def handle_timeout(self, timeout_ms: int) -> bool:
+        self.sender, at_s = min(self._next.items(), key=lambda item: item[1])
+        wait_s = at_s - time.monotonic()
+        time.sleep(max(0.0, min(wait_s, timeout_ms / 1e3)))
+        if wait_s > timeout_ms / 1e3:
+            return False
+        self._next[self.sender] = at_s + SLOWEST_S
+        self.speak()
+        return True
+
+    def speak(self) -> None:
+        is_robot = self.sender == ROBOT
+        said = turbopi.telemetry_t()
+        said.mode = TELEMETRY.MODE_STOPPED if is_robot else TELEMETRY.MODE_TABLE
+        said.utime_us = round(1e6 * (time.time() - (0 if is_robot else RECORDED_S)))
+        self._hear("R01_TELEMETRY", said.encode())
+        if is_robot:
+            self._hear("R01_LINK", link(time.monotonic()))
+
+    def publish(self, *said):
+        self.said.append(said)
+
+
+def link(session_s: float, mode: int = TELEMETRY.MODE_STOPPED) -> bytes:
+    said = turbopi.link_t()
+    said.session, said.session_us, said.mode, said.stands = SESSION, round(1e6 * session_s), mode, 1
+    said.utime_us = time.time_ns() // 1000 - round(1e6 * (time.monotonic() - session_s))
+    said.tag = bytes(keys.TAG_BYTES)
+    return keys.sign(keys.of_robot(KEY, 1), said.encode())
+
+
+def hold(made_s: float) -> bytes:
+    command, sealed = turbopi.swarm_command_t(), turbopi.signed_command_t()
+    command.verb = sealed.VERB_HOLD
+    sealed.robot_id, sealed.session, sealed.made_us = 1, SESSION, round(1e6 * made_s)
+    sealed.command = command.encode()
+    sealed.command_size = len(sealed.command)
+    sealed.tag = bytes(keys.TAG_BYTES)
+    return keys.sign(keys.of_robot(KEY, 1), sealed.encode())
+
+
+def fleet_beside(player_s: float) -> Fleet:
+    fleet = Fleet("", connect=lambda _: Bus(player_s), key=KEY)
+    tell.find(fleet, {1})
+    return fleet
+
+
+def test_nobody_is_told_anything_before_two_robots_of_a_number_would_be_heard():
+    """One message of the robot had been enough to arm it."""
+    fleet = fleet_beside(SLOWEST_S)
+    assert not fleet.robots[1].is_double
+    with pytest.raises(ValueError, match="Two robots say that they are number 1"):
+        swarm_door.refuse_doubles(fleet, {1})
+    assert not fleet.bus.said
+
+
+@pytest.mark.parametrize("partial", [False, True])
+def test_a_double_that_shows_up_in_the_count_calls_the_start_off(monkeypatch, partial):
+    monkeypatch.setattr(tell, "stop", lambda *_, **__: [])
+    fleet = fleet_beside(1.0)
+    swarm_door.refuse_doubles(fleet, {1})
+    begin_s = time.monotonic()
+    begun = tell.start(fleet, {1}, "", ahead_s=2.0, partial=partial)
+    assert begun.called_off and "two robots" in begun.dropouts.words[1]
+    assert time.monotonic() - begin_s < 2.0 - tell.CALL_OFF_S
+
+
+def test_what_a_robot_signs_now_rules_over_what_is_said_unsigned():
+    """It stood, and its recording made "R01 drives already" of it."""
+    fleet = fleet_beside(SLOWEST_S)
+    fleet.listen(1.0, lambda: fleet.robots[1].says_that_it_drives)
+    known = fleet.robots[1]
+    assert known.says_that_it_drives and not known.drives_by_any_word
+    known.link = None  # of another key: nobody knows more
+    assert known.drives_by_any_word
+
+
+def test_a_hold_that_was_fresh_by_a_recording_alone_is_none():
+    fleet, now_s = Fleet("", connect=lambda _: Bus(0.0), key=KEY), time.monotonic()
+    fleet.bus._hear("R01_LINK", link(now_s - RECORDED_S))
+    known = fleet.robots[1]
+    fleet.bus._hear("SWARM_SIGNED", hold(now_s - RECORDED_S))
+    assert known.hold_s > 0
+    fleet.bus._hear("R01_LINK", link(now_s))
+    assert FRESH_US < 1e6 * RECORDED_S and not known.hears_operator
+    assert not known.hears_other_operator
+    fleet.bus._hear("SWARM_SIGNED", hold(now_s))
+    fleet.bus._hear("R01_LINK", link(now_s + 0.1))
+    assert known.hears_operator and known.hears_other_operator
+
+
+@pytest.mark.parametrize("behind_s", [0.0, 3600.0])
+def test_the_older_of_two_sources_may_be_a_recording_whatever_the_clock_here_is(
+    monkeypatch, behind_s
+):
+    now = time.time
+    monkeypatch.setattr("twinmill.robots.fleet.time.time", lambda: now() - behind_s)
+    fleet = fleet_beside(SLOWEST_S)
+    fleet.listen(1.0)
+    said = doubles(fleet, {1})
+    assert f"what {PLAYER[0]} says is 60 s older, and may be a recording" in said
+    assert "flash" not in said and ROBOT[0] not in said.split(":")[1]
