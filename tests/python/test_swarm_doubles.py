@@ -2,6 +2,7 @@
 """Two robots of one number, one may be a recording: who is heard first decides nothing."""
 
 import time
+from dataclasses import replace
 
 import pytest
 import turbopi
@@ -11,6 +12,7 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import FRESH_US, TELEMETRY, Fleet
 from twinmill_cli import swarm_door
 from twinmill_cli.swarm_double import doubles
+from twinmill_cli.swarm_verdict import of_start, of_status
 
 KEY, SESSION = bytes(range(32)), 7
 ROBOT, PLAYER = ("198.51.100.1", 7667), ("198.51.100.2", 7667)  # RFC 5737: nobody has these
@@ -131,3 +133,16 @@ def test_the_older_of_two_sources_may_be_a_recording_whatever_the_clock_here_is(
     said = doubles(fleet, {1})
     assert f"what {PLAYER[0]} says is 60 s older, and may be a recording" in said
     assert "flash" not in said and ROBOT[0] not in said.split(":")[1]
+
+
+def test_no_outcome_with_two_robots_of_a_number_in_it_is_a_good_one():
+    """A start had said "Started at", with ok true, beside a robot that was double."""
+    fleet = fleet_beside(SLOWEST_S)
+    alone = of_status([fleet.robots[1]])
+    fleet.listen(1.0, lambda: fleet.robots[1].is_double)
+    answer = tell.Answer(1, True, True, "", "running", False, False, [], link_timeout_s=2.0)
+    for is_double in (False, True):
+        begun = of_start(tell.Start(0, [replace(answer, is_double=is_double)], {1: SESSION}))
+        assert begun.ok != is_double
+    assert "R01: two robots have this number" in begun.sentence
+    assert alone.ok and not of_status([fleet.robots[1]]).ok
