@@ -6,6 +6,7 @@ TWINMILL_FUZZ_EXAMPLES sets how many texts are tried; see tests/fuzz/README.md.
 
 import io
 import os
+import time
 import unicodedata
 
 import pytest
@@ -86,6 +87,7 @@ def test_messages_of_strangers_are_rows_of_a_table(source, version, behavior, re
         text.encode(errors="replace").decode() for text in (source, version, behavior, reason)
     )
     for kind, message in (("RUN", run), ("ACK", ack), ("TELEMETRY", turbopi.telemetry_t())):
+        message.utime_us = int(time.time() * 1e6)  # what is older is no news of now
         bus.hear(f"R03_{kind}", message.encode())
     shown = screen(width, status_table([fleet.robots[3]]))
     assert not forbidden(shown)
