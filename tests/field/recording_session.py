@@ -96,7 +96,7 @@ def told(key_file: Path, words: tuple[str, ...]) -> dict:
 
 
 def told_beside(folder: Path, key_file: Path, said: list) -> dict:
-    """What is told while the recording is played on another computer than the robot's and this."""
+    """All that is told while another computer than the robot's and this plays it."""
     recording = folder / "recording"
     recording.write_bytes(pickle.dumps(said))
     player = Machine()
