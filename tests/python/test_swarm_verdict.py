@@ -255,7 +255,7 @@ def test_each_sentence_has_its_code(verdict, begins, code):
 
 
 def test_who_refused_a_start_and_drives_drives_for_somebody_else():
-    """An examiner was told that a start of a mistyped behaviour had taken over."""
+    """It was told that a start of a mistyped behaviour had taken over."""
     told = of_start(
         begun(SHORT, answer(3, accepted=False, reason="no behaviour 'mlling'"))
     ).sentence
