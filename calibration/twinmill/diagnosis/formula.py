@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from twinmill.diagnosis.known_physics import resembles
-from twinmill.formulas.forms import ROOM, Form, joined, summed
+from twinmill.formulas.forms import ROOM, Form, joined, with_rates
 
 
 @dataclass(frozen=True)
@@ -154,11 +154,7 @@ class Formula:
     @property
     def text(self) -> str:
         """With its numbers in place of their names."""
-        text = summed(self.forms, [f"{n.value:.3g}" for n in self.numbers if n.name])
-        equation = self.equation
-        keys = {"state_rate": "ds/dt", "second_rate": "dr/dt"}
-        rates = [f"{of} = {equation[key]}" for key, of in keys.items() if key in equation]
-        return text + (f" with {' and '.join(rates)}" if rates else "")
+        return with_rates(self.forms, [f"{n.value:.3g}" for n in self.numbers if n.name])
 
     @property
     def equals(self) -> str:

@@ -276,21 +276,12 @@ class Motion:
         """Motion of logs at (N, 3) velocities in each."""
         responses = [own.response for own in logs]
         velocity = np.concatenate(velocities)
-        vx, vy, omega = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
-        x, y = np.concatenate([r.pose[:, :2] for r in responses]).T
-        theta = np.concatenate([r.heading_rad for r in responses])
-        names = dict(
-            moves=(np.abs(velocity) > STILL).any(axis=1) * 1.0,
-            vx=vx,
-            vy=vy,
-            omega=omega,
-            x=x,
-            y=y,
-            theta=theta,
-            course=theta + np.arctan2(vy, vx),
-            t=np.concatenate([r.middle_s for r in responses]),
+        names = names_of(
+            velocity,
+            np.concatenate([r.pose[:, :2] for r in responses]),
+            np.concatenate([r.heading_rad for r in responses]),
+            np.concatenate([r.middle_s for r in responses]),
         )
-        names = {name: np.ascontiguousarray(values) for name, values in names.items()}
         return cls(logs, velocity, names, horizons)
 
     @cached_property
@@ -446,6 +437,32 @@ class Motion:
         if adds_to == "aside":
             return {0: -velocity[:, [1]] * own, 1: velocity[:, [0]] * own}
         return {axis: velocity[:, [axis]] * own for axis in ALL_AXES[adds_to]}
+
+
+def names_of(
+    velocity: np.ndarray, place: np.ndarray, theta_rad: np.ndarray, t_s: np.ndarray
+) -> dict[str, np.ndarray]:
+    """(N,) each name of the motion, as the effect `equation` has them.
+
+    Args:
+        velocity: (N, 3) of the body, m/s and rad/s.
+        place: (N, 2) in m.
+        theta_rad: (N,) headings.
+        t_s: (N,) times.
+    """
+    vx, vy, omega = np.where(np.abs(velocity) < STILL, 0.0, velocity).T
+    names = dict(
+        moves=(np.abs(velocity) > STILL).any(axis=1) * 1.0,
+        vx=vx,
+        vy=vy,
+        omega=omega,
+        x=place[:, 0],
+        y=place[:, 1],
+        theta=theta_rad,
+        course=theta_rad + np.arctan2(vy, vx),
+        t=t_s,
+    )
+    return {name: np.ascontiguousarray(values) for name, values in names.items()}
 
 
 def _mean_faded(keep: np.ndarray, pushes: np.ndarray) -> np.ndarray:
@@ -738,6 +755,13 @@ def _equation(adds_to: str, texts: Sequence[str], rates: Sequence[str]) -> dict[
 def summed(forms: Sequence[Form], numbers: Sequence[str]) -> str:
     """The formula of terms, all of one place, with these texts in the place of their numbers."""
     return _sum(forms[0].adds_to, [text for form in forms for text in form.texts], numbers)
+
+
+def with_rates(forms: Sequence[Form], numbers: Sequence[str]) -> str:
+    """As `summed`, with how its states change."""
+    equation, keys = joined(forms), {"state_rate": "ds/dt", "second_rate": "dr/dt"}
+    rates = [f"{of} = {equation[key]}" for key, of in keys.items() if key in equation]
+    return summed(forms, numbers) + (f" with {' and '.join(rates)}" if rates else "")
 
 
 def _sum(adds_to: str, texts: Sequence[str], numbers: Sequence[str]) -> str:

@@ -15,9 +15,18 @@ from typing import Any
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from twinmill.formulas.forms import HEADING, MOST_NUMBERS, ROOM, Form, joined, own_forms
+from twinmill.formulas.forms import (
+    HEADING,
+    MOST_NUMBERS,
+    ROOM,
+    Form,
+    joined,
+    names_of,
+    own_forms,
+    with_rates,
+)
 from twinmill.formulas.forms import STARTS as REST
-from twinmill.formulas.term import CHANGE, COUPLING, PAST, PLACE, STILL, TIME, WAY, times
+from twinmill.formulas.term import CHANGE, COUPLING, PAST, PLACE, TIME, WAY, times
 from twinmill.formulas.units import units_of
 from twinmill.inference.discrepancy import CHANCE, SIZES
 from twinmill.inference.discrepancy import TIME as OF_TIME
@@ -73,20 +82,31 @@ class Formula:
 
     Attributes:
         word: what it depends on.
-        texts: of the effect `equation`.
-        values, stds: of its numbers p0 and so on, posterior mean and standard deviation, in ...
-        units: ... these.
+        form: of the equation.
+        values, stds: of its numbers p0 and so on, posterior mean and standard deviation.
         probability: that some equation of few numbers describes it as well as any function does.
-        of_one_run: it names moments of the log.
     """
 
     word: str
-    texts: dict[str, str]
+    form: Form
     values: tuple[float, ...]
     stds: tuple[float, ...]
-    units: tuple[str, ...]
     probability: float
-    of_one_run: bool
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """Texts of the effect `equation`."""
+        return joined([self.form])
+
+    @property
+    def units(self) -> list[str]:
+        """Units of the numbers."""
+        return units_of(self.form)
+
+    @property
+    def of_one_run(self) -> bool:
+        """It names moments of the log."""
+        return self.form.names_time
 
     @property
     def holds(self) -> bool:
@@ -96,12 +116,8 @@ class Formula:
     @property
     def text(self) -> str:
         """With its numbers in place of their names."""
-        text = self.texts["formula"]
-        for k, value in enumerate(self.values):
-            text = text.replace(f"p{k}*", f"{value:.3g}*")
-        rates = [f"d{s}/dt = {self.texts[key]}" for key, s in RATES.items() if key in self.texts]
-        beside = f" with {' and '.join(rates)}" if rates else ""
-        return f"{self.texts['adds_to']} += {text.replace('+ -', '- ')}{beside}"
+        told = with_rates([self.form], [f"{value:.3g}" for value in self.values])
+        return f"{self.form.adds_to} += {told}"
 
     @property
     def lasting(self) -> bool:
@@ -133,9 +149,6 @@ class Formula:
         }
 
 
-RATES = {"state_rate": "s", "second_rate": "r"}
-
-
 def formula_of(
     search: Search, own: Evidence, motion: Motion, words: Sequence[str]
 ) -> Formula | None:
@@ -162,15 +175,7 @@ def formula_of(
     listed = logsumexp([best.log_evidence, *others]) - np.log(len(tried))
     odds = np.log(PRIORS.alike / (1 - PRIORS.alike)) + listed - fitting.smooth(words[0])
     values, stds = fitting.numbers(best)
-    return Formula(
-        words[0],
-        joined([best.form]),
-        values,
-        stds,
-        tuple(units_of(best.form)),
-        float(expit(odds)),
-        best.form.names_time,
-    )
+    return Formula(words[0], best.form, values, stds, float(expit(odds)))
 
 
 def _beside(search: Search, own: Evidence, words: Sequence[str]) -> Linear:
@@ -179,21 +184,14 @@ def _beside(search: Search, own: Evidence, words: Sequence[str]) -> Linear:
     for word in words:
         at = [f for f, k in enumerate(search.problem.kernels) if k.depends_on == word]
         if at:
-            gains = own.gains[at] + np.log(CHANCE)
-            which, s = np.unravel_index(gains.argmax(), gains.shape)
-            linear = linear.with_columns(SIZES[s] * own.white(search.view, at[which]))
+            f, s, _ = own.likeliest(at)
+            linear = linear.with_columns(SIZES[s] * own.white(search.view, f))
     return linear
 
 
 def _forms(word: str, m: Motion, model: Any) -> list[Form]:
     """Forms that depend on it."""
-    rate = m.moved / m.step_s[:, None]
-    vx, vy, omega = np.where(np.abs(rate) < STILL, 0.0, rate).T
-    names = {
-        "moves": (np.abs(rate) > STILL).any(axis=1) * 1.0, "vx": vx, "vy": vy, "omega": omega,
-        "x": m.place[:, 0], "y": m.place[:, 1], "theta": m.heading,
-        "course": m.heading + np.arctan2(vy, vx), "t": m.t_s - m.t_s[0],
-    }  # fmt: skip
+    names = names_of(m.moved / m.step_s[:, None], m.place, m.heading, m.t_s - m.t_s[0])
     sideways = drives_sideways(model)
     every = [*BESIDE, *own_forms(names, 0.0, sideways, bool(model.wheels()))]
     return [f for f in every if f.group in GROUPS[word] and (sideways or f.adds_to != "vy_mps")]

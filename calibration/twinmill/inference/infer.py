@@ -132,12 +132,13 @@ def infer(
     problem = problem_of(runs, model_file, always, sheet=is_own(runs, model_file))
     search = Search(problem, progress).run()
     found = answer(table_of(search))
-    left, own_set = unnamed(search, problem.motion, found), likeliest(search, found)
-    formula = None
-    sure = [word for word, p in found.depends_on.items() if p >= PRIORS.sure]
-    if own_set is not None and sure:
-        progress("formula")
-        formula = formula_of(search, own_set, problem.motion, sure)
+    own_set, formula = likeliest(search, found), None
+    left: tuple[Unnamed, ...] = ()
+    if own_set is not None:
+        left = unnamed(search, own_set, problem.motion, found.sure_words)
+        if sure := [word for word, p in found.depends_on.items() if p >= PRIORS.sure]:
+            progress("formula")
+            formula = formula_of(search, own_set, problem.motion, sure)
     progress("scores")
     said = tuple(strangers(own, model_file))
     return _scored(found, runs, model_file, left=left, formula=formula, always=always, said=said)

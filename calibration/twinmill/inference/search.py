@@ -5,7 +5,7 @@ Nothing is accepted or refused on the way: a set that was fitted competes in the
 effect more, two at once, one exchanged, one left out.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import SupportsIndex
@@ -63,6 +63,12 @@ class Evidence:
     cross: np.ndarray
     push: np.ndarray
     grams: list[np.ndarray]
+
+    def likeliest(self, among: Sequence[int]) -> tuple[int, int, float]:
+        """Likeliest of some kernels, place of its size, and gain with that size's chance."""
+        gains = self.gains[among] + np.log(CHANCE)
+        k, s = np.unravel_index(gains.argmax(), gains.shape)
+        return among[int(k)], int(s), float(gains[k, s])
 
     def white(self, view: View, f: SupportsIndex) -> np.ndarray:
         """(K, R) white columns of a kernel, without what the effects take."""

@@ -221,10 +221,9 @@ def swells_once(steps: list[tuple[float, float]]) -> bool:
 
 def _likeliest_columns(own: Evidence, p: Problem) -> np.ndarray:
     """(K, W, 3) columns of the likeliest dependence at its size; none if it gains nothing."""
-    gains = own.gains + np.log(CHANCE)
-    f, s = np.unravel_index(gains.argmax(), gains.shape)
+    f, s, gain = own.likeliest(range(len(p.kernels)))
     columns = SIZES[s] * p.kernels[f].columns
-    return columns if gains[f, s] > 0 else columns[:0]
+    return columns if gain > 0 else columns[:0]
 
 
 def noise_of(h: Hypothesis, p: Problem, beside: np.ndarray | None = None) -> Noise:
@@ -474,15 +473,14 @@ class _Comparison:
 
     def _likeliest(self, usual: _Beside, own: Evidence) -> _Beside:
         """The likeliest form and size of a dependence, as something that is there as well."""
-        gains = own.gains + np.log(CHANCE)
-        f, s = np.unravel_index(gains.argmax(), gains.shape)
+        f, s, gain = own.likeliest(range(len(self.view.kernels)))
         word = self.view.kernels[f].depends_on
         forms = sum(k.depends_on == word for k in self.view.kernels)
         return _Beside(
             (word,),
             np.concatenate([usual.white, SIZES[s] * own.white(self.view, f)]),
             usual.log_chance + float(np.log(CHANCE[s] / forms)),
-            float(own.falls[f, s]) if gains[f, s] > 0 else 0.0,
+            float(own.falls[f, s]) if gain > 0 else 0.0,
             self._log_relative(own.falls[f, s]) - np.log(CHANCE[s]),
             None,
             usual.local,

@@ -7,13 +7,14 @@ what that leaves by a constant velocity, channel by channel; both are linear in 
 so that their standard deviations follow from the posterior (Rasmussen and Williams 2006, eq. 2.11).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from twinmill.inference.answer import Answer
-from twinmill.inference.discrepancy import CHANCE, SIZES, TIME, Kernel
+from twinmill.inference.discrepancy import SIZES, TIME, Kernel
 from twinmill.inference.search import Evidence, Search
 from twinmill.inference.steps import Motion
 from twinmill.model.parameters import catalogue_name
@@ -59,28 +60,25 @@ def likeliest(search: Search, found: Answer) -> Evidence | None:
     return search.fitted[sets[0]] if sets else None
 
 
-def unnamed(search: Search, motion: Motion, found: Answer) -> tuple[Unnamed, ...]:
-    """Each dependence that is sure, or else the likeliest, all in one model.
-
-    Left out is one that has no such picture, as moments have none.
+def unnamed(
+    search: Search, own: Evidence, motion: Motion, words: Sequence[str]
+) -> tuple[Unnamed, ...]:
+    """Each of some dependences, all in one model; left out is one that has no such picture.
 
     Args:
         search: that was answered.
+        own: of the likeliest set of effects.
         motion: of its logs.
-        found: the answer.
+        words: dependences that are sure, or else the likeliest.
     """
-    kernels, own = search.problem.kernels, likeliest(search, found)
-    if own is None:
-        return ()
-    linear, told = own.linear, []
-    for word in found.sure_words:
+    kernels, linear, told = search.problem.kernels, own.linear, []
+    for word in words:
         forms = [f for f, kernel in enumerate(kernels) if kernel.depends_on == word]
         if forms:
-            gains = own.gains[forms] + np.log(CHANCE)
-            which, s = np.unravel_index(gains.argmax(), gains.shape)
-            white = SIZES[s] * own.white(search.view, forms[which])
+            f, s, _ = own.likeliest(forms)
+            white = SIZES[s] * own.white(search.view, f)
             at = np.arange(len(linear.mean), len(linear.mean) + len(white))
-            told.append((kernels[forms[which]], float(SIZES[s]), at))
+            told.append((kernels[f], float(SIZES[s]), at))
             linear = linear.with_columns(white)
     mean, cov = linear.mean, linear.covariance
     return tuple(
