@@ -24,7 +24,7 @@
 #include "swarm/metrics.h"
 #include "swarm/robots.h"
 #include "swarm/species.h"
-#include "world_file.h"
+#include "swarm/world_file.h"
 
 namespace twin
 {

@@ -11,39 +11,31 @@ namespace
 
 using Eigen::Vector2d;
 
-// Twice the area of the triangle, positive if c is left of the way from a to b.
-double Turn(const Vector2d &a, const Vector2d &b, const Vector2d &c)
-{
-    const Vector2d ab = b - a, ac = c - a;
-    return ab.x() * ac.y() - ab.y() * ac.x();
-}
+using One = CapsuleFormulas<1>;
 
-bool Intersect(const Vector2d &a, const Vector2d &b, const Vector2d &c, const Vector2d &d)
+One::Point PointOf(const Vector2d &point_m)
 {
-    return Turn(a, b, c) * Turn(a, b, d) < 0 && Turn(c, d, a) * Turn(c, d, b) < 0;
+    return {Lanes<1>::All(point_m.x()), Lanes<1>::All(point_m.y())};
 }
 
 }  // namespace
 
-Vector2d NearestPoint(const Capsule &capsule, const Vector2d &point_m)
+PlainCapsule PlainOf(const Capsule &capsule)
 {
-    const Vector2d along = capsule.to_m - capsule.from_m;
-    const double length2 = along.squaredNorm();
-    const double part = length2 > 0 ? along.dot(point_m - capsule.from_m) / length2 : 0;
-    return capsule.from_m + std::clamp(part, 0.0, 1.0) * along;
+    return {capsule.from_m.x(), capsule.from_m.y(), capsule.to_m.x(), capsule.to_m.y(),
+            capsule.radius_m};
 }
 
-// Two segments that do not cross are nearest at an end of one of them.
+Vector2d NearestPoint(const Capsule &capsule, const Vector2d &point_m)
+{
+    const One::Point nearest =
+        One::Nearest(PointOf(capsule.from_m), PointOf(capsule.to_m), PointOf(point_m));
+    return {nearest.x_m[0], nearest.y_m[0]};
+}
+
 bool Crosses(const Capsule &capsule, const Vector2d &a_m, const Vector2d &b_m)
 {
-    if (Intersect(capsule.from_m, capsule.to_m, a_m, b_m))
-        return true;
-    const Capsule way{a_m, b_m, 0};
-    const double apart_m = std::min({(NearestPoint(capsule, a_m) - a_m).norm(),
-                                     (NearestPoint(capsule, b_m) - b_m).norm(),
-                                     (NearestPoint(way, capsule.from_m) - capsule.from_m).norm(),
-                                     (NearestPoint(way, capsule.to_m) - capsule.to_m).norm()});
-    return apart_m < capsule.radius_m;
+    return One::Crosses(PlainOf(capsule), PointOf(a_m), PointOf(b_m))[0];
 }
 
 Capsule WorldBody::At(double t_s) const

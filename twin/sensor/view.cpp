@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "sensor/view_lanes.h"
+
 namespace twin
 {
 namespace
@@ -77,25 +79,6 @@ double InViewProbability(const Pose2 &eye, const Pose2 &target, const DetectionM
                   std::hypot(blur.heading_rad, both_m / std::max(place.distance_m, 1e-3)));
 }
 
-// Shrinks a wall of 100 m to less than a micrometre.
-constexpr int kGoldenSteps = 40;
-
-// How far a point is from the field of view; 0 within.
-double ToView(const Pose2 &eye, const Eigen::Vector2d &point_m, const DetectionModel &detection)
-{
-    const double dx_m = point_m.x() - eye.x_m, dy_m = point_m.y() - eye.y_m;
-    const double axis_rad = eye.theta_rad + detection.pan_rad;
-    const double c = std::cos(axis_rad), s = std::sin(axis_rad);
-    const double ahead_m = c * dx_m + s * dy_m, aside_m = std::abs(c * dy_m - s * dx_m);
-    if (std::atan2(aside_m, ahead_m) <= detection.cone_rad / 2)
-        return std::max(std::hypot(ahead_m, aside_m) - detection.range_m, 0.0);
-    const double cos_half = std::cos(detection.cone_rad / 2),
-                 sin_half = std::sin(detection.cone_rad / 2);
-    const double along_m =
-        std::clamp(ahead_m * cos_half + aside_m * sin_half, 0.0, detection.range_m);
-    return std::hypot(ahead_m - along_m * cos_half, aside_m - along_m * sin_half);
-}
-
 }  // namespace
 
 bool InView(const Pose2 &eye, const Pose2 &target, const DetectionModel &detection)
@@ -125,27 +108,21 @@ bool Hidden(std::span<const Pose2> poses, size_t self, size_t target,
     return Clear(poses, self, target, detection, {}) == 0;
 }
 
-// The distance to a convex set is convex along a segment: golden sections find its least.
 std::optional<Eigen::Vector2d> PartInView(const Pose2 &eye, const Capsule &body,
                                           const DetectionModel &detection)
 {
-    const Eigen::Vector2d along_m = body.to_m - body.from_m;
-    const auto distance_m = [&](double part) {
-        return ToView(eye, body.from_m + part * along_m, detection);
-    };
-    double low = 0, high = along_m.isZero() ? 0 : 1;
-    for (int i = 0; i < kGoldenSteps && high > low; ++i)
-    {
-        const double step = (high - low) / std::numbers::phi;
-        if (distance_m(high - step) <= distance_m(low + step))
-            high = low + step;
-        else
-            low = high - step;
-    }
-    const double part = (low + high) / 2;
-    if (!(distance_m(part) < body.radius_m))
+    using L = Lanes<1>;
+    const double axis_rad = eye.theta_rad + detection.pan_rad;
+    const EyeLanes<1> lanes{{L::All(eye.x_m), L::All(eye.y_m)},
+                            L::All(std::cos(axis_rad)),
+                            L::All(std::sin(axis_rad)),
+                            L::All(std::cos(detection.cone_rad / 2)),
+                            L::All(std::sin(detection.cone_rad / 2)),
+                            L::All(detection.range_m)};
+    const auto part = ViewFormulas<1>::PartInView(lanes, PlainOf(body));
+    if (!part.in_view[0])
         return std::nullopt;
-    return body.from_m + part * along_m;
+    return Eigen::Vector2d{part.at.x_m[0], part.at.y_m[0]};
 }
 
 double ViewProbability(std::span<const Pose2> poses, size_t self, const DetectionModel &detection,

@@ -3,7 +3,7 @@
 #ifndef SWEEP_SINGLE_LANES_H
 #define SWEEP_SINGLE_LANES_H
 
-#include "swarm/lanes.h"
+#include "plant/lanes.h"
 
 namespace twin
 {

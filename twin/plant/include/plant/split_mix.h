@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Random bits, for one stream or for one in each lane of a vector. No headers, see swarm/lanes.h.
+// Random bits, for one stream or for one in each lane of a vector. No headers, see plant/lanes.h.
 #ifndef PLANT_SPLIT_MIX_H
 #define PLANT_SPLIT_MIX_H
 

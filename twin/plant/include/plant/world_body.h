@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "plant/capsule_lanes.h"
+
 namespace twin
 {
 
@@ -17,7 +19,9 @@ struct Capsule
 {
     Eigen::Vector2d from_m, to_m;
     double radius_m;
+    bool operator==(const Capsule &) const = default;
 };
+PlainCapsule PlainOf(const Capsule &capsule);
 
 // The point of the segment that is nearest to `point_m`.
 Eigen::Vector2d NearestPoint(const Capsule &capsule, const Eigen::Vector2d &point_m);
@@ -36,7 +40,9 @@ struct WorldBody
     std::vector<Eigen::Vector2d> path_m{};
     double speed_mps = 0;
 
+    bool Moves() const { return !path_m.empty() && speed_mps > 0; }
     Capsule At(double t_s) const;
+    bool operator==(const WorldBody &) const = default;
 };
 
 }  // namespace twin

@@ -3,7 +3,7 @@
 #ifndef SWARM_METRICS_LANES_H
 #define SWARM_METRICS_LANES_H
 
-#include "swarm/lanes.h"
+#include "plant/lanes.h"
 
 namespace twin
 {

@@ -3,8 +3,8 @@
 // All operations are those of IEEE 754, so a lane's result does not depend on W. Code in a file
 // that is compiled for newer processors includes nothing beyond this and C headers: an inline
 // function of the standard library, compiled there, could be linked into what runs everywhere.
-#ifndef SWARM_LANES_H
-#define SWARM_LANES_H
+#ifndef PLANT_LANES_H
+#define PLANT_LANES_H
 
 #include <stdint.h>
 #ifdef __AVX512F__

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "world_file.h"
+#include "swarm/world_file.h"
 
 #include <toml++/toml.h>
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 
 #include "sensor/scene.h"
-#include "toml_file.h"
 
 namespace twin
 {
@@ -151,22 +152,43 @@ private:
     std::string origin_;
 };
 
+toml::table TableOf(const std::string &text, const std::string &origin)
+{
+    try
+    {
+        return toml::parse(text, origin);
+    }
+    catch (const toml::parse_error &error)
+    {
+        throw std::invalid_argument(origin + ", line " + std::to_string(error.source().begin.line) +
+                                    ": " + std::string(error.description()));
+    }
+}
+
 }  // namespace
 
 std::vector<WorldBody> LoadWorld(const std::string &path)
 {
-    std::vector<WorldBody> world;
     if (path.empty())
-        return world;
-    const toml::table file = ParseToml(path);
+        return {};
+    std::ostringstream text;
+    if (!(text << std::ifstream(path, std::ios::binary).rdbuf()))
+        throw std::invalid_argument(path + ": cannot be read, or is empty");
+    return ParseWorld(text.str(), path);
+}
+
+std::vector<WorldBody> ParseWorld(const std::string &text, const std::string &origin)
+{
+    std::vector<WorldBody> world;
+    const toml::table file = TableOf(text, origin);
     const toml::array *bodies = file["body"].as_array();
     if (!bodies || file.size() != 1)
-        throw std::invalid_argument(path + ": must be a list of [[body]], and nothing else");
+        throw std::invalid_argument(origin + ": must be a list of [[body]], and nothing else");
     for (const toml::node &node : *bodies)
     {
         if (!node.is_table())
-            throw std::invalid_argument(path + ": must be a list of [[body]], and nothing else");
-        world.push_back(Reader(path, *node.as_table(), world.size() + 1).Read());
+            throw std::invalid_argument(origin + ": must be a list of [[body]], and nothing else");
+        world.push_back(Reader(origin, *node.as_table(), world.size() + 1).Read());
         if (world.back().name.empty())
             world.back().name = "body" + std::to_string(world.size());
     }
