@@ -90,7 +90,7 @@ std::vector<Cell> Meetings(const char *behavior)
 int Held(const std::string &mjcf, const std::vector<Cell> &cells)
 {
     const auto make = [&](const std::vector<Model> &models, const std::vector<Pose2> &starts,
-                          uint64_t seed) {
+                          uint64_t seed, const std::vector<WorldBody> &) {
         return std::make_unique<MujocoPlant>(mjcf, models, starts, SweepOptions(seed));
     };
     int held = 0;

@@ -21,6 +21,26 @@ Cell PaperCell(int n = 6)
             static_cast<size_t>(n)};
 }
 
+// A goal, a wall, a post that hides, an evader that crosses all of it, and a robot
+// of its team.
+void AddWorld(Cell &c)
+{
+    c.model.robot.body_radius_m = 0.1;
+    c.model.sensor.bits = {"all", "left,40,235,0,124,165,255"};
+    c.model.sensor.false_negative_rate = 0.04;
+    const size_t n = c.tables.size();
+    c.tables.assign(n, fw_table{2, {{100, -500}, {100, 300}, {80, -900}, {60, 700}}});
+    c.ring_size = n - 1;
+    c.colours.assign(n, TargetColour());
+    c.colours.back() = ColourNamed("red");
+    c.spread_m = 2;
+    const auto at = [](double x_m, double y_m) { return Eigen::Vector2d{x_m, y_m}; };
+    c.world = {{"goal", {at(0, 0), at(0, 0), 0.5}, 0.2, "red", false},
+               {"wall", {at(-2, 1.1), at(2, 1.4), 0.02}, 0.2, "green"},
+               {"post", {at(0.7, 0), at(0.7, 0), 0.1}, 0.2, ""},
+               {"evader", {at(-2, -1), at(-2, -1), 0.15}, 0.2, "red", true, {at(2, 1)}, 0.3}};
+}
+
 struct Variant
 {
     const char *name;
@@ -89,6 +109,14 @@ const Variant kVariants[] = {
          c.model.noise = {};
          c.model.effects.clear();
      }},
+    {"world", AddWorld, 10},
+    {"world_seen_late",
+     [](Cell &c) {
+         AddWorld(c);
+         c.model.sensor.delay_s = 0.1;
+         c.model.sensor.target_radius_m = 0.1;
+     },
+     10},
     {"long_period",
      [](Cell &c) {
          c.model.base.control_period_s = 0.06;
@@ -136,6 +164,10 @@ TEST_P(BatchKernel, DoesWhatTheFirmwareAndPlantDo)
         ExpectSame(l.groups, f.groups, 0.01, "groups");
         ExpectSame(l.contacts, f.contacts, 0.01, "contacts");
         ExpectSame(batched[w].least_diffusion, full[w].least_diffusion, 1e-7, "least_diffusion");
+        const Defence &d = batched[w].defence, &e = full[w].defence;
+        ExpectSame(d.caught_s, e.caught_s, 1e-7, "caught_s");
+        ExpectSame(d.reached_s, e.reached_s, 1e-7, "reached_s");
+        ExpectSame(d.inside, cell.world.empty() ? d.inside : e.inside, 1e-7, "inside");
     }
 }
 
@@ -150,9 +182,13 @@ TEST(BatchKernel, GivesTheSameBytesInAnyWidth)
     cell.model.sensor.false_positive_rate = 0.05;
     cell.model.sensor.vote_frames = 3;
     cell.model.sensor.delay_s = 0.05;
+    Cell with_bodies = cell;
+    AddWorld(with_bodies);
     std::vector<World> worlds;
     for (uint64_t seed = 1; seed <= 16; ++seed)
         worlds.push_back({&cell, seed});
+    for (uint64_t seed = 1; seed <= 16; ++seed)
+        worlds.push_back({&with_bodies, seed});
     std::vector<std::vector<Outcome>> runs;
     for (const BatchWidth &width : BatchWidths())
     {
@@ -165,6 +201,7 @@ TEST(BatchKernel, GivesTheSameBytesInAnyWidth)
             EXPECT_EQ(run[w].mean.circliness, runs[0][w].mean.circliness) << width.lanes;
             EXPECT_EQ(run[w].mean.diffusion, runs[0][w].mean.diffusion) << width.lanes;
             EXPECT_EQ(run[w].mean.contacts, runs[0][w].mean.contacts) << width.lanes;
+            EXPECT_EQ(run[w].defence.inside, runs[0][w].defence.inside) << width.lanes;
         }
     }
 }

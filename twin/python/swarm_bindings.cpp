@@ -15,6 +15,7 @@
 #include "swarm/metrics.h"
 #include "swarm/robots.h"
 #include "swarm/species.h"
+#include "swarm/world_file.h"
 #include "sweep/batch.h"
 #include "sweep/worlds.h"
 
@@ -27,12 +28,18 @@ namespace
 
 using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 using Seeds = nb::ndarray<const uint64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+// What a world's file lists.
+struct Bodies
+{
+    std::vector<WorldBody> all;
+};
 using Row = std::vector<int>;  // speed and turn of each number of bits
 using Tables = std::vector<Row>;
 
 constexpr const char *kMetricNames[] = {"circliness", "radius_m",  "scatter_m2", "rotation",
                                         "odd_ratio",  "diffusion", "groups",     "contacts"};
 constexpr size_t kMetrics = std::size(kMetricNames);
+constexpr const char *kDefenceNames[] = {"caught_s", "reached_s", "inside"};
 
 void Append(std::vector<double> &row, const Metrics &m)
 {
@@ -94,7 +101,7 @@ NamedTables Species(const std::string &text, std::optional<int> n, const NamedTa
 
 Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const std::string &start,
               double spread_m, const std::vector<std::array<double, 3>> &poses,
-              const std::vector<std::string> &colours)
+              const std::vector<std::string> &colours, const std::vector<WorldBody> &world)
 {
     if (!colours.empty() && colours.size() != rows.size())
         throw std::invalid_argument("colours must be none, or one for each table");
@@ -114,17 +121,21 @@ Cell MakeCell(const Model &model, const Tables &rows, size_t ring_size, const st
     Cell cell{model, std::move(tables), ring_size, StartNamed(start), spread_m, std::move(starts)};
     for (const std::string &name : colours)
         cell.colours.push_back(ColourNamed(name));
+    cell.world = world;
     return cell;
 }
 
 // Robots with other wheels than the installed one's are made of their models' numbers.
 std::unique_ptr<Plant> MakeMujoco(const std::vector<Model> &models,
-                                  const std::vector<Pose2> &starts, uint64_t seed)
+                                  const std::vector<Pose2> &starts, uint64_t seed,
+                                  const std::vector<WorldBody> &world)
 {
     const WheelKind wheels = models[0].base.wheels;
     const bool installed = wheels == WheelKind::kMecanum || wheels == WheelKind::kNone;
+    MujocoOptions options = SweepOptions(seed);
+    options.world = world;
     return std::make_unique<MujocoPlant>(installed ? FindModelFile("turbopi.xml") : "", models,
-                                         starts, SweepOptions(seed));
+                                         starts, options);
 }
 
 void CheckPlant(const std::string &plant)
@@ -133,7 +144,8 @@ void CheckPlant(const std::string &plant)
         throw std::invalid_argument("plant '" + plant + "' must be 'planar' or 'mujoco'");
 }
 
-// (W, 10): the metrics, the least diffusion, and since when the class has held.
+// (W, 10): the metrics, the least diffusion, and since when the class has held; (W, 13) with what
+// became of evaders where a cell has a world.
 Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, double duration_s,
           bool full, const std::string &plant)
 {
@@ -143,6 +155,8 @@ Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, dou
     std::vector<World> worlds;
     for (size_t w = 0; w < seeds.size(); ++w)
         worlds.push_back({cells.at(static_cast<size_t>(cell.data()[w])), seeds.data()[w]});
+    const bool has_world =
+        std::ranges::any_of(cells, [](const Cell *one) { return !one->world.empty(); });
     std::vector<double> rows;
     {
         nb::gil_scoped_release unlocked;
@@ -152,9 +166,13 @@ Array Run(const std::vector<const Cell *> &cells, Indices cell, Seeds seeds, dou
         {
             Append(rows, o.mean);
             rows.insert(rows.end(), {o.least_diffusion, o.settled_s});
+            if (has_world)
+                rows.insert(rows.end(),
+                            {o.defence.caught_s, o.defence.reached_s, o.defence.inside});
         }
     }
-    return ToNumpy(std::move(rows), {worlds.size(), kMetrics + 2});
+    const size_t defence = has_world ? std::size(kDefenceNames) : 0;
+    return ToNumpy(std::move(rows), {worlds.size(), kMetrics + 2 + defence});
 }
 
 Array Trace(const Cell &cell, uint64_t seed, double duration_s, double every_s,
@@ -226,32 +244,55 @@ void BindSwarms(nb::module_ &m)
         outcomes.append(name);
     m.attr("METRICS") = names;
     m.attr("OUTCOMES") = outcomes;
+    nb::list defence;
+    for (const char *name : kDefenceNames)
+        defence.append(name);
+    m.attr("DEFENCE") = defence;
     m.attr("MUJOCO_PHYSICS") = std::string("MuJoCo ") + mj_versionString() + ", " + kSweepPhysics;
     m.def("species", &Species, "text"_a, "n"_a = nb::none(), "own"_a = NamedTables(),
           "Per robot the behaviour's name and (unseen speed, turn, seen speed, turn) inputs, turn "
           "in thousandths, or so for each number of k bits. `own`: tables beside the firmware's.");
     m.def("colours", &ColourNames, "text"_a, "n"_a = nb::none(),
           "Per robot the colour of its target, as name@colour says it.");
+    nb::class_<Bodies>(m, "Bodies", "Obstacles, walls, goals and evaders of a world's file.")
+        .def(
+            "__init__",
+            [](Bodies *self, const std::string &text, const std::string &origin) {
+                new (self) Bodies{ParseWorld(text, origin)};
+            },
+            "text"_a, "origin"_a)
+        .def_prop_ro(
+            "goals",
+            [](const Bodies &bodies) {
+                std::vector<std::string> names;
+                for (const WorldBody &body : bodies.all)
+                    if (!body.is_solid)
+                        names.push_back(body.name);
+                return names;
+            },
+            "Names of what robots drive over.");
     nb::class_<Cell>(m, "Cell", "A swarm but for its seed; robots after ring_size are odd.")
         .def(
             "__init__",
             [](Cell *self, const Model &model, const Tables &tables, size_t ring_size,
                const std::string &start, double spread_m,
                const std::vector<std::array<double, 3>> &poses,
-               const std::vector<std::string> &colours) {
-                new (self)
-                    Cell(MakeCell(model, tables, ring_size, start, spread_m, poses, colours));
+               const std::vector<std::string> &colours, const Bodies *world) {
+                new (self) Cell(MakeCell(model, tables, ring_size, start, spread_m, poses, colours,
+                                         world ? world->all : std::vector<WorldBody>()));
             },
             "model"_a, "tables"_a, "ring_size"_a, "start"_a = "square", "spread_m"_a = 1.2,
             "poses"_a = std::vector<std::array<double, 3>>(),
-            "colours"_a = std::vector<std::string>())
+            "colours"_a = std::vector<std::string>(), "world"_a = nb::none())
         .def_prop_ro("period_s", [](const Cell &cell) { return cell.model.base.control_period_s; })
         .def_prop_ro("why_not_batched", [](const Cell &cell) { return WhyNotBatched(cell.model); });
     m.def(
         "run_worlds", &Run, "cells"_a, "cell"_a, "seeds"_a, "duration_s"_a, "full"_a = false,
         "plant"_a = "planar",
         "(W, 10) OUTCOMES of worlds of cell and seed: METRICS and their least diffusion over the last "
-        "10 s; since when the class has held, NaN of the batched kernel.");
+        "10 s; since when the class has held, NaN of the batched kernel. (W, 13) with DEFENCE where a "
+        "cell has a world: when a robot first touched an evader, and an untouched evader was first "
+        "in a goal, NaN if never; the share of the run for which an evader was in a goal.");
     m.def("trace_world", &Trace, "cell"_a, "seed"_a, "duration_s"_a, "every_s"_a,
           "plant"_a = "planar", "(T, n, 3) poses of one world, the start first.");
     m.def("measure", &MeasureAll, "pose"_a, "velocity"_a, "ring_size"_a, "range_m"_a,

@@ -13,6 +13,7 @@
 #include "sensor/view.h"
 #include "swarm/robots.h"
 #include "swarm/swarm.h"
+#include "sweep/defence.h"
 
 namespace twin
 {
@@ -80,7 +81,10 @@ class Batch
 public:
     Batch(const BatchWidth &width, std::span<const World> worlds, double duration_s,
           bool prefilters)
-        : worlds_(worlds), lanes_(width.lanes), advance_(width.advance)
+        : worlds_(worlds),
+          lanes_(width.lanes),
+          advance_(width.advance),
+          defence_(*worlds.front().cell)
     {
         const Cell &cell = *worlds.front().cell;
         const Model &model = cell.model;
@@ -92,13 +96,14 @@ public:
         bits_ = MakeBits(model);
         plan_.bits = static_cast<int>(bits_.size());
         FindShown(cell);
-        plan_.prefilters = prefilters && IsPlain();
+        plan_.prefilters = prefilters && IsPlain() && cell.world.empty();
         plan_.substeps = SubstepCount(model.base.control_period_s, SwarmOptions{}.max_step_s);
         plan_.vote_frames = static_cast<int>(std::lround(model.sensor.vote_frames));
         schedule_ = Schedule(model, count, plan_.vote_frames, plan_.kept_frames);
         plan_.steps = schedule_.data();
         plan_.body_m = 2 * model.robot.body_radius_m;
         plan_.touch_m = plan_.body_m * kTouch;
+        FindWorld(cell);
         const size_t size = static_cast<size_t>(BatchLayout(plan_).total) * lanes_ / 2;
         memory_.assign(size + kAlign / sizeof(double), 0.0);
         numbers_ = Aligned(memory_);
@@ -113,7 +118,10 @@ public:
         const auto mean = [&](BatchSum sum) { return Sum(sum, lane) / measured_; };
         return {{mean(kCirclinessSum), mean(kRadiusSum), mean(kScatterSum), mean(kRotationSum),
                  mean(kOddSum), mean(kDiffusionSum), mean(kGroupsSum), mean(kContactsSum)},
-                Sum(kLeastDiffusion, lane)};
+                Sum(kLeastDiffusion, lane),
+                std::numeric_limits<double>::quiet_NaN(),
+                DefenceOf(Sum(kCaught, lane), Sum(kReached, lane), Sum(kInside, lane),
+                          plan_.step_count)};
     }
 
 private:
@@ -159,7 +167,8 @@ private:
                         fw_table_lookup(&cell.tables[i], static_cast<uint32_t>(row)));
         }
         Number(BatchLayout(plan_).range, lane) = cell.model.sensor.range_m;
-        Sum(kLeastDiffusion, lane) = std::numeric_limits<double>::infinity();
+        for (const BatchSum least : {kLeastDiffusion, kCaught, kReached})
+            Sum(least, lane) = std::numeric_limits<double>::infinity();
     }
 
     void FillSensor(size_t robot, size_t lane, const Sensor &sensor)
@@ -193,6 +202,23 @@ private:
             for (size_t i = 0; i < cell.tables.size(); ++i)
                 shown_.push_back(IsInside(cell.ColourOf(i), bit.box));
         plan_.shown = shown_.data();
+    }
+
+    // Where its bodies are, and who sees them; after substeps were counted.
+    void FindWorld(const Cell &cell)
+    {
+        plan_.world = defence_.World();
+        plan_.step_s = cell.model.base.control_period_s;
+        for (const fw_bit &bit : bits_)
+            for (const WorldBody &body : cell.world)
+                bodies_shown_.push_back(!body.colour.empty() &&
+                                        IsInside(ColourNamed(body.colour), bit.box));
+        plan_.bodies_shown = bodies_shown_.data();
+        const int times = cell.world.empty() ? 0 : plan_.step_count * plan_.substeps + 1;
+        for (int k = 0; k < times; ++k)
+            std::ranges::copy(PlacesAt(cell.world, k * plan_.step_s / plan_.substeps),
+                              std::back_inserter(places_));
+        plan_.places = places_.data();
     }
 
     // Any other robot, anywhere ahead.
@@ -233,7 +259,9 @@ private:
     BatchPlan plan_{};
     std::vector<BatchStep> schedule_;
     std::vector<fw_bit> bits_;
-    std::vector<uint8_t> shown_;
+    DefencePlan defence_;
+    std::vector<uint8_t> shown_, bodies_shown_;
+    std::vector<PlainCapsule> places_;
     std::vector<double> memory_;
     double *numbers_ = nullptr;
 };
@@ -250,7 +278,7 @@ bool SameBatch(const Cell &a, const Cell &b)
 {
     const Model &m = a.model, &o = b.model;
     return a.tables.size() == b.tables.size() && a.ring_size == b.ring_size &&
-           a.colours == b.colours && m.sensor.bits == o.sensor.bits &&
+           a.colours == b.colours && a.world == b.world && m.sensor.bits == o.sensor.bits &&
            m.base.control_period_s == o.base.control_period_s &&
            m.sensor.delay_s == o.sensor.delay_s && m.sensor.vote_frames == o.sensor.vote_frames &&
            m.robot.body_radius_m == o.robot.body_radius_m;

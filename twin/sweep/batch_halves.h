@@ -40,29 +40,35 @@ private:
     template <bool kDisc>
     void Sense(int step)
     {
+        if (p_.world.body_count)
+            return SenseAll<kDisc, true>(step);
         if (!p_.prefilters)
-        {
-            for (int bit = 0; bit < p_.bits; ++bit)
-                for (int i = 0; i < p_.n; ++i)
-                {
-                    low_.template Sense<kDisc>(bit, i);
-                    high_.template Sense<kDisc>(bit, i);
-                }
-            return;
-        }
+            return SenseAll<kDisc, false>(step);
         prefilter_.template Sense<kDisc>(step);
         for (int i = 0; i < p_.n; ++i)
             if (prefilter_.Doubtful(i))
-            {
-                low_.template Sense<kDisc>(0, i);
-                high_.template Sense<kDisc>(0, i);
-            }
+                SenseBoth<kDisc, false>(0, i, step);
             else
             {
                 const auto seen = prefilter_.Seen(i);
                 low_.Seen()[i] = SingleLanes<W>::Low(seen);
                 high_.Seen()[i] = SingleLanes<W>::High(seen);
             }
+    }
+
+    template <bool kDisc, bool kWorld>
+    void SenseAll(int step)
+    {
+        for (int bit = 0; bit < p_.bits; ++bit)
+            for (int i = 0; i < p_.n; ++i)
+                SenseBoth<kDisc, kWorld>(bit, i, step);
+    }
+
+    template <bool kDisc, bool kWorld>
+    void SenseBoth(int bit, int robot, int step)
+    {
+        low_.template Sense<kDisc, kWorld>(bit, robot, step);
+        high_.template Sense<kDisc, kWorld>(bit, robot, step);
     }
 
     const BatchPlan &p_;

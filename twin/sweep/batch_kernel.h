@@ -6,6 +6,7 @@
 #define SWEEP_BATCH_KERNEL_H
 
 #include "plant/split_mix.h"
+#include "sensor/view_lanes.h"
 #include "swarm/metrics_lanes.h"
 #include "sweep/batch_plan.h"
 
@@ -19,6 +20,8 @@ class BatchKernel
     using Real = typename L::Real;
     using Mask = typename L::Mask;
     using Bits = typename L::Bits;
+    using View = ViewFormulas<W>;
+    using Point = PointLanes<W>;
 
 public:
     BatchKernel(const BatchPlan &plan, double *numbers)
@@ -31,9 +34,9 @@ public:
     Mask *Seen() const { return BitsAt(at_.seen); }
 
     // InView() of the cone sensor for one bit of a robot. Its ahead > cos * distance is squared
-    // with the signs kept, which spares the root.
-    template <bool kDisc>
-    void Sense(int bit, int robot)
+    // with the signs kept, which spares the root. With kWorld its bodies are seen, and hide.
+    template <bool kDisc, bool kWorld>
+    void Sense(int bit, int robot, int step)
     {
         const auto eye = [&](int column) { return Column(at_.OfBit(bit, column))[robot]; };
         const uint8_t *shown = p_.shown + bit * n_;
@@ -52,8 +55,16 @@ public:
             Mask inside = ahead * L::Abs(ahead) > cone * d2;
             if constexpr (kDisc)
                 inside |= Edge(bit, robot, ahead, L::Abs(c * dy - s * dx));
-            seen |= inside & (d2 < range2);
+            inside &= d2 < range2;
+            if constexpr (kWorld)
+                if (L::Any(inside))
+                    inside &= ~HiddenByBody(robot, {x[j], y[j]}, -1, step);
+            seen |= inside;
         }
+        if constexpr (kWorld)
+            seen |= SeesBody(
+                bit, robot,
+                {{x[robot], y[robot]}, c, s, eye(kHalfCos), eye(kHalfSin), L::Sqrt(range2)}, step);
         Seen()[bit * n_ + robot] = seen;
     }
 
@@ -64,14 +75,18 @@ public:
             Err();
         Decide(step);
         const bool moves = p_.steps[step].frame >= 0;
-        for (int i = 0; moves && i < p_.substeps; ++i)
+        for (int i = 0; (moves || p_.world.body_count) && i < p_.substeps; ++i)
         {
-            if (p_.bits == 1)
+            if (moves && p_.bits == 1)
                 Move<true>();
-            else
+            else if (moves)
                 Move<false>();
             PushApart();
+            if (p_.world.body_count)
+                StopAtWorld(step * p_.substeps + i + 1);
         }
+        if (p_.world.body_count)
+            WatchEvaders(step);
         if (p_.steps[step].measured)
             Measure(moves);
     }
@@ -88,6 +103,40 @@ private:
         const Real along = L::Max(ahead * cos_half + aside * sin_half, Real{});
         const Real over = ahead - along * cos_half, off = aside - along * sin_half;
         return over * over + off * off < eye(kTarget2);
+    }
+
+    // Of all bodies of the world after so many substeps.
+    const PlainCapsule *Places(int substeps) const
+    {
+        return p_.places + substeps * p_.world.body_count;
+    }
+
+    // As ConeSensor: whether a solid body, `but` apart, is between a robot and a point.
+    Mask HiddenByBody(int robot, const Point &point, int but, int step) const
+    {
+        const Point eye{Column(kX)[robot], Column(kY)[robot]};
+        const PlainCapsule *places = Places(step * p_.substeps);
+        Mask hidden{};
+        for (int b = 0; b < p_.world.body_count; ++b)
+            if (b != but && p_.world.bodies[b].is_solid)
+                hidden |= CapsuleFormulas<W>::Crosses(places[b], eye, point);
+        return hidden;
+    }
+
+    Mask SeesBody(int bit, int robot, const EyeLanes<W> &eye, int step) const
+    {
+        const uint8_t *shown = p_.bodies_shown + bit * p_.world.body_count;
+        const PlainCapsule *places = Places(step * p_.substeps);
+        Mask seen{};
+        for (int b = 0; b < p_.world.body_count; ++b)
+        {
+            if (!shown[b])
+                continue;
+            const auto part = View::PartInView(eye, places[b]);
+            if (L::Any(part.in_view))
+                seen |= part.in_view & ~HiddenByBody(robot, part.at, b, step);
+        }
+        return seen;
     }
 
     void Err()
@@ -184,6 +233,45 @@ private:
                 x[j] += push * dx;
                 y[j] += push * dy;
             }
+    }
+
+    // As twin::PushOut() without friction, after so many substeps.
+    void StopAtWorld(int substeps)
+    {
+        if (p_.body_m == 0)
+            return;
+        Real *x = Column(kX), *y = Column(kY);
+        const PlainCapsule *places = Places(substeps);
+        for (int b = 0; b < p_.world.body_count; ++b)
+        {
+            if (!p_.world.bodies[b].is_solid)
+                continue;
+            const Point from = CapsuleFormulas<W>::From(places[b]);
+            const Point to = CapsuleFormulas<W>::To(places[b]);
+            const double touch_m = p_.body_m / 2 + places[b].radius_m;
+            for (int i = 0; i < n_; ++i)
+            {
+                const Point at = CapsuleFormulas<W>::Nearest(from, to, {x[i], y[i]});
+                const Real dx = at.x_m - x[i], dy = at.y_m - y[i], d2 = dx * dx + dy * dy;
+                const Mask overlaps = (d2 < touch_m * touch_m) & (d2 != 0);
+                if (!L::Any(overlaps))
+                    continue;
+                const Real push = overlaps ? touch_m / L::Sqrt(d2) - 1 : Real{};
+                x[i] -= push * dx;
+                y[i] -= push * dy;
+            }
+        }
+    }
+
+    void WatchEvaders(int step)
+    {
+        Real *sums = numbers_ + at_.sums;
+        DefenceLanes<W> now{sums[kCaught], sums[kReached], sums[kInside]};
+        DefenceFormulas<W>::Add(p_.world, Places((step + 1) * p_.substeps), Column(kX), Column(kY),
+                                (step + 1) * p_.step_s, BitsAt(at_.caught), now);
+        sums[kCaught] = now.caught_s;
+        sums[kReached] = now.reached_s;
+        sums[kInside] = now.inside;
     }
 
     void Measure(bool moves)

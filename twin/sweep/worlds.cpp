@@ -13,6 +13,7 @@
 #include "swarm/robots.h"
 #include "swarm/swarm.h"
 #include "sweep/batch.h"
+#include "sweep/defence.h"
 
 namespace twin
 {
@@ -25,8 +26,8 @@ Swarm MakeSwarm(const World &world, const PlantMaker &make)
     const int n = static_cast<int>(cell.tables.size());
     const auto robots = DrawRobots(cell.model, n, world.seed);
     const auto starts = StartsOf(cell, world.seed);
-    return Swarm(make(robots, starts, world.seed), robots, cell.tables,
-                 {.seed = world.seed, .colours = cell.colours});
+    return Swarm(make(robots, starts, world.seed, cell.world), robots, cell.tables,
+                 {.seed = world.seed, .colours = cell.colours, .world = cell.world});
 }
 
 // The classes that a swarm goes through.
@@ -65,12 +66,14 @@ Outcome RunFull(const World &world, double duration_s, const PlantMaker &make)
     MetricWindow window(std::numeric_limits<double>::infinity());
     History history;
     Bounds bounds;
+    DefenceWatch defence(cell);
     Outcome outcome{{}, std::numeric_limits<double>::infinity()};
     std::vector<RobotState> states(cell.tables.size());
     for (int step = 0; step < count.steps; ++step)
     {
         swarm.Step();
         bounds.Check(swarm);
+        defence.Add(swarm);
         if (!count.Samples(step))
             continue;
         for (size_t i = 0; i < states.size(); ++i)
@@ -83,6 +86,7 @@ Outcome RunFull(const World &world, double duration_s, const PlantMaker &make)
         outcome.least_diffusion = std::min(outcome.least_diffusion, now.diffusion);
     }
     outcome.mean = window.Mean();
+    outcome.defence = defence.Sum();
     outcome.settled_s = history.SettledIn(Classify(outcome.mean));
     return outcome;
 }
@@ -102,9 +106,10 @@ size_t BatchSize(std::span<const World> worlds)
 }  // namespace
 
 std::unique_ptr<Plant> MakePlanarBodies(const std::vector<Model> &models,
-                                        const std::vector<Pose2> &starts, uint64_t seed)
+                                        const std::vector<Pose2> &starts, uint64_t seed,
+                                        const std::vector<WorldBody> &world)
 {
-    return std::make_unique<PlanarBodies>(models, starts, seed);
+    return std::make_unique<PlanarBodies>(models, starts, seed, kGridPays, world);
 }
 
 std::vector<Outcome> RunWorlds(std::span<const World> worlds, double duration_s, Path path)

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "swarm/metrics_lanes.h"
+#include "sweep/defence_lanes.h"
 
 namespace twin
 {
@@ -86,6 +87,9 @@ enum BatchSum
     kGroupsSum,
     kContactsSum,
     kLeastDiffusion,
+    kCaught,
+    kReached,
+    kInside,
     kBatchSums,
 };
 
@@ -112,12 +116,18 @@ struct BatchPlan
     double most_m;    // that a robot may drive in a step
     double body_m;    // diameter; 0: no bodies
     double touch_m;   // nearer bodies count as in contact
+    double step_s;
+    DefenceWorld world;
+    const uint8_t *bodies_shown;  // by bit, of each body of the world: it has the colour
+    // Of all bodies of the world at the start, after the first substep, after the second, ...
+    const PlainCapsule *places;
 };
 
 constexpr int kMostRows = 16;
 
 // Numbers of one lane, in units of the lane count: columns, range, sums, bits seen, votes' ones,
-// frames on the way, frames that vote. `total`: of two halves of a batch and their prefilter.
+// frames on the way, frames that vote, evaders caught. `total`: of two halves of a batch and their
+// prefilter.
 struct BatchLayout
 {
     // Always inlined: see lanes.h on inline functions that are compiled for several processors.
@@ -129,7 +139,8 @@ struct BatchLayout
           ones(seen + p.bits * p.n),
           frames(ones + p.bits * p.n),
           votes(frames + p.kept_frames * p.bits * p.n),
-          size(votes + p.vote_frames * p.bits * p.n),
+          caught(votes + p.vote_frames * p.bits * p.n),
+          size(caught + (p.world.body_count ? p.world.body_count + p.n : 0)),
           total(2 * size + kPrefilterColumns * p.n)
     {
     }
@@ -141,7 +152,7 @@ struct BatchLayout
     {
         return first_row + row * kRowColumns + column;
     }
-    int first_row, range, sums, seen, ones, frames, votes, size, total;
+    int first_row, range, sums, seen, ones, frames, votes, caught, size, total;
 };
 
 // Runs all steps of 2 W worlds. `numbers`: BatchLayout::total * W doubles, aligned to 64 bytes:

@@ -24,8 +24,9 @@ struct Cell
     size_t ring_size;
     StartShape start = StartShape::kSquare;
     double spread_m = 1.2;
-    std::vector<Pose2> poses = {};     // where they start whatever the seed; empty: drawn
-    std::vector<Colour> colours = {};  // of the robots' targets; empty: TargetColour()
+    std::vector<Pose2> poses = {};      // where they start whatever the seed; empty: drawn
+    std::vector<Colour> colours = {};   // of the robots' targets; empty: TargetColour()
+    std::vector<WorldBody> world = {};  // what else there is to see and to run into
 
     Colour ColourOf(size_t robot) const
     {
@@ -42,6 +43,18 @@ struct World
     uint64_t seed;
 };
 
+// Evaders are solid bodies of the world that move, and robots whose target has another colour than
+// the first's; goals are bodies that are not solid. Of the whole run, by the poses at the end of
+// each control period.
+struct Defence
+{
+    // When a robot of the first one's colour first touches an evader; NaN: never.
+    double caught_s = std::numeric_limits<double>::quiet_NaN();
+    // When the middle of an evader that was not caught before is first in a goal; NaN: never.
+    double reached_s = std::numeric_limits<double>::quiet_NaN();
+    double inside = 0;  // share of the run for which an evader is in a goal
+};
+
 struct Outcome
 {
     Metrics mean;                // over the last 10 s, every 0.1 s or a little more often
@@ -49,6 +62,7 @@ struct Outcome
     // Since when the swarm has been of the class that it ends in, by means over 5 s, once a second.
     // NaN: the last 5 s are of another class than the last 10 s, or the batched kernel ran.
     double settled_s = std::numeric_limits<double>::quiet_NaN();
+    Defence defence{};  // of cells with a world
 };
 
 }  // namespace twin

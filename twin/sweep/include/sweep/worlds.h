@@ -21,11 +21,14 @@ enum class Path
     kFull,  // every robot its firmware, its effects and its plant
 };
 
-// The plant of a swarm: one model and one start a robot, and the seed of its noise.
+// The plant of a swarm: one model and one start a robot, the seed of its noise, and what else is
+// there.
 using PlantMaker = std::function<std::unique_ptr<Plant>(
-    const std::vector<Model> &models, const std::vector<Pose2> &starts, uint64_t seed)>;
+    const std::vector<Model> &models, const std::vector<Pose2> &starts, uint64_t seed,
+    const std::vector<WorldBody> &world)>;
 std::unique_ptr<Plant> MakePlanarBodies(const std::vector<Model> &models,
-                                        const std::vector<Pose2> &starts, uint64_t seed);
+                                        const std::vector<Pose2> &starts, uint64_t seed,
+                                        const std::vector<WorldBody> &world = {});
 
 // Runs each world for `duration_s`; outcomes in the same order. They depend on nothing but the
 // world and the duration. Throws std::invalid_argument in one sentence if a swarm cannot be made,
