@@ -59,6 +59,15 @@ Start = Annotated[str, typer.Option("--start", help="square, disc or facing-out.
 SpreadM = Annotated[
     float, typer.Option("--spread-m", min=0.01, help="Side of the square, diameter of the disc")
 ]
+World = Annotated[
+    Path | None,
+    typer.Option(
+        "--world",
+        metavar="FILE",
+        show_default=False,
+        help="Obstacles, walls, goals and evaders, as twin_run has them.",
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option(

@@ -13,7 +13,7 @@ from twinmill.counted import counted
 from twinmill.swarm.axes import ALIASES, QUANTITIES
 from twinmill_cli import early
 from twinmill_cli.ending import leave
-from twinmill_cli.options import SpreadM, Start
+from twinmill_cli.options import SpreadM, Start, World
 from twinmill_cli.output import AsJson, busy, deliver
 from twinmill_cli.spelling import typed
 
@@ -29,6 +29,8 @@ def _text(data: dict[str, Any]) -> str:
     classes = ", ".join(f"{name} {count}" for name, count in data["classes"].items())
     worlds = f"{counted(data['worlds'], 'world')} in {counted(data['cells'], 'cell')}"
     lines = [f"{worlds}, {data['wall_s']:.1f} s: {classes}"]
+    if "kept_out" in data:
+        lines.append(f"Kept out of the goal: in {data['kept_out']} of {data['worlds']} worlds.")
     if data["why_full"]:
         lines.append(f"Every robot ran its firmware and plant, slowly: {data['why_full']}.")
     lines.append(f"{data['file']}\nPicture: twinmill swarm phase {shlex.quote(str(data['out']))}")
@@ -93,6 +95,7 @@ def _command(
             help="planar, or mujoco: wheels that slip, bodies with mass; steps of 5 ms at most.",
         ),
     ] = "planar",
+    world: World = None,
     as_json: AsJson = False,
 ) -> None:
     """Run swarms over a grid of parameters, with metrics and a class for each.
@@ -119,6 +122,7 @@ def _command(
             full=full,
             same_seeds=same_seeds,
             plant=plant,
+            world=world,
         )
     data = sweep(request, out, workers, dask)
     deliver(data, _text(data), as_json)

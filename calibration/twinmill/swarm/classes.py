@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import binomtest
 
+from twinmill.arguments import option
 from twinmill.swarm.request import Request
 
 if TYPE_CHECKING:  # `metrics` works where only sweeps' tables lack
@@ -33,7 +34,9 @@ WORDS = {
 }
 # Aims beyond a class: nobody can reach another's view for all of the last 10 s.
 DIFFUSED = "diffused"
-GOALS = [*COLORS, DIFFUSED]
+# No evader came into a goal before a robot had touched it; of sweeps with a world.
+KEPT_OUT = "kept-out"
+GOALS = [*COLORS, DIFFUSED, KEPT_OUT]
 
 
 def check_goal(name: str) -> str:
@@ -50,7 +53,9 @@ def check_goal(name: str) -> str:
 
 
 def goal_of(request: Request) -> str:
-    """Class that the first species aims at, as far as its name tells."""
+    """Aim of the first species: to keep goals free, or the class that its name tells."""
+    if request.has_goals:
+        return KEPT_OUT
     return DIFFUSED if request.behavior.startswith(("diffusing", "disperse")) else "milling"
 
 
@@ -58,6 +63,12 @@ def reached(table: pa.Table, goal: str) -> np.ndarray:
     """(rows,) whether a run got there."""
     if goal == DIFFUSED:
         return table["least_diffusion"].to_numpy() > 1
+    if goal == KEPT_OUT:
+        if "reached_s" not in table.column_names:
+            raise ValueError(
+                f"{option('goal', goal)}: this sweep has no world; give twin_sweep one by --world."
+            )
+        return np.isnan(table["reached_s"].to_numpy())
     return np.array(table["class"].to_pylist()) == goal
 
 

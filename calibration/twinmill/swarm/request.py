@@ -23,6 +23,7 @@ LEAST_SPREAD_M = 0.01  # as of twin_run
 # in MuJoCo a world of two minutes is a part.
 PART_BATCHED, PART_FULL, PART_MUJOCO = 50_000_000, 1_000_000, 5_000
 PLANTS = ("planar", "mujoco")
+OF_WORLD = ("world_name", "world_text")
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class Request:
         same_seeds: every cell has the seeds of the first, so that cells differ by their values
             alone: for differences between cells.
         plant: "planar" or "mujoco"; the latter runs every robot its firmware.
+        world_name, world_text: file of the bodies that robots see and run into; empty: none.
     """
 
     behavior: str
@@ -57,10 +59,17 @@ class Request:
     full: bool = False
     same_seeds: bool = False
     plant: str = "planar"
+    world_name: str = ""
+    world_text: str = ""
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain values; of a world, only if there is one."""
+        data = asdict(self)
+        return data if self.world_text else {k: v for k, v in data.items() if k not in OF_WORLD}
 
     def to_json(self) -> str:
         """One line, the same for the same request; in MuJoCo with the physics that runs here."""
-        data = asdict(self)
+        data = self.to_data()
         if self.plant == "mujoco":
             data["physics"] = native.MUJOCO_PHYSICS
         return json.dumps(data, sort_keys=True, allow_nan=False)
@@ -145,7 +154,27 @@ class Request:
             self.start,
             spread_m,
             colours=[colour for _, _, colour in robots],
+            world=self.bodies,
         )
+
+    @property
+    def bodies(self) -> native.Bodies | None:
+        """Bodies of the world's file; None: there is no world.
+
+        Raises:
+            ValueError: the file says what no world has.
+        """
+        return native.Bodies(self.world_text, self.world_name) if self.world_text else None
+
+    @property
+    def has_goals(self) -> bool:
+        """True if the world has something that evaders can be kept out of."""
+        return bool(self.bodies and self.bodies.goals)
+
+    @property
+    def outcomes(self) -> list[str]:
+        """Names of what is measured of each world, in the order of `run_worlds`."""
+        return [*native.OUTCOMES, *(native.DEFENCE if self.world_text else [])]
 
     def cell_model(self, point: tuple[float, ...]) -> native.Model:
         """The model at these axis values.
@@ -228,7 +257,7 @@ def run_part(request: Request, worlds: range) -> dict[str, list[Any]]:
         kind = int if axis.whole else float
         columns[axis.name] = [kind(points[c][a]) for c in cell_of]
     columns["n"] = [request.robots(points[c]) for c in cell_of]
-    for k, name in enumerate(native.OUTCOMES):
+    for k, name in enumerate(request.outcomes):
         columns[name] = rows[:, k].tolist()
     columns["class"] = native.classify(rows)
     kernels = [request.kernel(cell) for cell in cells]

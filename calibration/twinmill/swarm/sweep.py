@@ -15,6 +15,7 @@ from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names, words_of
 from twinmill.swarm.axes import parse_axis
 from twinmill.swarm.behaviors import parse_table
+from twinmill.swarm.classes import KEPT_OUT, reached
 from twinmill.swarm.request import PLANTS, Request
 from twinmill.swarm.store import Store, read_sweep
 from twinmill.swarm.workers import run_here, run_on_dask
@@ -26,9 +27,23 @@ MOST_SEEDS = 2**63 - 1  # of 64 bits with a sign
 
 
 def make_request(
-    behavior: str, model: str, axes: list[str], tables: list[str] | None = None, **rest: Any
+    behavior: str,
+    model: str,
+    axes: list[str],
+    tables: list[str] | None = None,
+    *,
+    world: Path | None = None,
+    **rest: Any,
 ) -> Request:
     """Checks everything before the long work.
+
+    Args:
+        behavior: name, or a mix as name:count,name:count.
+        model: file, here or among the installed ones.
+        axes: as name=from:to:count or name=value,value.
+        tables: own behaviours, as name=speed,turn,speed,turn.
+        world: file of bodies that robots see and run into.
+        rest: as fields of Request.
 
     Raises:
         ValueError: in one sentence.
@@ -50,6 +65,7 @@ def make_request(
         version=__version__,
         axes=parsed,
         tables=own,
+        **_world(world),
         **rest,
     )
     if request.plant not in PLANTS:
@@ -62,6 +78,19 @@ def make_request(
         for name in set(names) & set(inert):
             raise ValueError(f"the axis {name}: changes nothing here: {inert[name]}.")
     return request
+
+
+def _world(path: Path | None) -> dict[str, Any]:
+    """Name and text of the world's file, as fields of the request."""
+    if path is None:
+        return {}
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read as a world ({error}).") from error
+    if not text.strip():
+        raise ValueError(f"{path}: is empty; list each body of the world in it as [[body]].")
+    return {"world_name": path.name, "world_text": text}
 
 
 def _unnamed(model: native.Model) -> dict[str, str]:
@@ -167,5 +196,6 @@ def _summary(request: Request, folder: Path, begin_s: float) -> dict[str, Any]:
         "kernels": dict(sorted(kernels.items())),
         "why_full": "asked for" if request.full else "; ".join(sorted(reasons)),
         "plant": request.plant,
+        **({"kept_out": int(reached(table, KEPT_OUT).sum())} if request.has_goals else {}),
         "wall_s": wall_s,
     }
