@@ -13,7 +13,7 @@ import typer
 
 from twinmill.defaults import PER_GENERATION
 from twinmill_cli.lazy import working
-from twinmill_cli.options import repeated
+from twinmill_cli.options import World, repeated
 from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
@@ -76,6 +76,7 @@ def _discover(
     ] = 8,
     duration_s: Annotated[float, typer.Option("--duration-s", min=1)] = 120,
     start: Annotated[str, typer.Option("--start")] = "square",
+    world: World = None,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Random seed of the search.")] = 1,
     show: Annotated[
         int,
@@ -102,7 +103,14 @@ def _discover(
     Example: twinmill lab discover --set robot.body_radius_m=0.1 --out found
     """
     request = make_request(
-        "milling", model, change or [], n=n, seeds=seeds, duration_s=duration_s, start=start
+        "milling",
+        model,
+        change or [],
+        n=n,
+        seeds=seeds,
+        duration_s=duration_s,
+        start=start,
+        world=world,
     )
     check_report(out)
     hunt = Hunt(without_axes(request), n, seed)
@@ -142,7 +150,7 @@ def _discover(
         page = section(hunt, found, offered, shown=shown, tried=tried, cells=elites.cells)
         limits = {"generations": generations, "show": show, "confirm": confirm_runs}
         limits["mujoco"] = mujoco_runs
-        source = _source(hunt, model, change or [], limits, out=out)
+        source = _source(hunt, model, change or [], limits, world=world, out=out)
         report = write_report(out, page.title, source, [page], note=NOTE)
     data = {
         "tried": tried,
@@ -171,11 +179,18 @@ def _best(found: list[Entry], show: int) -> list[Entry]:
 
 
 def _source(
-    hunt: Hunt, model: str, change: list[str], limits: dict[str, int], *, out: Path
+    hunt: Hunt,
+    model: str,
+    change: list[str],
+    limits: dict[str, int],
+    *,
+    world: Path | None,
+    out: Path,
 ) -> Provenance:
     request = hunt.request
     words = ["twinmill", "lab", "discover", "--model", model]
     words += repeated("--set", change)
+    words += ["--world", str(world)] if world else []
     words += [word for name, limit in limits.items() for word in (f"--{name}", str(limit))]
     words += ["--n", str(hunt.n), "--seeds", str(request.seeds)]
     words += ["--duration-s", f"{request.duration_s:g}", "--start", request.start]

@@ -139,6 +139,7 @@ def _table(shown: list[Entry]) -> Table:
             Cell(f"{100 * entry.share:.0f}"),
             Cell("-" if entry.drawn is None else f"{100 * entry.drawn:.0f}"),
             Cell("-" if entry.mujoco is None else f"{100 * entry.mujoco:.0f}"),
+            *([] if entry.kept_out is None else [Cell(f"{100 * entry.kept_out:.0f}")]),
             Cell(number(entry.alike, 2)),
             *_measured(entry),
         ]
@@ -152,6 +153,7 @@ def _table(shown: list[Entry]) -> Table:
             "so called\n%",
             "in twins\n%",
             "in MuJoCo\n%",
+            *([] if shown[0].kept_out is None else ["kept out\n%"]),
             "alike",
             *(UNITS.get(name, name) for name in MEASURES),
         ],
@@ -159,8 +161,9 @@ def _table(shown: list[Entry]) -> Table:
         f"The first column goes after {option('behavior')}. So called: the share that is what "
         "its name says, "
         f"of {runs} runs with fresh seeds; in twins: of as many drawn from the model's errors, if "
-        f"it knows them; in MuJoCo: of the fewer runs there ({option('mujoco')}). Alike: 1 is "
-        "the same "
+        f"it knows them; in MuJoCo: of the fewer runs there ({option('mujoco')}). "
+        + ("" if shown[0].kept_out is None else "Kept out: no evader came into a goal untouched. ")
+        + "Alike: 1 is the same "
         "whatever the seed. Odd ones: how far from the middle they are, over the ring's radius, "
         "and 2 if farther.",
     )

@@ -20,7 +20,7 @@ from twinmill.swarm.discover.kinds import KIND_COLORS, MEASURES, kinds
 from twinmill.swarm.discover.search import Elites, Hunt
 from twinmill.swarm.forecast.draws import drawn_models, knows_errors
 
-MODEL = "model.toml"
+MODEL, WORLD = "model.toml", "world.toml"
 DRAWS = 10  # models drawn from the uncertainty
 MUJOCO_ROUNDS = 2
 MUJOCO_SEEDS_FROM = 1_000_000  # beyond those of all other runs
@@ -40,6 +40,9 @@ class Entry:
         drawn: the same of runs with models drawn from the uncertainty; None: the model knows none.
         confirmed: fresh runs behind each share; 0: it was not run again.
         mujoco: share in MuJoCo; None: it was not run there.
+        kept_out: share of fresh runs in which no evader came into a goal untouched; None: there is
+            no goal, or it was not run again.
+        world: file with the bodies around it; empty: none.
     """
 
     name: str
@@ -51,6 +54,8 @@ class Entry:
     drawn: float | None = None
     confirmed: int = 0
     mujoco: float | None = None
+    kept_out: float | None = None
+    world: str = ""
 
     @property
     def holds(self) -> bool:
@@ -67,7 +72,10 @@ class Entry:
     def command(self) -> str:
         """The command line of `twin_run` that plays the behaviour."""
         behavior = self.mix.behavior(self.name)
-        return f"twin_run --plant planar --model {MODEL} --n {self.mix.n} --behavior {behavior}"
+        world = f" --world {self.world}" if self.world else ""
+        return (
+            f"twin_run --plant planar --model {MODEL}{world} --n {self.mix.n} --behavior {behavior}"
+        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -82,6 +90,7 @@ class Entry:
             "share": self.share,
             "share_drawn": self.drawn,
             "share_mujoco": self.mujoco,
+            **({} if self.kept_out is None else {"kept_out": self.kept_out}),
             "confirmed_runs": self.confirmed,
             "offered": bool(self.name),
             **dict(zip(MEASURES, self.measures, strict=True)),
@@ -96,15 +105,15 @@ def _start_scatter_m2(hunt: Hunt) -> float:
 def entries(hunt: Hunt, elites: Elites) -> tuple[list[Entry], float]:
     """All elites, without names; and the start's mean scatter."""
     start_m2, range_m = _start_scatter_m2(hunt), hunt.request.model.get("sensor.range_m")
+    world = WORLD if hunt.request.world_text else ""
     found = []
     for genes, alike, at, rows in zip(
         elites.genes, elites.alike, elites.measures, elites.rows, strict=True
     ):
         kind, count = Counter(kinds(rows, start_m2, range_m)).most_common(1)[0]
         share = count / len(rows)
-        found.append(
-            Entry("", kind, decode(genes, hunt.n, hunt.bits), float(alike), at.tolist(), share)
-        )
+        mix = decode(genes, hunt.n, hunt.bits)
+        found.append(Entry("", kind, mix, float(alike), at.tolist(), share, world=world))
     return found, start_m2
 
 
@@ -131,10 +140,14 @@ def confirm(
     first = hunt.request.first_seed + hunt.request.seeds
     mixes = [entry.mix for entry in found]
     draws = min(DRAWS, runs) if knows_errors(hunt.request) else 0
-    shares = _shares(hunt, found, hunt.run(mixes, range(first, first + runs)), start_m2)
+    rows = hunt.run(mixes, range(first, first + runs))
     tell(1, 1 + draws)
-    for entry, share in zip(found, shares, strict=True):
+    for entry, share in zip(found, _shares(hunt, found, rows, start_m2), strict=True):
         entry.share, entry.confirmed = float(share), runs
+    if hunt.request.has_goals:
+        free = np.isnan(rows[:, :, hunt.columns.index("reached_s")]).mean(axis=1)
+        for entry, share in zip(found, free, strict=True):
+            entry.kept_out = float(share)
     parts = []
     for k, text in enumerate(drawn_models(hunt.request, draws, hunt.seed) if draws else []):
         twin = replace(hunt, request=replace(hunt.request, model_text=text))
@@ -218,8 +231,10 @@ def offer(found: list[Entry], in_mujoco: bool) -> list[Entry]:
 
 
 def write_entries(folder: Path, hunt: Hunt, found: list[Entry]) -> None:
-    """archive.parquet with everything; behaviors.toml and model.toml for twin_run."""
+    """archive.parquet with everything; behaviors.toml, model.toml and world.toml for twin_run."""
     write_whole(folder / MODEL, hunt.request.model_text)
+    if hunt.request.world_text:
+        write_whole(folder / WORLD, hunt.request.world_text)
     rows = [entry.to_json() for entry in found]
     with replacing(folder / "archive.parquet", force=True) as fresh:
         pq.write_table(pa.Table.from_pylist(rows), fresh, compression="zstd")

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -26,7 +27,7 @@ from twinmill.files import alone_in, made_folder, replacing
 from twinmill.model.model_file import write_whole
 from twinmill.programs import available_cores
 from twinmill.swarm.discover.genes import Mix, decode, gene_count
-from twinmill.swarm.discover.kinds import COLUMNS, MEASURES, measures
+from twinmill.swarm.discover.kinds import MEASURES, measures
 from twinmill.swarm.request import Request
 
 STEP = 0.2  # first standard deviation of genes
@@ -48,7 +49,16 @@ class Hunt:
     @property
     def sha256(self) -> str:
         """Hash of the whole question: a stored search goes on only with an equal one."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(self.to_data(), sort_keys=True).encode()).hexdigest()
+
+    def to_data(self) -> dict[str, Any]:
+        """Plain values."""
+        return asdict(self) | {"request": self.request.to_data()}
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of what is measured of each run."""
+        return self.request.outcomes
 
     @property
     def bits(self) -> int:
@@ -62,10 +72,10 @@ class Hunt:
         return named.cell(())
 
     def run(self, mixes: list[Mix], seeds: range, plant: str = "planar") -> np.ndarray:
-        """(mixes, seeds, COLUMNS) metrics of the last 10 s."""
+        """(mixes, seeds, columns) metrics of the last 10 s."""
         count = available_cores()
         chunks = [mixes[k::count] for k in range(min(count, len(mixes)))]
-        rows = np.empty((len(mixes), len(seeds), len(COLUMNS)))
+        rows = np.empty((len(mixes), len(seeds), len(self.columns)))
         with ThreadPoolExecutor(count) as pool:
             for k, part in enumerate(
                 pool.map(lambda chunk: self._run(chunk, seeds, plant), chunks)
@@ -83,7 +93,7 @@ class Hunt:
             self.request.full,
             plant,
         )
-        return flat.reshape(len(mixes), len(seeds), len(COLUMNS))
+        return flat.reshape(len(mixes), len(seeds), len(self.columns))
 
 
 @dataclass(frozen=True)
@@ -141,7 +151,9 @@ class GenerationStore:
             raise ValueError(
                 f"{folder}: is not empty and holds no search; choose another {option('out')}."
             )
-        text = json.dumps({"sha256": hunt.sha256, "hunt": asdict(hunt)}, indent=1, sort_keys=True)
+        self._columns = hunt.columns
+        about = {"sha256": hunt.sha256, "hunt": hunt.to_data()}
+        text = json.dumps(about, indent=1, sort_keys=True)
         write_whole(manifest, text)
         self._parts.mkdir(exist_ok=True)
 
@@ -152,11 +164,11 @@ class GenerationStore:
         if path.exists():
             table = pq.read_table(path)
             if table.schema.metadata.get(b"genes") == digest:
-                return np.stack([table[name].to_numpy() for name in COLUMNS], axis=-1).reshape(
-                    len(genes), -1, len(COLUMNS)
-                )
+                return np.stack(
+                    [table[name].to_numpy() for name in self._columns], axis=-1
+                ).reshape(len(genes), -1, len(self._columns))
         rows = run()
-        columns = {name: rows[..., k].ravel() for k, name in enumerate(COLUMNS)}
+        columns = {name: rows[..., k].ravel() for k, name in enumerate(self._columns)}
         with replacing(path, force=True) as fresh:
             pq.write_table(pa.table(columns).replace_schema_metadata({"genes": digest}), fresh)
         return rows
