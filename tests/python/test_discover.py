@@ -170,6 +170,54 @@ def test_an_entry_runs_by_name_and_does_what_it_is_called(archive, tmp_path):
     assert '"milling"' in done.stdout
 
 
+WORLD = """
+[[body]]
+name = "goal"
+at_m = [0, 0]
+radius_m = 0.3
+solid = false
+[[body]]
+name = "evader"
+at_m = [-1.5, 0.2]
+radius_m = 0.1
+colour = "green"
+path_m = [[1.5, 0.2]]
+speed_mps = 0.3
+"""
+
+
+@pytest.mark.skipif(not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program")
+def test_a_search_in_a_world_tells_who_was_kept_out_and_runs_there(tmp_path):
+    """As robot by robot, each with its firmware; the goal is reached after 3 s, or never."""
+    (tmp_path / "w.toml").write_text(WORLD)
+    folder = tmp_path / "found"
+    words = ["--world", str(tmp_path / "w.toml"), "--n", "4", "--seeds", "2", "--duration-s", "8"]
+    words += ["--generations", "2", "--confirm", "6", "--mujoco", "1", "--show", "1"]
+    found = run(["discover", *BODIES, *words, "--out", str(folder)])
+    assert (folder / "world.toml").read_text() == WORLD
+    shares = pq.read_table(folder / "archive.parquet")["kept_out"].to_pylist()
+    assert shares == [entry.kept_out for entry in found] and len(set(shares)) > 2
+    asked = make_request(
+        "milling",
+        str(folder / "model.toml"),
+        [],
+        n=4,
+        seeds=2,
+        duration_s=8.0,
+        full=True,
+        world=folder / "world.toml",
+    )
+    hunt = Hunt(asked, 4, 1)
+    rows = hunt.run([entry.mix for entry in found[:20]], range(3, 9))
+    reached_s = rows[..., hunt.columns.index("reached_s")]
+    assert np.isnan(reached_s).mean(axis=1).tolist() == shares[:20]
+    inside_s = (1.5 - np.sqrt(0.3**2 - 0.2**2)) / 0.3
+    assert reached_s[~np.isnan(reached_s)] == pytest.approx(inside_s, abs=0.022)
+    shown = next(entry for entry in found if entry.name)
+    command = [os.environ["TWIN_RUN"], *shown.command.split()[1:], "--duration-s", "1", "--json"]
+    subprocess.run([*command, "--log", tmp_path / "a.lcmlog"], cwd=folder, check=True)
+
+
 def test_a_robot_takes_the_table_by_name(archive, monkeypatch):
     folder, found = archive
     monkeypatch.chdir(folder)
