@@ -43,7 +43,7 @@ def test_fences_that_a_command_prints_do_not_end_its_block(tmp_path):
 def test_the_page_on_sweeps_tells_every_metric():
     page = (ROOT / "docs/sweep.md").read_text()
     told = set(re.findall(r"^\| `(\w+)` \|", page.split("## Columns")[1], re.MULTILINE))
-    there = {*native.OUTCOMES, "cell", "seed", "class", "kernel", "log", "t_s"}
+    there = {*native.OUTCOMES, *native.DEFENCE, "cell", "seed", "class", "kernel", "log", "t_s"}
     assert there <= told
 
 

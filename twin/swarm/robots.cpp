@@ -59,6 +59,7 @@ Model DrawRobot(const Model &model, int id, uint64_t seed)
 std::vector<Model> DrawRobots(const Model &model, int n, uint64_t seed)
 {
     std::vector<Model> robots;
+    robots.reserve(static_cast<size_t>(n));
     for (int id = 0; id < n; ++id)
         robots.push_back(DrawRobot(model, id, seed));
     return robots;

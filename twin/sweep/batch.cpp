@@ -148,7 +148,9 @@ private:
     void FillLane(size_t lane, const World &world)
     {
         const Cell &cell = *world.cell;
-        const auto robots = DrawRobots(cell.model, plan_.n, world.seed);
+        Model model = cell.model;
+        model.stated.clear();  // many names, which each robot would have a copy of, and none needs
+        const auto robots = DrawRobots(model, plan_.n, world.seed);
         const auto starts = StartsOf(cell, world.seed);
         for (size_t i = 0; i < robots.size(); ++i)
         {
