@@ -193,6 +193,12 @@ def test_any_number_of_workers_gives_the_same_bytes(tmp_path: Path, world: Path,
     assert there["inside"] == table["inside"].to_pylist()[: len(there["inside"])]
 
 
+def test_bodies_are_drawn_where_they_are():
+    name, colour, solid, radius_m, ends = native.Bodies(EVADER, "w.toml").trace([0.0, 5.0])[0]
+    assert (name, colour, solid, radius_m) == ("evader", "green", True, 0.1)
+    assert ends == pytest.approx(np.array([[-2, 0, -2, 0], [-1, 0, -1, 0]]))
+
+
 def test_a_sweep_goes_on_only_in_the_same_world(tmp_path: Path, world: Path):
     sweep(request(world, seeds=1, duration_s=1.0), tmp_path / "s")
     world.write_text(GOAL + EVADER.replace("0.2", "0.3") + POST)

@@ -194,6 +194,23 @@ Array Trace(const Cell &cell, uint64_t seed, double duration_s, double every_s,
     return ToNumpy(std::move(poses), {times, cell.tables.size(), 3});
 }
 
+nb::list TraceBodies(const Bodies &bodies, const std::vector<double> &t_s)
+{
+    nb::list all;
+    for (const WorldBody &body : bodies.all)
+    {
+        std::vector<double> ends;
+        for (const double at_s : t_s)
+        {
+            const PlainCapsule at = PlainOf(body.At(at_s));
+            ends.insert(ends.end(), {at.from_x_m, at.from_y_m, at.to_x_m, at.to_y_m});
+        }
+        all.append(nb::make_tuple(body.name, body.colour, body.is_solid, body.shape.radius_m,
+                                  ToNumpy(std::move(ends), {t_s.size(), size_t{4}})));
+    }
+    return all;
+}
+
 Array MeasureAll(Cube pose, Cube velocity, size_t ring_size, double range_m, double body_radius_m)
 {
     const size_t times = pose.shape(0), n = pose.shape(1);
@@ -270,7 +287,10 @@ void BindSwarms(nb::module_ &m)
                         names.push_back(body.name);
                 return names;
             },
-            "Names of what robots drive over.");
+            "Names of what robots drive over.")
+        .def("trace", &TraceBodies, "t_s"_a,
+             "Of each body name, colour, whether it is solid, radius in m, and (T, 4) x and y of "
+             "both ends.");
     nb::class_<Cell>(m, "Cell", "A swarm but for its seed; robots after ring_size are odd.")
         .def(
             "__init__",

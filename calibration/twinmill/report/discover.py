@@ -11,7 +11,7 @@ from twinmill.arguments import option
 from twinmill.counted import counted
 from twinmill.report import Figure, Section
 from twinmill.report.canvas import draw
-from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, paint_paths
+from twinmill.report.phase_figures import TRACE_EVERY_S, TRACE_S, paint_paths, paint_world
 from twinmill.report.tables import Cell, Table, number
 from twinmill.swarm.classes import WORDS
 from twinmill.swarm.discover.entries import Entry
@@ -120,6 +120,7 @@ def _gallery(hunt: Hunt, kind: str, best: list[Entry]) -> Figure:
                 TRACE_EVERY_S,
             )[-int(TRACE_S / TRACE_EVERY_S) :]
             paint_paths(axes, trace, KIND_COLORS[kind], odd)
+            paint_world(axes, hunt.request)
             title = f"{entry.name}\n{table_text(entry.mix.ring)}"
             title += f"\n{odd} odd: {table_text(entry.mix.odd)}" if odd else ""
             axes.set_title(title, fontsize=7)

@@ -14,12 +14,15 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.patheffects import withStroke
 from scipy.interpolate import CubicSpline
 
+from twinmill.data.world_bodies import WorldBody
 from twinmill.report import Figure
 from twinmill.report.canvas import WIDTH_IN, Svg, draw
+from twinmill.report.log_figures import paint_bodies
 from twinmill.swarm.axes import Axis
 from twinmill.swarm.classes import COLORS, WORDS, interval
 from twinmill.swarm.experiments import Experiment
 from twinmill.swarm.phase import CLASSES, Phase
+from twinmill.swarm.request import Request
 
 TRACE_S, TRACE_EVERY_S = 8.0, 0.1
 BETWEEN = 5  # pieces that a step of a trace is drawn in
@@ -250,6 +253,7 @@ def thumbnail_figure(phase: Phase, at: dict[str, float]) -> Figure:
     def paint(panels: np.ndarray) -> None:
         for axes, (k, cell) in zip(np.ravel(panels), picks, strict=True):
             paint_paths(axes, _typical(phase, cell, k), COLORS[CLASSES[k]])
+            paint_world(axes, phase.request)
             where = phase.where(cell, 2).replace(", ", "\n")
             axes.set_title(f"{CLASSES[k]}\n{where}", fontsize=7)
 
@@ -258,6 +262,7 @@ def thumbnail_figure(phase: Phase, at: dict[str, float]) -> Figure:
         "What the swarm looks like",
         f"The last {TRACE_S:.0f} s of one run in the cell where each class is most frequent; dots "
         "are the robots at the end, the bar is 1 m. "
+        + ("Dotted: where bodies moved. " if phase.request.world_text else "")
         + " ".join(f"{CLASSES[k].capitalize()}: {WORDS[CLASSES[k]]}." for k, _ in picks),
     )
 
@@ -279,6 +284,18 @@ def _curve(path: np.ndarray) -> np.ndarray:
     if len(path) < 3:
         return path
     return CubicSpline(steps, path)(np.linspace(0, steps[-1], BETWEEN * steps[-1] + 1))
+
+
+def paint_world(axes: Axes, request: Request) -> None:
+    """Bodies of a sweep's world over the last seconds of a run, as far as the axes show them."""
+    t_s = request.duration_s + np.arange(-TRACE_S, TRACE_EVERY_S / 2, TRACE_EVERY_S)
+    t_s = np.maximum(t_s, 0)
+    traces = request.bodies.trace(t_s) if request.bodies else []
+    bodies = [
+        WorldBody(name, colour, solid, t_s, ends[:, :2], ends[:, 2:], radius_m)
+        for name, colour, solid, radius_m, ends in traces
+    ]
+    paint_bodies(axes, bodies)
 
 
 def paint_paths(axes: Axes, trace: np.ndarray, color: str, odd: int = 0) -> None:
