@@ -290,7 +290,7 @@ def paint_world(axes: Axes, request: Request) -> None:
     """Bodies of a sweep's world over the last seconds of a run, as far as the axes show them."""
     t_s = request.duration_s + np.arange(-TRACE_S, TRACE_EVERY_S / 2, TRACE_EVERY_S)
     t_s = np.maximum(t_s, 0)
-    traces = request.bodies.trace(t_s) if request.bodies else []
+    traces = request.bodies.trace(t_s.tolist()) if request.bodies else []
     bodies = [
         WorldBody(name, colour, solid, t_s, ends[:, :2], ends[:, 2:], radius_m)
         for name, colour, solid, radius_m, ends in traces
