@@ -40,7 +40,7 @@ def alike_model(body_radius_m: float) -> native.Model:
 
 
 def ended(cell: native.Cell, duration_s: float, kernel: tuple[str, bool]) -> dict[str, float]:
-    """What one world is measured to be."""
+    """Measures of one run of the cell, by name."""
     plant, full = kernel
     one = np.zeros(1, np.int64), np.ones(1, np.uint64)
     (row,) = native.run_worlds([cell], *one, duration_s, full, plant)
@@ -103,7 +103,7 @@ def test_a_robot_of_another_colour_is_an_evader_and_one_of_another_table_is_not(
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_no_robot_passes_a_wall(kernel):
-    """Of a square pen; in 30 s a robot drives 3 m."""
+    """A square pen of 2 m; in 30 s a robot drives 3 m."""
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
     walls = "".join(
         f"[[body]]\nfrom_m = {list(a)}\nto_m = {list(b)}\n"
