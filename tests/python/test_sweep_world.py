@@ -206,6 +206,12 @@ def test_a_sweep_goes_on_only_in_the_same_world(tmp_path: Path, world: Path):
         sweep(request(world, seeds=1, duration_s=1.0), tmp_path / "s")
 
 
+def test_points_in_mujoco_are_not_judged_by_a_radius_that_they_do_not_have(world: Path):
+    with pytest.raises(ValueError, match=r"robot\.body_radius_m = 0: robots have hulls"):
+        request(world, plant="mujoco")
+    assert request(world, ["robot.body_radius_m=0.1"], plant="mujoco").points
+
+
 def test_a_request_without_a_world_is_what_it_was(world: Path):
     without = make_request("milling", "paper.toml", ["v_mps=0.1,0.2"])
     assert "world" not in without.to_json()
