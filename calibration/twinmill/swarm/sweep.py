@@ -72,19 +72,26 @@ def make_request(
         raise ValueError(f"{option('plant', request.plant)}: must be {' or '.join(PLANTS)}.")
     _check_size(request)
     unnamed = _unnamed(request.model)
-    by_radius = request.plant == "mujoco" and request.has_goals
+    _check_radius(request)
     for point in request.points:
         request.cell(point)
-        if by_radius and request.cell_model(point).get("robot.body_radius_m") == 0:
+        inert = unnamed | dict(request.cell_model(point).inert(request.plant))
+        for name in set(names) & set(inert):
+            raise ValueError(f"the axis {name}: changes nothing here: {inert[name]}.")
+    return request
+
+
+def _check_radius(request: Request) -> None:
+    """Refuses points where hulls are what touches evaders."""
+    if request.plant != "mujoco" or not request.has_goals:
+        return
+    for point in request.points:
+        if request.cell_model(point).get("robot.body_radius_m") == 0:
             raise ValueError(
                 "robot.body_radius_m = 0: robots have hulls in MuJoCo, and whether one touches an "
                 "evader is judged by this radius; give it, as in "
                 f"{option('z', 'robot.body_radius_m=0.1')}."
             )
-        inert = unnamed | dict(request.cell_model(point).inert(request.plant))
-        for name in set(names) & set(inert):
-            raise ValueError(f"the axis {name}: changes nothing here: {inert[name]}.")
-    return request
 
 
 def _world(path: Path | None) -> dict[str, Any]:
