@@ -31,7 +31,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.diagnosis.stopped import NOTHING_TRIED, stopped
     from twinmill.files import check_new_file
-    from twinmill.inference.keeping import keeps_its_error
+    from twinmill.inference.keeping import by_probabilities
     from twinmill.model.model_file import ModelFile
     from twinmill.provenance import Provenance
     from twinmill_cli.frame import (
@@ -90,7 +90,7 @@ def _diagnose(
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json):
         given = read(logs, model, model_file)
-        if own or keeps_its_error(given.measurements, model_file):
+        if own or by_probabilities(given.measurements):
             from twinmill_cli.infer import inferred  # slow to import
 
             return inferred("diagnose", given, own=own or [], as_json=as_json, out=out)
@@ -300,7 +300,7 @@ def _explain(
     check_new_file(output, force, [model_file.path, *logs, *(own or [])])
     with _told_if_stopped(source, as_json):
         given = read(logs, model, model_file)
-    if own or keeps_its_error(given.measurements, model_file):
+    if own or by_probabilities(given.measurements):
         from twinmill_cli.infer import inferred  # as in diagnose
 
         return inferred(

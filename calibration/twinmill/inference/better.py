@@ -2,7 +2,8 @@
 """The model with what it lacked: base and effects at their posterior, in a file of its own.
 
 Written is the likeliest set of missing effects, with what the base's own log shows beside it. An
-effect that is of a moment of the log stays out, since no other log has it. An unnamed cause is in
+effect that is of a moment of the log stays out, since no other log has it; so do effects none of
+which is sure where predictions are no better with them. An unnamed cause is in
 it where a formula describes it; the base's numbers are those beside it, so that they do not stand
 for it.
 """
@@ -78,8 +79,9 @@ def _fitted(
 ) -> tuple[Fitted, tuple[str, ...]]:
     """Fit to be written, and its new instances of effects; the score is not known yet."""
     always = found.always.effects if found.always else ()
-    lasting = [n for n in (*always, *found.answer.added) if not with_role(n, "moment")]
-    own = found_model(model_file.model, found.answer.numbers, lasting)
+    lasting = [n for n in always if not with_role(n, "moment")]
+    numbers = found.answer.numbers if found.added or found.formula else found.answer.refit
+    own = found_model(model_file.model, numbers, [*lasting, *found.added])
     if found.formula and found.formula.lasting:
         own = with_formula(own, found.formula)
     kept = [e for e in own.estimates if instance_of(e.name) != "clock"]

@@ -206,7 +206,7 @@ def diagnosed(base: Path, case: Case, judge: Judge = Judge.DIAGNOSE) -> tuple[di
     started = time.monotonic()
     if judge == Judge.INFER:
         own = base.parent / f"calibration_{case.robot}.lcmlog"
-        found = tm.infer(log, tm.Model.load(base), own=own).to_json()
+        found = tm.diagnose(log, tm.Model.load(base), own=own).to_json()
     else:
         found = tm.diagnose(log, tm.Model.load(base)).to_json()
     time_s = time.monotonic() - started
