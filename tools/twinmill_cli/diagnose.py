@@ -127,7 +127,7 @@ def _shown() -> ModuleType:
 
 @contextmanager
 def _told_if_stopped(source: Provenance, as_json: bool) -> Iterator[None]:
-    """Ctrl-C before anything was tried: that nothing can be said is said, too.
+    """Ctrl-C before there is an answer: that nothing can be said is said, too.
 
     Raises:
         Exit: so it was.
@@ -303,15 +303,16 @@ def _explain(
     if own or by_probabilities(given.measurements):
         from twinmill_cli.infer import inferred  # as in diagnose
 
-        return inferred(
-            *(verb, given),
-            own=own or [],
-            output=output,
-            formula=formula is not False,
-            force=force,
-            as_json=as_json,
-            out=out,
-        )
+        with _told_if_stopped(source, as_json):
+            return inferred(
+                *(verb, given),
+                own=own or [],
+                output=output,
+                formula=formula is not False,
+                force=force,
+                as_json=as_json,
+                out=out,
+            )
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
     measurements = given.measurements

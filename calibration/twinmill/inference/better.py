@@ -21,7 +21,7 @@ from twinmill.inference.infer import Inference
 from twinmill.inference.keeping import with_its_error
 from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.model.parameters import CLOCK, CLOCK_RATE, instance_of, with_role
+from twinmill.model.parameters import CLOCK, CLOCK_RATE, catalogue_name, instance_of, with_role
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,7 @@ def _fitted(
     declared = own.model.clock_same or any(m.same_clock for m in found.measurements)
     if declared or len(found.measurements) > 1:  # several logs may have an offset each
         clock = {}
+    told = {f.effect: f.share for f in found.answer.findings}
     fitted = Fitted(
         model=own.model,
         estimates=kept,
@@ -97,5 +98,6 @@ def _fitted(
         score_after=score,
         clock=clock,
         covariance=own.covariance.of([*(e.name for e in kept), *clock]),
+        shares={n: told[catalogue_name(n)] for n in own.added if catalogue_name(n) in told},
     )
     return fitted, own.added

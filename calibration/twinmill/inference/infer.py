@@ -18,6 +18,7 @@ from twinmill.inference.formula import Formula, formula_of
 from twinmill.inference.found_model import found_model, with_formula
 from twinmill.inference.keeping import is_own
 from twinmill.inference.kept import kept
+from twinmill.inference.lateness import lateness
 from twinmill.inference.planar import problem_of
 from twinmill.inference.prior import Always
 from twinmill.inference.search import Search
@@ -25,6 +26,7 @@ from twinmill.inference.settings import PRIORS
 from twinmill.inference.sheet import chance_of_stale, fitted_to, is_sheet
 from twinmill.inference.table import Numbers, table_of
 from twinmill.inference.unnamed import Unnamed, likeliest, unnamed
+from twinmill.model.late import Late
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import with_role
 
@@ -56,6 +58,7 @@ class Inference:
         opened: these logs with the model of `refitted`.
         not_shown: effects that these logs cannot show by their kind, and why.
         strangers: sentences on own logs that are not the model's.
+        late: how late the motion is in the likeliest model.
         told_here: the base was fitted to one of these logs, so that all it misses there is told.
     """
 
@@ -70,6 +73,7 @@ class Inference:
     opened: Sequence[Opened]
     not_shown: dict[str, str]
     strangers: tuple[str, ...]
+    late: Late
     told_here: bool
 
     @property
@@ -88,8 +92,19 @@ class Inference:
             return ()
         return tuple(name for name in self.answer.added if not with_role(name, "moment"))
 
+    def steps(self) -> list[dict[str, Any]]:
+        """Scores of the model as given, of its base, and with what was found.
+
+        The score between two effects that were found together is null.
+        """
+        names = [*self.answer.added, *(["equation"] if self.formula and self.formula.holds else [])]
+        steps = [("refit", self.refitted.score), *((name, None) for name in names[:-1])]
+        steps += [(name, self.after.score) for name in names[-1:]]
+        first = {"effect": None, "score_heldout": self.before.score}
+        return [first, *({"effect": e, "score_heldout": score} for e, score in steps)]
+
     def to_json(self) -> dict[str, Any]:
-        """Fields of `twinmill lab infer --json`."""
+        """Fields of `twinmill diagnose --json`."""
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
         told = self.answer.to_json()
@@ -111,6 +126,8 @@ class Inference:
             "score_after": self.after.score,
             "not_identifiable": [{"effect": e, "why": w} for e, w in self.not_shown.items()],
             "robots_off": [],
+            "late": self.late.to_json(),
+            "steps": self.steps(),
             "next_experiment": None,
             "warnings": [*self.strangers, *self.before.warnings],
             "settings": {name: value for name, value, _ in PRIORS.listed()},
@@ -155,7 +172,8 @@ def infer(
             progress("formula")
             formula = formula_of(search, own_set, problem.motion, sure)
     progress("scores")
-    return _scored(found, runs, model_file, told=told, left=left, formula=formula)
+    late = lateness(found.numbers, problem.same_clock)
+    return _scored(found, runs, model_file, told=told, left=left, formula=formula, late=late)
 
 
 @dataclass(frozen=True)
@@ -201,6 +219,7 @@ def _scored(
     told: _Told,
     left: tuple[Unnamed, ...],
     formula: Formula | None,
+    late: Late,
 ) -> Inference:
     given = open_measurements(runs, model_file)
     there = told.always.effects if told.always else ()
@@ -227,6 +246,7 @@ def _scored(
         opened=base,
         not_shown=not_shown(given),
         strangers=told.strangers,
+        late=late,
         told_here=told.here,
     )
 

@@ -55,11 +55,13 @@ class PlanarProblem(Problem):
     Attributes:
         motion: as the base predicts it.
         always: what the base misses in its own log; None where that is not known.
+        same_clock: the offset of the clocks is known.
     """
 
     steps: Steps
     motion: Motion
     always: Always | None
+    same_clock: bool
 
     def candidate(self, name: str, model: native.Model) -> Candidate:
         """Change by an effect of the twin's catalogue beside a model."""
@@ -184,6 +186,7 @@ def problem_of(
         tuple(missed),
         motion,
         always,
+        same_clock,
     )
     noise = flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)

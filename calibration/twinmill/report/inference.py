@@ -282,7 +282,7 @@ def _known(result: Inference) -> list[str]:
     """Errors that are not new, as far as they are known, in sentences."""
     always = result.always
     if always is None and result.told_here:
-        return ["The model was fitted to this log: what it has always missed is told as well."]
+        return ["This log told the base, too, so that all is named that the base misses in it."]
     if always is None:
         return [
             "The model's error on the log that it was fitted to is not known, so it may be "
