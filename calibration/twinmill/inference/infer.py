@@ -108,7 +108,7 @@ class Inference:
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
         told = self.answer.to_json()
-        told["rest"]["curves"] = [one.to_json() for one in self.left]
+        told["rest"] |= {"curves": [one.to_json() for one in self.left], "proven": None}
         if self.formula and self.formula.holds:
             told["rest"] |= {"formula": self.formula.text, "proven": self.formula.to_json()}
         return {
