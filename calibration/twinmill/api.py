@@ -938,19 +938,12 @@ class Model(Shown):
         )
         return [*(left.sentence() for left in done.left), *done.warnings]
 
-    def explain(
-        self,
-        log: "Log | str | Path",
-        *,
-        formula: bool = True,
-        progress: Callable[[str], None] | None = None,
-    ) -> "Explanation":
+    def explain(self, log: "Log | str | Path", **options: Any) -> "Improvement | Explanation":
         """Diagnoses, and adds the effects that are found.
 
         Args:
             log: a log, or the path of one.
-            formula: see `explain`.
-            progress: see `explain`.
+            options: of `explain`.
 
         Returns:
             See `explain`.
@@ -962,7 +955,7 @@ class Model(Shown):
             >>> tm.Model.load("fitted.toml").explain("run.lcmlog").model.effects
             ['coasting']
         """
-        return explain(log, self, formula=formula, progress=progress)
+        return explain(log, self, **options)
 
     def next_run(self, log: "Log | str | Path", **options: Any) -> "NextRun":
         """Designs the run that best discriminates between effects that these logs cannot.
@@ -1396,6 +1389,8 @@ class Diagnosis(Judged):
         'effect_missing'
     """
 
+    _result: _diagnosed.Diagnosis
+
     def __init__(self, result: _diagnosed.Diagnosis, log: Log, file: ModelFile):
         self._result, self._file = result, file
         self.verdict: Verdict = result.verdict
@@ -1482,6 +1477,8 @@ class Inference(Judged):
         >>> d.nothing < 0.05
         True
     """
+
+    _result: _infer.Inference
 
     def __init__(self, result: _infer.Inference, log: Log, file: ModelFile):
         self._result, self._file, answer = result, file, result.answer
