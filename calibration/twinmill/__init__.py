@@ -24,6 +24,8 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Explanation as Explanation
     from twinmill.api import Finding as Finding
     from twinmill.api import Fit as Fit
+    from twinmill.api import Improvement as Improvement
+    from twinmill.api import Inference as Inference
     from twinmill.api import Log as Log
     from twinmill.api import Model as Model
     from twinmill.api import compare as compare
@@ -35,8 +37,6 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import explain as explain
     from twinmill.api import fit as fit
     from twinmill.api import import_log as import_log
-    from twinmill.api import improved as improved
-    from twinmill.api import infer as infer
     from twinmill.api import infer_robots as infer_robots
     from twinmill.api import load as load
     from twinmill.api import next_run as next_run
@@ -62,7 +62,6 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.model.python_effect import python_effect as python_effect
     from twinmill.results import Comparison as Comparison
     from twinmill.results import Effect as Effect
-    from twinmill.results import Inference as Inference
     from twinmill.results import NextRun as NextRun
     from twinmill.results import RunComparison as RunComparison
     from twinmill.results import SwarmComparison as SwarmComparison
@@ -83,7 +82,8 @@ _HOME = {
     **dict.fromkeys(("Number", "PythonEffect", "python_effect"), "twinmill.model.python_effect"),
     **dict.fromkeys(
         (
-            *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Log", "Model"),
+            *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Improvement"),
+            *("Inference", "Log", "Model"),
             *(
                 "compare",
                 "compare_models",
@@ -95,12 +95,12 @@ _HOME = {
                 "fit",
                 "import_log",
             ),
-            *("improved", "infer", "infer_robots", "load", "next_run", "simulate"),
+            *("infer_robots", "load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),
     **dict.fromkeys(
-        ("Comparison", "Effect", "Inference", "NextRun", "RunComparison", "SwarmComparison"),
+        ("Comparison", "Effect", "NextRun", "RunComparison", "SwarmComparison"),
         "twinmill.results",
     ),
 }

@@ -63,8 +63,6 @@ from twinmill.defaults import (
 from twinmill.diagnosis import diagnose as _diagnose
 from twinmill.diagnosis import explain as _explain
 from twinmill.diagnosis import result as _diagnosed
-from twinmill.diagnosis.finding import Finding as _Found
-from twinmill.diagnosis.finding import Ranked
 from twinmill.experiment.design import Limits, design, plan_run
 from twinmill.experiment.design import check as check_limits
 from twinmill.export.carried import open_robot
@@ -82,18 +80,23 @@ from twinmill.inference import better as _better
 from twinmill.inference import infer as _infer
 from twinmill.inference import keeping as _keeping
 from twinmill.model.model_file import ModelFile
-from twinmill.model.parameters import catalogue, catalogue_name, find_effect, key_of
+from twinmill.model.parameters import (
+    catalogue,
+    catalogue_name,
+    effect_names,
+    find_effect,
+    key_of,
+)
 from twinmill.model.python_effect import PythonEffect
 from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
-from twinmill.report import detections, sections, show
+from twinmill.report import detections, inference, sections, show
 from twinmill.report import diagnosis as diagnosis_report
 from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
 from twinmill.results import (
     Comparison,
     Effect,
-    Inference,
     NextRun,
     RunComparison,
     SwarmComparison,
@@ -850,6 +853,7 @@ class Model(Shown):
             priors=priors,
             robot_id=None if robot is None else int(robot),
         )
+        result = replace(result, child=_keeping.with_its_error(result.child, measurements))
         return _told(Addition(result), measurements)
 
     def numbers(self, effect: PythonEffect) -> dict[str, float]:
@@ -934,19 +938,12 @@ class Model(Shown):
         )
         return [*(left.sentence() for left in done.left), *done.warnings]
 
-    def explain(
-        self,
-        log: "Log | str | Path",
-        *,
-        formula: bool = True,
-        progress: Callable[[str], None] | None = None,
-    ) -> "Explanation":
+    def explain(self, log: "Log | str | Path", **options: Any) -> "Improvement | Explanation":
         """Diagnoses, and adds the effects that are found.
 
         Args:
             log: a log, or the path of one.
-            formula: see `explain`.
-            progress: see `explain`.
+            options: of `explain`.
 
         Returns:
             See `explain`.
@@ -958,7 +955,7 @@ class Model(Shown):
             >>> tm.Model.load("fitted.toml").explain("run.lcmlog").model.effects
             ['coasting']
         """
-        return explain(log, self, formula=formula, progress=progress)
+        return explain(log, self, **options)
 
     def next_run(self, log: "Log | str | Path", **options: Any) -> "NextRun":
         """Designs the run that best discriminates between effects that these logs cannot.
@@ -981,7 +978,7 @@ class Model(Shown):
         """
         return next_run(log, self, **options)
 
-    def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
+    def diagnose(self, log: "Log | str | Path", **options: Any) -> "Inference | Diagnosis":
         """Names the physical effect that the model lacks.
 
         Args:
@@ -1263,22 +1260,24 @@ class Finding(Shown):
 
     Attributes:
         effect: its name.
-        parameters: estimates by name, from a fit with all other findings.
-        share: of the squared held-out error above the noise floor that it removes.
+        parameters: estimates by name, with all other findings in the model.
+        share: of the squared error above the noise floor that is the effect's.
         certainty: sure, group or doubtful.
-        score_heldout: of the model with it, on data that was not fitted to.
+        probability: that it is missing; None where several robots or a table were judged.
+        score_heldout: there, of the model with it, on data that was not fitted to; else None.
 
     Examples:
         >>> d.best.parameters["deceleration_mps2"] > 0
         True
     """
 
-    def __init__(self, finding: _Found, ranked: Ranked, log: Log):
-        self._result, self._ranked, self._log = finding, ranked, log
-        self.effect, self.score_heldout = finding.effect, ranked.score_heldout
-        self.share = finding.share
-        self.certainty: Certainty = finding.certainty
-        self.parameters = {key_of(e.name): e.value for e in finding.parameters}
+    def __init__(self, told: Mapping[str, Any], log: Log, again: bool):
+        self._told, self._log, self._again = told, log, again
+        self.effect, self.share = told["effect"], told["share"]
+        self.certainty: Certainty = told["certainty"]
+        self.probability: float | None = told.get("probability")
+        self.score_heldout: float | None = told["score_heldout"]
+        self.parameters = {key_of(p["name"]): p["value"] for p in told["parameters"]}
 
     def to_json(self) -> dict[str, Any]:
         """All results of the diagnosis for this effect.
@@ -1290,7 +1289,7 @@ class Finding(Shown):
             >>> d.best.to_json()["certainty"]
             'sure'
         """
-        return plain({**self._ranked.to_json(), **self._result.to_json()})
+        return plain(self._told)
 
     def add_to(self, model: Model | str | Path) -> Model:
         """Adds the effect to a model, fitted with all other parameters to the diagnosed log.
@@ -1310,7 +1309,7 @@ class Finding(Shown):
             ['coasting']
         """
         model, effect = _model(model), catalogue_name(self.effect)
-        if effect in model.effects and not self._result.again:
+        if effect in model.effects and not self._again:
             raise ValueError(
                 f"{model.name}: has {effect} already, and the model of the diagnosis had not; fit "
                 "this one to the log."
@@ -1321,85 +1320,25 @@ class Finding(Shown):
         """Its parameters.
 
         Returns:
-            name, value, std, unit, at_bound, seen, together, as of `Fit.table`.
+            name, value, std, unit; of several robots and tables also at_bound, seen, together, as
+            of `Fit.table`.
 
         Examples:
             >>> d.best.table()["name"].tolist()
-            ['coasting.deceleration_mps2', ...]
+            ['deceleration_mps2', ...]
         """
-        return pd.DataFrame([e.to_json() for e in self._result.parameters])
+        return pd.DataFrame(self._told["parameters"])
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={value:.3g}" for name, value in self.parameters.items())
         return f"Finding({self.effect}: {values})"
 
 
-class Diagnosis(Reported):
-    """Physical effects that a model lacks.
+class Judged(Reported):
+    """A diagnosis that can design the run which tells what it leaves open."""
 
-    Attributes:
-        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue
-            or cannot_tell.
-        sentence: the same for people.
-        found: the missing effects, most important first.
-        best: the first of them; None if none is named.
-
-    Examples:
-        >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
-        >>> d.verdict
-        'effect_missing'
-    """
-
-    def __init__(self, result: _diagnosed.Diagnosis, log: Log, file: ModelFile):
-        self._result, self._file = result, file
-        self.verdict: Verdict = result.verdict
-        self.sentence = result.sentence
-        ranked = {r.effect: r for r in result.ranking}
-        named = [(result.finding(name), ranked.get(name)) for name in result.found]
-        self.found = [Finding(f, rank, log) for f, rank in named if f and rank]
-        self.best = self.found[0] if self.found else None
-
-    def table(self) -> pd.DataFrame:
-        """The effects that explain most, best first.
-
-        Returns:
-            effect, found, score_heldout and share_explained (of the search step that tried it),
-            p_value, group (effects with the same number cannot be distinguished in this log),
-            takes_away and certainty (of findings: `share` and `certainty` of `Finding`), estimates
-            (with standard errors; of effects that were not found, from the step that tried them).
-
-        Examples:
-            >>> d.table().loc[0, "effect"]
-            'coasting'
-        """
-        keys = ("effect", "score_heldout", "share_explained", "p_value", "group")
-        rows = []
-        for r in self._result.ranking:
-            f = self._result.finding(r.effect)
-            rows.append(
-                {
-                    **{k: getattr(r, k) for k in keys},
-                    "takes_away": f.share if f else np.nan,
-                    "certainty": f.certainty if f else "",
-                    "estimates": diagnosis_report.estimates((f or r).parameters),
-                }
-            )
-        table = pd.DataFrame(rows)
-        if len(table):
-            table.insert(1, "found", table["effect"].isin(self._result.found))
-        return table
-
-    def plot(self) -> Figure:
-        """Score after each step: as given, refitted, with each effect found.
-
-        Returns:
-            A figure of matplotlib; where robots reported detections, what their cameras see.
-
-        Examples:
-            >>> d.plot().axes[0].get_xlabel()
-            'score: error over noise floor'
-        """
-        return diagnosis_report.section(self._result).figures[0].svg.picture
+    _result: _diagnosed.Diagnosis | _infer.Inference
+    _file: ModelFile
 
     @_one_thread
     def next_run(
@@ -1433,6 +1372,80 @@ class Diagnosis(Reported):
         planned.input = self.input
         return planned
 
+
+class Diagnosis(Judged):
+    """Physical effects that a model of several robots lacks, or of a table of steady speeds.
+
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue
+            or cannot_tell.
+        sentence: the same for people.
+        found: the missing effects, most important first.
+        best: the first of them; None if none is named.
+
+    Examples:
+        >>> both = tm.diagnose("both.lcmlog", "fitted.toml")
+        >>> both.verdict
+        'effect_missing'
+    """
+
+    _result: _diagnosed.Diagnosis
+
+    def __init__(self, result: _diagnosed.Diagnosis, log: Log, file: ModelFile):
+        self._result, self._file = result, file
+        self.verdict: Verdict = result.verdict
+        self.sentence = result.sentence
+        ranked = {r.effect: r for r in result.ranking}
+        named = [(result.finding(name), ranked.get(name)) for name in result.found]
+        self.found = [
+            Finding({**rank.to_json(), **f.to_json()}, log, f.again)
+            for f, rank in named
+            if f and rank
+        ]
+        self.best = self.found[0] if self.found else None
+
+    def table(self) -> pd.DataFrame:
+        """The effects that explain most, best first.
+
+        Returns:
+            effect, found, score_heldout and share_explained (of the search step that tried it),
+            p_value, group (effects with the same number cannot be distinguished in this log),
+            takes_away and certainty (of findings: `share` and `certainty` of `Finding`), estimates
+            (with standard errors; of effects that were not found, from the step that tried them).
+
+        Examples:
+            >>> both.table().loc[0, "effect"]
+            'coasting'
+        """
+        keys = ("effect", "score_heldout", "share_explained", "p_value", "group")
+        rows = []
+        for r in self._result.ranking:
+            f = self._result.finding(r.effect)
+            rows.append(
+                {
+                    **{k: getattr(r, k) for k in keys},
+                    "takes_away": f.share if f else np.nan,
+                    "certainty": f.certainty if f else "",
+                    "estimates": diagnosis_report.estimates((f or r).parameters),
+                }
+            )
+        table = pd.DataFrame(rows)
+        if len(table):
+            table.insert(1, "found", table["effect"].isin(self._result.found))
+        return table
+
+    def plot(self) -> Figure:
+        """Score after each step: as given, refitted, with each effect found.
+
+        Returns:
+            A figure of matplotlib; where robots reported detections, what their cameras see.
+
+        Examples:
+            >>> both.plot().axes[0].get_xlabel()
+            'score: error over noise floor'
+        """
+        return diagnosis_report.section(self._result).figures[0].svg.picture
+
     def _page(self) -> tuple[report.Section, str]:
         return diagnosis_report.section(self._result), "twinmill.diagnose"
 
@@ -1443,8 +1456,99 @@ class Diagnosis(Reported):
         return f"Diagnosis({self.verdict}: {self.sentence})"
 
 
+class Inference(Judged):
+    """Posterior probabilities of the effects that a model of a robot may lack.
+
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
+            cannot_tell.
+        sentence: the same for people.
+        found: effects that are missing, surest first.
+        best: the first of them; None if none is named.
+        nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
+        score: as of `compare`, of the model as given.
+        score_refit: of its base at its posterior where no effect is new.
+        score_after: with the likeliest set of new effects. All three are RMS errors of predictions
+            0.1 to 2 s ahead over the noise floor; the models are the most probable ones, not those
+            with the least score, so that it may also rise.
+
+    Examples:
+        >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
+        >>> d.nothing < 0.05
+        True
+    """
+
+    _result: _infer.Inference
+
+    def __init__(self, result: _infer.Inference, log: Log, file: ModelFile):
+        self._result, self._file, answer = result, file, result.answer
+        self.verdict: Verdict = answer.verdict
+        self.nothing, self.outside = answer.nothing, answer.outside
+        self.sentence, self.score = inference.sentence(answer), result.before.score
+        self.score_refit, self.score_after = result.refitted.score, result.after.score
+        told = answer.to_json()
+        ranked = {row["effect"]: row for row in told["ranking"]}
+        there = {catalogue_name(name) for name in effect_names(file.model)}
+        self.found = [
+            Finding({**ranked[f["effect"]], **f}, log, catalogue_name(f["effect"]) in there)
+            for f in told["findings"]
+        ]
+        self.best = self.found[0] if self.found else None
+
+    def to_json(self) -> dict[str, Any]:
+        """All numbers and names, as of `twinmill diagnose --json`.
+
+        Returns:
+            As the page on probabilities tells; an absent number is None.
+
+        Examples:
+            >>> d.to_json()["found"]
+            ['coasting']
+        """
+        return {"sentence": self.sentence, **super().to_json()}
+
+    def table(self) -> pd.DataFrame:
+        """Effects and their numbers.
+
+        Returns:
+            effect, probability, certainty, name, value, std, unit (of both).
+
+        Examples:
+            >>> d.table()["effect"].unique().tolist()
+            ['coasting']
+        """
+        columns = ["name", "value", "std", "unit"]
+        rows = [
+            (f.effect, f.probability, f.certainty, *(own[c] for c in columns))
+            for f in self.found
+            for own in f.to_json()["parameters"]
+        ]
+        return pd.DataFrame(rows, columns=["effect", "probability", "certainty", *columns])
+
+    def plot(self) -> Figure:
+        """Probability of each effect, of nothing and of an unknown cause.
+
+        Returns:
+            A figure of matplotlib.
+
+        Examples:
+            >>> len(d.plot().axes)
+            1
+        """
+        return inference.probabilities(self._result.answer).svg.picture
+
+    def _page(self) -> tuple[report.Section, str]:
+        return inference.section([self._result]), "twinmill.diagnose"
+
+    def _text(self) -> RenderableType:
+        return inference.terminal(self._result)
+
+    def __repr__(self) -> str:
+        return f"Inference({self.verdict}: {self.sentence})"
+
+
 class Explanation(Reported):
-    """A model with the effects that were found, and the diagnosis that found them.
+    """A model of several robots, or of a table, with the effects that were found.
 
     Attributes:
         model: the new one.
@@ -1453,8 +1557,8 @@ class Explanation(Reported):
         score: of the new model on the log that it was fitted to.
 
     Examples:
-        >>> explained = tm.explain("run.lcmlog", "fitted.toml")
-        >>> explained.diagnosis.verdict
+        >>> widely = tm.explain("both.lcmlog", "fitted.toml")
+        >>> widely.diagnosis.verdict
         'effect_missing'
     """
 
@@ -1471,7 +1575,7 @@ class Explanation(Reported):
             name, value, std, unit, at_bound, seen, together, as of `Fit.table`.
 
         Examples:
-            >>> "coasting.deceleration_mps2" in explained.table()["name"].tolist()
+            >>> "coasting.deceleration_mps2" in widely.table()["name"].tolist()
             True
         """
         return pd.DataFrame([e.to_json() for e in self._result.parameters])
@@ -1484,7 +1588,7 @@ class Explanation(Reported):
             for a validated formula) and score_heldout.
 
         Examples:
-            >>> explained.steps()["score_heldout"].is_monotonic_decreasing
+            >>> widely.steps()["score_heldout"].is_monotonic_decreasing
             True
         """
         steps = self._result.steps
@@ -1499,7 +1603,7 @@ class Explanation(Reported):
             A figure of matplotlib, as of `Diagnosis.plot`.
 
         Examples:
-            >>> explained.plot().axes[0].get_xlabel()
+            >>> widely.plot().axes[0].get_xlabel()
             'score: error over noise floor'
         """
         return self.diagnosis.plot()
@@ -1515,6 +1619,77 @@ class Explanation(Reported):
         found = ", ".join(self._result.diagnosis.found) or "nothing"
         before = self._result.diagnosis.before
         return f"Explanation(found {found}: score {before.score:.3g} -> {self.score:.3g})"
+
+
+class Improvement(Reported):
+    """A model of a robot with what it lacked, and the diagnosis behind it.
+
+    Attributes:
+        model: the new one: the likeliest set of effects, all numbers at their posterior mean. It
+            keeps what it misses in these logs, so that `diagnose` does not report that of others.
+        diagnosis: of the model as given.
+        after: comparison of the new model with the logs.
+        score: of the new model on the logs that were judged.
+
+    Examples:
+        >>> explained = tm.explain("run.lcmlog", "fitted.toml")
+        >>> explained.diagnosis.verdict
+        'effect_missing'
+    """
+
+    def __init__(self, written: _better.Better, found: Inference):
+        self._written, self.diagnosis, self.model = written, found, Model(written.file)
+        self.after = Comparison(written.after)
+        self.score = self.after.score
+
+    def to_json(self) -> dict[str, Any]:
+        """All numbers and names, as of `twinmill explain --json`.
+
+        Returns:
+            Fields of the diagnosis, and those of the new model.
+
+        Examples:
+            >>> explained.to_json()["added"]
+            ['coasting']
+        """
+        return {**self.diagnosis.to_json(), **plain(self._written.to_json())}
+
+    def table(self) -> pd.DataFrame:
+        """Quantities of the new model, as of `Model.table`.
+
+        Returns:
+            One row for each quantity.
+
+        Examples:
+            >>> "coasting.deceleration_mps2" in explained.table()["name"].tolist()
+            True
+        """
+        return self.model.table()
+
+    def plot(self) -> Figure:
+        """Errors over the horizon, of both models.
+
+        Returns:
+            A figure of matplotlib, as of `Comparison.plot`.
+
+        Examples:
+            >>> len(explained.plot().axes)
+            3
+        """
+        both = [("as given", self._written.before), ("with what was found", self._written.after)]
+        return errors_drawn(both)
+
+    def _page(self) -> tuple[report.Section, str]:
+        page = inference.section([self.diagnosis._result], written=self._written)
+        return page, "twinmill.explain"
+
+    def _text(self) -> RenderableType:
+        return inference.terminal_of_robots([self.diagnosis._result], (), self._written)
+
+    def __repr__(self) -> str:
+        added = ", ".join(self._written.added) or "nothing"
+        before = self._written.before.score
+        return f"Improvement(added {added}: score {before:.3g} -> {self.score:.3g})"
 
 
 def load(*paths: str | Path) -> Log:
@@ -1755,24 +1930,30 @@ def diagnose(
     log: Log | str | Path,
     model: Model | str | Path | None = None,
     *,
+    own: Logs | None = None,
     without: Iterable[str] = (),
     progress: Callable[[str], None] | None = None,
-) -> Diagnosis:
+) -> Inference | Diagnosis:
     """Names the physical effect that a model lacks, or says that none is missing or identifiable.
 
     Args:
-        log: a log, or the path of one.
+        log: a log, or the path of one; several of one robot that were loaded together are judged
+            together.
         model: best one that was fitted to another log; None is TurboPi's.
+        own: the log (or logs) of this robot that the model was fitted to: model errors there are
+            not reported. Models of `fit` and `explain` keep these errors and do without.
         without: names of effects that are not considered.
         progress: called with a sentence on each step.
 
     Returns:
-        The verdict, what was found, and all effects that were tried.
+        Of one robot's poses the posterior probability of each effect. Several robots are compared
+        with each other, and tables judged, without probabilities: `Diagnosis`.
 
     Raises:
         LogError: the log cannot be used; one sentence.
         ModelError: the model cannot be read.
-        ValueError: there is no such effect as is named in `without`.
+        ValueError: there is no such effect as is named in `without`, or `own` is given for several
+            robots or a table.
 
     Examples:
         >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
@@ -1784,68 +1965,16 @@ def diagnose(
     log, model = _log(log), _model(model)
     excluded = known("without", without, catalogue())
     measurements = log.measurements(model)
-    result = _diagnose.diagnose(measurements, model.file, _progress(progress), excluded)
-    return _told(Diagnosis(result, log, model.file), measurements)
-
-
-@_one_thread
-def infer(
-    log: Log | str | Path,
-    model: Model | str | Path | None = None,
-    *,
-    own: Logs | None = None,
-    progress: Callable[[str], None] | None = None,
-) -> Inference:
-    """Posterior probability of each effect that a model may lack, and of an unknown cause.
-
-    Args:
-        log: of one robot, or the path of one; several logs that were loaded together are judged
-            together.
-        model: best one that was fitted to another log; None is TurboPi's.
-        own: the log (or logs) that the model was fitted to: model errors there are not reported.
-        progress: called with a sentence on each step.
-
-    Returns:
-        Verdict, effects and dependences with their probabilities.
-
-    Raises:
-        LogError: the log cannot be used, or has several robots; one sentence.
-        ModelError: the model cannot be read.
-
-    Examples:
-        >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
-        >>> inferred.findings[0].effect
-        'coasting'
-    """
-    log, model = _log(log), _model(model)
-    measurements = log.measurements(model)
-    before = _log(own).measurements(model) if own is not None else ()
-    result = _infer.infer(measurements, model.file, before, _progress(progress))
-    return _told(Inference(result), measurements)
-
-
-@_one_thread
-def improved(found: Inference, model: Model | str | Path | None = None) -> Model:
-    """Model with the likeliest set of missing effects, all numbers at their posterior mean.
-
-    Args:
-        found: by `infer`.
-        model: the one that was judged; None is TurboPi's.
-
-    Returns:
-        The new model, not written yet; it keeps what it misses in the logs that were judged, so
-        that `infer` does not report that of a later log.
-
-    Raises:
-        ModelError: the model gives the robot numbers of its own.
-
-    Examples:
-        >>> tm.improved(inferred, "fitted.toml").effects
-        ['coasting']
-    """
-    file = _model(model).file
-    path = Path(f"{file.path.stem}_improved.toml")
-    return Model(_better.better(found._result, file, path, "twinmill.improved").file)
+    tell = _progress(progress)
+    found: Inference | Diagnosis
+    if own is not None or _keeping.by_probabilities(measurements):
+        before = _log(own).measurements(model) if own is not None else ()
+        told = _infer.infer(measurements, model.file, before, tell, without=excluded)
+        found = Inference(told, log, model.file)
+    else:
+        older = _diagnose.diagnose(measurements, model.file, tell, excluded)
+        found = Diagnosis(older, log, model.file)
+    return _told(found, measurements)
 
 
 @_one_thread
@@ -1861,7 +1990,7 @@ def infer_robots(
     Args:
         log: of several robots, or the path of one.
         model: of all of them; None is TurboPi's.
-        own: the log (or logs) that the model was fitted to; see `infer`.
+        own: the log (or logs) that the model was fitted to; see `diagnose`.
         progress: called with a sentence on each step.
 
     Returns:
@@ -1873,14 +2002,17 @@ def infer_robots(
 
     Examples:
         >>> found = tm.infer_robots(log, "fitted.toml")
-        >>> {robot: one.findings[0].effect for robot, one in found.items()}
+        >>> {robot: one.best.effect for robot, one in found.items()}
         {0: 'coasting'}
     """
     log, model = _log(log), _model(model)
     measurements = log.measurements(model)
     before = _log(own).measurements(model) if own is not None else ()
     results = _infer.infer_robots(measurements, model.file, before, _progress(progress))
-    return {r.measurements[0].track.robot_id: _told(Inference(r), measurements) for r in results}
+    return {
+        r.measurements[0].track.robot_id: _told(Inference(r, log, model.file), measurements)
+        for r in results
+    }
 
 
 @_one_thread
@@ -1888,23 +2020,26 @@ def explain(
     log: Log | str | Path,
     model: Model | str | Path | None = None,
     *,
+    own: Logs | None = None,
     formula: bool = True,
     progress: Callable[[str], None] | None = None,
-) -> Explanation:
-    """Diagnoses, adds the effects found, and fits all parameters; cross-validated at each step.
+) -> Improvement | Explanation:
+    """Diagnoses, adds the effects found, and estimates all parameters.
 
     Args:
-        log: a log, or the path of one.
+        log: as of `diagnose`.
         model: best one that was fitted to another log; None is TurboPi's.
-        formula: also add a validated formula for what no effect explains.
+        own: as of `diagnose`.
+        formula: also add a formula for what no effect explains, where one holds.
         progress: called with a sentence on each step.
 
     Returns:
-        The new model, and the diagnosis behind it.
+        The new model, and the diagnosis behind it: of one robot's poses by probabilities, of
+        others cross-validated at each step.
 
     Raises:
         LogError: the log cannot be used; one sentence.
-        ModelError: the model cannot be read.
+        ModelError: the model cannot be read, or gives the robot numbers of its own.
 
     Examples:
         >>> explained = tm.explain("run.lcmlog", "fitted.toml")
@@ -1914,6 +2049,13 @@ def explain(
     log, model = _log(log), _model(model)
     checked("formula", formula, (bool,), "True or False")
     measurements = log.measurements(model)
+    if own is not None or _keeping.by_probabilities(measurements):
+        found = diagnose(log, model, own=own, progress=progress)
+        assert isinstance(found, Inference)
+        told = found._result if formula else replace(found._result, formula=None)
+        path = Path(f"{model.file.path.stem}_explained.toml")
+        written = _better.better(told, model.file, path, "twinmill.explain")
+        return _told(Improvement(written, found), measurements)
     result = _explain.explain_model(
         measurements,
         model.file,
@@ -1949,7 +2091,7 @@ def next_run(
         floor_m: free floor, along and across the robot at its start.
         max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
             highest in its logs.
-        own: the log (or logs) that the model was fitted to; see `infer`.
+        own: the log (or logs) that the model was fitted to; see `diagnose`.
         progress: called with a sentence on each step.
 
     Returns:

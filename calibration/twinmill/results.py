@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Results without a model of their own: comparisons, inferences, designed runs, cards."""
+"""Results without a model of their own: comparisons, designed runs, cards."""
 
 from io import StringIO
 from pathlib import Path
@@ -15,12 +15,9 @@ from twinmill.experiment.design import Plan
 from twinmill.experiment.played import csv_text
 from twinmill.files import plain, replacing
 from twinmill.fitting import compare as _compare
-from twinmill.inference import infer as _infer
-from twinmill.inference.answer import units_of
 from twinmill.report import (
     comparisons,
     error_figures,
-    inference,
     next_run_figures,
     runs,
     sections,
@@ -95,94 +92,6 @@ class Comparison(Reported):
     def __repr__(self) -> str:
         logs = ", ".join(dict.fromkeys(r.measurement.log_name for r in self._result.robots))
         return f"Comparison({self._result.model_name}, {logs}: score {self.score:.3g})"
-
-
-class Inference(Reported):
-    """Posterior probabilities of the effects that a model may lack.
-
-    Attributes:
-        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
-            cannot_tell.
-        sentence: the same for people.
-        findings: effects that are missing, each with `effect`, `probability` and `certainty`.
-        nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
-        score: as of `compare`, of the model as given.
-        score_refit: of its base at its posterior where no effect is new.
-        score_after: with the likeliest set of new effects. All three are RMS errors of predictions
-            0.1 to 2 s ahead over the noise floor; the models are the most probable ones, not those
-            with the least score, so that it may also rise.
-
-    Examples:
-        >>> inferred = tm.infer("run.lcmlog", "fitted.toml")
-        >>> inferred.nothing < 0.05
-        True
-    """
-
-    def __init__(self, result: _infer.Inference):
-        self._result, answer = result, result.answer
-        self.verdict, self.findings = answer.verdict, list(answer.findings)
-        self.nothing, self.outside = answer.nothing, answer.outside
-        self.sentence, self.score = inference.sentence(answer), result.before.score
-        self.score_refit, self.score_after = result.refitted.score, result.after.score
-
-    def to_json(self) -> dict[str, Any]:
-        """All numbers and names, as of `twinmill lab infer --json`.
-
-        Returns:
-            As the page on probabilities tells; an absent number is None.
-
-        Examples:
-            >>> inferred.to_json()["found"]
-            ['coasting']
-        """
-        return {"sentence": self.sentence, **super().to_json()}
-
-    def table(self) -> pd.DataFrame:
-        """Effects and their numbers.
-
-        Returns:
-            effect, probability, certainty, name, value, std, unit (of both).
-
-        Examples:
-            >>> inferred.table()["effect"].unique().tolist()
-            ['coasting']
-        """
-        columns = ["effect", "probability", "certainty", "name", "value", "std", "unit"]
-        rows = [
-            (
-                f.effect,
-                f.probability,
-                f.certainty,
-                name,
-                value,
-                std,
-                units_of(f.effect).get(name, ""),
-            )
-            for f in self.findings
-            for name, (value, std) in f.numbers.items()
-        ]
-        return pd.DataFrame(rows, columns=columns)
-
-    def plot(self) -> Figure:
-        """Probability of each effect, of nothing and of an unknown cause.
-
-        Returns:
-            A figure of matplotlib.
-
-        Examples:
-            >>> len(inferred.plot().axes)
-            1
-        """
-        return inference.probabilities(self._result.answer).svg.picture
-
-    def _page(self) -> tuple[report.Section, str]:
-        return inference.section([self._result]), "twinmill.infer"
-
-    def _text(self) -> RenderableType:
-        return inference.terminal(self._result)
-
-    def __repr__(self) -> str:
-        return f"Inference({self.verdict}: {self.sentence})"
 
 
 class RunComparison(Reported):

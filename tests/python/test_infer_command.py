@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from twinmill.inference.answer import Answer
+from twinmill.inference.infer import Inference
 from twinmill_cli.frame import Given
 from twinmill_cli.infer import _mending
 
@@ -31,7 +32,9 @@ def answer(verdict, *added):
 )
 def test_a_model_is_offered_that_has_what_lasts(said, new):
     given = Given([Path("run.lcmlog")], "base.toml", None, None)
-    found = SimpleNamespace(answer=said, formula=None)
+    scores = {"refitted": SimpleNamespace(score=2.0), "after": SimpleNamespace(score=1.0)}
+    found = SimpleNamespace(answer=said, formula=None, **scores)
+    found.added = Inference.added.fget(found)
     typed = [c for _, c in _mending(found, "lab infer", given)]
     assert typed == ([f"twinmill lab infer run.lcmlog --model base.toml -o {new}"] if new else [])
 
@@ -58,7 +61,7 @@ def test_diagnose_and_explain_with_the_models_own_log_find_what_came_since(
     assert effect["name"] == "coasting"
     assert effect["deceleration_mps2"] == pytest.approx(0.7, rel=0.1)
     code, out, _ = twinmill("diagnose", log, "--model", better, "--json")
-    assert code == 0 and json.loads(out)["verdict"] == "model_adequate"
+    assert code == 0 and not json.loads(out)["findings"]
 
 
 @pytest.mark.parametrize("asked", ["--no-formula", "--formula"])

@@ -120,23 +120,22 @@ def test_stopped_before_anything_was_tried_is_said(
     twinmill, brief_coasting_robot, monkeypatch, tmp_path, verb
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(whole, "open_measurements", interrupt)
+    monkeypatch.setattr("twinmill.inference.infer.problem_of", interrupt)
     command = [*verb, brief_coasting_robot.log, "--model", brief_coasting_robot.model]
     code, out, err = twinmill(*command, "--json")
     said = json.loads(out)
     assert (code, err) == (130, "") and said["stopped"] and said["found"] == []
     code, out, err = twinmill(*command)
     assert (code, out.strip(), err) == (130, said["sentence"], "")
-    assert "Stopped before anything was tried" in out
+    assert "Stopped before there was an answer" in out
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.usefixtures("diagnosed")
 @pytest.mark.parametrize("as_json", [True, False])
 def test_a_report_that_is_stopped_loses_nothing_of_the_diagnosis(
     twinmill, brief_coasting_robot, monkeypatch, tmp_path, as_json
 ):
-    monkeypatch.setattr("twinmill.report.diagnosis.section", interrupt)
+    monkeypatch.setattr("twinmill_cli.infer.section", interrupt)
     out = tmp_path / "x.toml"
     command = ["explain", brief_coasting_robot.log, "--model", brief_coasting_robot.model]
     folder = tmp_path / "report"

@@ -27,7 +27,7 @@ from twinmill_cli.output import AsJson, busy, say
 
 if working():  # not for --help
     from twinmill.files import check_new_file
-    from twinmill.fitting.add import OWN_GAINS, AddResult, add
+    from twinmill.fitting.add import OWN_GAINS, AddResult, add_to_model
     from twinmill.fitting.compare import Comparison, compare
     from twinmill.fitting.fit import Choice, FitResult, fit_model
     from twinmill.inference.keeping import with_its_error
@@ -211,17 +211,18 @@ def _add(
     check_new_file(output, force, [model_file.path, *logs])
     measurements = load(logs, model_file)
     with busy(f"adding {effect} to {model}"):
-        result = add(
+        result = add_to_model(
             effect=effect,
             measurements=measurements,
             model_file=model_file,
-            out=output,
+            path=output,
             command=source.command,
             texts=texts,
             held=held,
             robot_id=robot,
-            force=force,
         )
+        result = replace(result, child=with_its_error(result.child, measurements))
+        result.child.write(force)  # last, as of fit
     section = partial(added_section, result)
     data = {**result.to_json(), **told(measurements)}
     finish(data, show.added(result), source, section=section, as_json=as_json, out=out)

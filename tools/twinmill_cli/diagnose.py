@@ -31,7 +31,7 @@ if working():  # not for --help
     from twinmill.diagnosis.result import Diagnosis
     from twinmill.diagnosis.stopped import NOTHING_TRIED, stopped
     from twinmill.files import check_new_file
-    from twinmill.inference.keeping import keeps_its_error
+    from twinmill.inference.keeping import by_probabilities
     from twinmill.model.model_file import ModelFile
     from twinmill.provenance import Provenance
     from twinmill_cli.frame import (
@@ -90,7 +90,7 @@ def _diagnose(
     source = provenance(command_line("diagnose", logs, model), model_file := open_model(model, out))
     with _told_if_stopped(source, as_json):
         given = read(logs, model, model_file)
-        if own or keeps_its_error(given.measurements, model_file):
+        if own or by_probabilities(given.measurements):
             from twinmill_cli.infer import inferred  # slow to import
 
             return inferred("diagnose", given, own=own or [], as_json=as_json, out=out)
@@ -127,7 +127,7 @@ def _shown() -> ModuleType:
 
 @contextmanager
 def _told_if_stopped(source: Provenance, as_json: bool) -> Iterator[None]:
-    """Ctrl-C before anything was tried: that nothing can be said is said, too.
+    """Ctrl-C before there is an answer: that nothing can be said is said, too.
 
     Raises:
         Exit: so it was.
@@ -300,18 +300,19 @@ def _explain(
     check_new_file(output, force, [model_file.path, *logs, *(own or [])])
     with _told_if_stopped(source, as_json):
         given = read(logs, model, model_file)
-    if own or keeps_its_error(given.measurements, model_file):
+    if own or by_probabilities(given.measurements):
         from twinmill_cli.infer import inferred  # as in diagnose
 
-        return inferred(
-            *(verb, given),
-            own=own or [],
-            output=output,
-            formula=formula is not False,
-            force=force,
-            as_json=as_json,
-            out=out,
-        )
+        with _told_if_stopped(source, as_json):
+            return inferred(
+                *(verb, given),
+                own=own or [],
+                output=output,
+                formula=formula is not False,
+                force=force,
+                as_json=as_json,
+                out=out,
+            )
     from twinmill.diagnosis.explain import explain  # slow to import, and diagnose needs none of it
 
     measurements = given.measurements

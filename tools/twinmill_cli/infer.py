@@ -25,7 +25,6 @@ if working():  # not for --help
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import as_table, with_kept
     from twinmill.listing import listed
-    from twinmill.model.parameters import with_role
     from twinmill.report.inference import next_run, section, sentence, terminal_of_robots
     from twinmill_cli.frame import (
         Given,
@@ -193,7 +192,7 @@ def _mending(result: Inference, verb: str, given: Given) -> list[tuple[str, str]
 
     What is of a moment of these logs is added to none.
     """
-    lasting = [name for name in result.answer.added if not with_role(name, "moment")]
+    lasting = [*result.added]
     if result.formula and result.formula.lasting:
         lasting.append("equation")
     if not lasting and result.answer.verdict != "refit_enough":
@@ -210,7 +209,7 @@ def _mending(result: Inference, verb: str, given: Given) -> list[tuple[str, str]
 
 def _settling(answer: Answer, given: Given, own: list[Path]) -> list[tuple[str, str]]:
     """Reason and command for the run that tells what is neither sure nor ruled out."""
-    if not answer.open or not (own or "always" in given.model_file.fit):
+    if not answer.open:
         return []
     verb = with_own("next", own)
     return [("To design that run", command_line(verb, given.logs, given.model, Path("next.csv")))]

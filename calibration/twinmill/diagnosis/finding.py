@@ -91,31 +91,6 @@ class Ranked:
         return {**vars(self), "parameters": [e.to_json() for e in self.parameters]}
 
 
-@dataclass(frozen=True)
-class Late:
-    """How late the motion follows its commands.
-
-    Attributes:
-        sum_s, sum_std_s: lag and delay together; with the clocks' offset where that is not known.
-        delay_s, lag_s, clock_s: its parts; None where the data cannot part them.
-        parted: whether they can.
-        spread_s: standard deviation of lags of which each robot or run has its own, also in
-            sum_std_s; 0 where there is one.
-    """
-
-    sum_s: float
-    sum_std_s: float | None
-    delay_s: float | None
-    lag_s: float | None
-    clock_s: float | None
-    parted: bool
-    spread_s: float = 0.0
-
-    def to_json(self) -> dict[str, Any]:
-        """Fields of the interface."""
-        return vars(self)
-
-
 def doubted(finding: Finding, why: str, wrong_form: bool = False, depends_on: str = "") -> Finding:
     """The finding with one more reason to doubt it; the first is told."""
     return replace(

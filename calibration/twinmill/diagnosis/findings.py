@@ -19,7 +19,7 @@ from twinmill.diagnosis.doubts import (
     seen_once,
     stand_in,
 )
-from twinmill.diagnosis.finding import Finding, Late, Ranked, doubted
+from twinmill.diagnosis.finding import Finding, Ranked, doubted
 from twinmill.diagnosis.rounds import Round, Search
 from twinmill.diagnosis.search import comes_again
 from twinmill.diagnosis.settings import SETTINGS
@@ -34,6 +34,7 @@ from twinmill.diagnosis.trials import (
 )
 from twinmill.fitting.compare import MISSING
 from twinmill.formulas.term import TIME
+from twinmill.model.late import Late, late_parts
 from twinmill.model.parameters import (
     CLOCK,
     LAG,
@@ -436,7 +437,7 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     lags_s = fit.x[[n == LAG for n in names]]  # one, or each robot's or run's own
     spread_s = float(np.std(lags_s, ddof=1)) if len(lags_s) > 1 else 0.0
     value["lag"] += float(np.mean(lags_s)) - model.get(LAG) if spread_s else 0.0
-    every = [n for own in _late_parts(model).values() for n in own] + [CLOCK] * (not same_clock)
+    every = [n for own in late_parts(model).values() for n in own] + [CLOCK] * (not same_clock)
     # Of what each log or robot has of its own, the mean.
     mask = np.array([(n in every) / names.count(n) for n in names])
     free = bool(mask.any())
@@ -458,19 +459,9 @@ def lateness(done: Search, found: Sequence[Finding], same_clock: bool) -> Late:
     )
 
 
-def _late_parts(model: native.Model) -> dict[str, list[str]]:
-    """Names of what makes a model late: lag, delay, clock."""
-    parts = {"lag": [LAG], "delay": [], "clock": []}
-    for instance in effect_names(model):
-        if late := late_part(catalogue_name(instance)):
-            kind, key = late
-            parts[kind].append(f"{instance}.{key}")
-    return parts
-
-
 def _late_values(state: State, same_clock: bool) -> dict[str, float]:
     """Seconds by lag, delay and clock; of logs whose clocks are two, the median."""
-    value = {k: sum(map(state.model.get, own)) for k, own in _late_parts(state.model).items()}
+    value = {k: sum(map(state.model.get, own)) for k, own in late_parts(state.model).items()}
     if not same_clock:
         value["clock"] += float(np.median([m.get(CLOCK) for m in state.models]))
     return value

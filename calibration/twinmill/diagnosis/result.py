@@ -9,7 +9,7 @@ import twinmill_native as native
 from twinmill.data.checks.settings import CHECKS
 from twinmill.defaults import Verdict
 from twinmill.diagnosis.apart import Apart
-from twinmill.diagnosis.finding import Finding, Late, Ranked
+from twinmill.diagnosis.finding import Finding, Ranked
 from twinmill.diagnosis.moments import every_s
 from twinmill.diagnosis.outliers import Outlier
 from twinmill.diagnosis.resolution import Resolution
@@ -20,6 +20,7 @@ from twinmill.diagnosis.trials import REFIT
 from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
 from twinmill.fitting.settings import FLOOR_SETTINGS
+from twinmill.model.late import Late
 from twinmill.model.parameters import ParameterEstimate, makes_late
 from twinmill.predict.detection_errors import DetectionComparison
 

@@ -20,7 +20,7 @@ from twinmill.fitting.compare import Comparison
 from twinmill.fitting.opening import Opened
 
 NOTHING = "Stopped before all was tried; nothing had been found."
-NOTHING_TRIED = "Stopped before anything was tried; nothing can be said."
+NOTHING_TRIED = "Stopped before there was an answer; nothing can be said."
 
 
 @dataclass

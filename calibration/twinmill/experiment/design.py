@@ -22,7 +22,7 @@ from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
 from twinmill.inference.infer import Inference, infer
-from twinmill.inference.keeping import keeps_its_error
+from twinmill.inference.keeping import by_probabilities
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import base_parameters, catalogue_of
 from twinmill.predict.modelled_log import ModelledLog
@@ -137,7 +137,7 @@ def plan_run(
 ) -> Plan:
     """Diagnoses logs, and designs the run that best names what they leave open.
 
-    They are judged by probabilities where it is known what the model always misses.
+    One robot's poses are judged by probabilities.
 
     Args:
         measurements: the logs so far.
@@ -151,7 +151,7 @@ def plan_run(
     """
     check(measurements, model_file, limits)
     found: Diagnosis | Inference
-    if own or keeps_its_error(measurements, model_file):
+    if own or by_probabilities(measurements):
         found = infer(measurements, model_file, own, progress)
     else:
         found = diagnose(measurements, model_file, progress)

@@ -2,7 +2,7 @@
 """From beliefs to an answer: verdict, findings with their certainty, what the rest depends on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Numbers, Table
 from twinmill.model.parameters import catalogue, catalogue_name, instance_of
 
+PASSES: tuple[Verdict, Verdict] = "model_adequate", "refit_enough"
 LARGEST_GROUP = 4  # names: more help nobody
 OF_SIZE = PRIORS.form / np.sqrt(NODES)  # error of an effect's size where its formula is off
 
@@ -97,6 +98,13 @@ class Answer:
     numbers: Numbers
     refit: Numbers
 
+    def with_stale(self, chance: float) -> "Answer":
+        """With another probability that the base's numbers are stale, and the verdict by it."""
+        verdict = self.verdict
+        if verdict in PASSES:
+            verdict = PASSES[chance > 0.5]
+        return replace(self, stale=chance, verdict=verdict)
+
     @property
     def sure_words(self) -> list[str]:
         """Dependences of the rest that are sure, else the likeliest; none if there is none."""
@@ -167,7 +175,7 @@ def answer(table: Table) -> Answer:
     stale = sum(b.probability for b in every if b.entry.stale)
     if not something:
         refit = sum(b.probability for b in every if b.nothing and b.entry.stale)
-        verdict: Verdict = "refit_enough" if refit > nothing / 2 else "model_adequate"
+        verdict = PASSES[refit > nothing / 2]
         verdict = verdict if nothing >= 0.5 else "cannot_tell"
     elif outside >= 0.5 or not findings:
         verdict = "outside_catalogue"

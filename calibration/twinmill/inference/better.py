@@ -2,7 +2,8 @@
 """The model with what it lacked: base and effects at their posterior, in a file of its own.
 
 Written is the likeliest set of missing effects, with what the base's own log shows beside it. An
-effect that is of a moment of the log stays out, since no other log has it. An unnamed cause is in
+effect that is of a moment of the log stays out, since no other log has it; so do effects none of
+which is sure where predictions are no better with them. An unnamed cause is in
 it where a formula describes it; the base's numbers are those beside it, so that they do not stand
 for it.
 """
@@ -20,7 +21,7 @@ from twinmill.inference.infer import Inference
 from twinmill.inference.keeping import with_its_error
 from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.model.parameters import CLOCK, CLOCK_RATE, instance_of, with_role
+from twinmill.model.parameters import CLOCK, CLOCK_RATE, catalogue_name, instance_of, with_role
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,9 @@ def _fitted(
 ) -> tuple[Fitted, tuple[str, ...]]:
     """Fit to be written, and its new instances of effects; the score is not known yet."""
     always = found.always.effects if found.always else ()
-    lasting = [n for n in (*always, *found.answer.added) if not with_role(n, "moment")]
-    own = found_model(model_file.model, found.answer.numbers, lasting)
+    lasting = [n for n in always if not with_role(n, "moment")]
+    numbers = found.answer.numbers if found.added or found.formula else found.answer.refit
+    own = found_model(model_file.model, numbers, [*lasting, *found.added])
     if found.formula and found.formula.lasting:
         own = with_formula(own, found.formula)
     kept = [e for e in own.estimates if instance_of(e.name) != "clock"]
@@ -87,6 +89,7 @@ def _fitted(
     declared = own.model.clock_same or any(m.same_clock for m in found.measurements)
     if declared or len(found.measurements) > 1:  # several logs may have an offset each
         clock = {}
+    told = {f.effect: f.share for f in found.answer.findings}
     fitted = Fitted(
         model=own.model,
         estimates=kept,
@@ -95,5 +98,6 @@ def _fitted(
         score_after=score,
         clock=clock,
         covariance=own.covariance.of([*(e.name for e in kept), *clock]),
+        shares={n: told[catalogue_name(n)] for n in own.added if catalogue_name(n) in told},
     )
     return fitted, own.added

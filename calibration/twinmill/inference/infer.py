@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One model, and each robot by itself: what is missing, with probabilities."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,13 +18,17 @@ from twinmill.inference.formula import Formula, formula_of
 from twinmill.inference.found_model import found_model, with_formula
 from twinmill.inference.keeping import is_own
 from twinmill.inference.kept import kept
+from twinmill.inference.lateness import lateness
 from twinmill.inference.planar import problem_of
 from twinmill.inference.prior import Always
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
+from twinmill.inference.sheet import chance_of_stale, fitted_to, is_sheet
 from twinmill.inference.table import Numbers, table_of
 from twinmill.inference.unnamed import Unnamed, likeliest, unnamed
+from twinmill.model.late import Late
 from twinmill.model.model_file import ModelFile
+from twinmill.model.parameters import with_role
 
 HELD, HELD_OWN = "infer: the logs hold", "infer: the model's own logs hold"
 ONE = (
@@ -54,7 +58,8 @@ class Inference:
         opened: these logs with the model of `refitted`.
         not_shown: effects that these logs cannot show by their kind, and why.
         strangers: sentences on own logs that are not the model's.
-        of_own_log: one of these logs told what the model always misses.
+        late: how late the motion is in the likeliest model.
+        told_here: the base was fitted to one of these logs, so that all it misses there is told.
     """
 
     answer: Answer
@@ -68,19 +73,42 @@ class Inference:
     opened: Sequence[Opened]
     not_shown: dict[str, str]
     strangers: tuple[str, ...]
-    of_own_log: bool
+    late: Late
+    told_here: bool
 
     @property
     def finds(self) -> bool:
         """True if the model can have what was found."""
         return bool(self.answer.added) or bool(self.formula and self.formula.holds)
 
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Effects that a better model gets: the likeliest set without what is of a moment.
+
+        None if none of them is sure, and predictions are no better with them.
+        """
+        sure = any(f.certainty == "sure" for f in self.answer.findings)
+        if not (sure or self.after.score < self.refitted.score):
+            return ()
+        return tuple(name for name in self.answer.added if not with_role(name, "moment"))
+
+    def steps(self) -> list[dict[str, Any]]:
+        """Scores of the model as given, of its base, and with what was found.
+
+        The score between two effects that were found together is null.
+        """
+        names = [*self.answer.added, *(["equation"] if self.formula and self.formula.holds else [])]
+        steps = [("refit", self.refitted.score), *((name, None) for name in names[:-1])]
+        steps += [(name, self.after.score) for name in names[-1:]]
+        first = {"effect": None, "score_heldout": self.before.score}
+        return [first, *({"effect": e, "score_heldout": score} for e, score in steps)]
+
     def to_json(self) -> dict[str, Any]:
-        """Fields of `twinmill lab infer --json`."""
+        """Fields of `twinmill diagnose --json`."""
         kernels = self.always.kernels if self.always else ()
         wander = self.always.sizes_of_wander().items() if self.always else ()
         told = self.answer.to_json()
-        told["rest"]["curves"] = [one.to_json() for one in self.left]
+        told["rest"] |= {"curves": [one.to_json() for one in self.left], "proven": None}
         if self.formula and self.formula.holds:
             told["rest"] |= {"formula": self.formula.text, "proven": self.formula.to_json()}
         return {
@@ -98,6 +126,8 @@ class Inference:
             "score_after": self.after.score,
             "not_identifiable": [{"effect": e, "why": w} for e, w in self.not_shown.items()],
             "robots_off": [],
+            "late": self.late.to_json(),
+            "steps": self.steps(),
             "next_experiment": None,
             "warnings": [*self.strangers, *self.before.warnings],
             "settings": {name: value for name, value, _ in PRIORS.listed()},
@@ -109,6 +139,8 @@ def infer(
     model_file: ModelFile,
     own: Sequence[Measurement | SteadyTable] = (),
     progress: Callable[[str], None] = lambda _: None,
+    *,
+    without: Collection[str] = (),
 ) -> Inference:
     """Probabilities of what a model lacks, from one robot in one log or several.
 
@@ -116,22 +148,22 @@ def infer(
         measurements: of the logs, which are judged together.
         model_file: the model.
         own: of the logs that the model was fitted to, with that robot: what it misses there, too,
-            is no news. Without them its file may tell that of other logs.
+            is no news. Without them its file may tell that of other logs; a model of which no log
+            told the numbers is fitted to the judged logs first.
         progress: told in words what is being done.
+        without: effects that do not compete.
 
     Raises:
         LogError: these are several robots, or tables.
         ModelError: what the file keeps cannot be read.
     """
     runs = of_one_robot(measurements, HELD, ONE)
-    always = None if is_own(runs, model_file) else kept(model_file)
-    if own:
-        progress("what the model misses in its own log")
-        robot = runs[0].track.robot_id
-        always = always_of(of_one_robot(own, HELD_OWN, OWN, robot), model_file)
-    problem = problem_of(runs, model_file, always, sheet=is_own(runs, model_file))
+    told = _told(runs, model_file, own, progress)
+    problem = problem_of(runs, told.base, told.always, sheet=told.here, without=without)
     search = Search(problem, progress).run()
     found = answer(table_of(search))
+    if told.base is not model_file:
+        found = found.with_stale(chance_of_stale(problem, model_file))
     own_set, formula = likeliest(search, found), None
     left: tuple[Unnamed, ...] = ()
     if own_set is not None:
@@ -140,8 +172,43 @@ def infer(
             progress("formula")
             formula = formula_of(search, own_set, problem.motion, sure)
     progress("scores")
-    said = tuple(strangers(own, model_file))
-    return _scored(found, runs, model_file, left=left, formula=formula, always=always, said=said)
+    late = lateness(found.numbers, problem.same_clock)
+    return _scored(found, runs, model_file, told=told, left=left, formula=formula, late=late)
+
+
+@dataclass(frozen=True)
+class _Told:
+    """Knowledge before logs are judged.
+
+    Attributes:
+        base: model that effects are compared beside: as given, or fitted to these logs.
+        always: what it misses in other logs.
+        here: these logs alone told the base's numbers.
+        strangers: sentences on own logs that are not the model's.
+    """
+
+    base: ModelFile
+    always: Always | None
+    here: bool
+    strangers: tuple[str, ...]
+
+
+def _told(
+    runs: Sequence[Measurement],
+    model_file: ModelFile,
+    own: Sequence[Measurement | SteadyTable],
+    progress: Callable[[str], None],
+) -> _Told:
+    if own:
+        progress("what the model misses in its own log")
+        robot = runs[0].track.robot_id
+        always = always_of(of_one_robot(own, HELD_OWN, OWN, robot), model_file)
+        return _Told(model_file, always, is_own(runs, model_file), strangers(own, model_file))
+    if is_sheet(model_file):
+        progress("fitting the base")
+        return _Told(fitted_to(runs, model_file), None, True, ())
+    here = is_own(runs, model_file)
+    return _Told(model_file, None if here else kept(model_file), here, ())
 
 
 def _scored(
@@ -149,13 +216,13 @@ def _scored(
     runs: Sequence[Measurement],
     model_file: ModelFile,
     *,
+    told: _Told,
     left: tuple[Unnamed, ...],
     formula: Formula | None,
-    always: Always | None,
-    said: tuple[str, ...],
+    late: Late,
 ) -> Inference:
     given = open_measurements(runs, model_file)
-    there = always.effects if always else ()
+    there = told.always.effects if told.always else ()
 
     def under(
         numbers: Numbers, effects: Sequence[str], beside: Formula | None = None
@@ -165,37 +232,37 @@ def _scored(
         return [o.aligned(model) for o in given]
 
     base = under(found.refit, there)
-    kept = formula if formula and formula.holds else None
-    new = found.added or kept
-    after = under(found.numbers, (*there, *found.added), kept) if new else base
+    holds = formula if formula and formula.holds else None
+    after = under(found.numbers, (*there, *found.added), holds) if found.added or holds else base
     return Inference(
         found,
         left,
         formula,
         runs,
-        always,
+        told.always,
         before=comparison(model_file, given),
         refitted=comparison(model_file, base),
         after=comparison(model_file, after),
         opened=base,
         not_shown=not_shown(given),
-        strangers=said,
-        of_own_log=is_own(runs, model_file),
+        strangers=told.strangers,
+        late=late,
+        told_here=told.here,
     )
 
 
-def strangers(own: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> list[str]:
+def strangers(own: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> tuple[str, ...]:
     """Sentences on own logs to which the model was not fitted, as its file knows; one at most."""
     hashes = [m.log_sha256 for m in own]
     if not own or not model_file.known_from_other_logs(hashes):
-        return []
+        return ()
     names = ", ".join(dict.fromkeys(m.log_name for m in own))
     fitted = ", ".join(model_file.fit.get("logs", [])) or "others"
-    return [
+    return (
         f"{names}: {model_file.path.name} was fitted to {fitted}, not to this; if robot and clocks "
         f"are not the same, what differs between them is told as new. Give {option('own')} the log "
-        "that the model was fitted to."
-    ]
+        "that the model was fitted to.",
+    )
 
 
 def infer_robots(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Models that keep what they always miss, and the logs that are judged by that."""
+"""Models that keep what they always miss, and the logs of which that is known."""
 
 from collections.abc import Sequence
 
@@ -10,19 +10,14 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.model.model_file import ModelFile
 
 
-def keeps_its_error(
-    measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile
-) -> bool:
-    """True if the file tells what its model always misses, and other logs of one robot are judged.
+def by_probabilities(measurements: Sequence[Measurement | SteadyTable]) -> bool:
+    """True if these are poses of one robot.
 
-    Several robots are compared with each other, and tables read, by the older engine alone; in the
-    logs that told it, all that the model misses would be no news.
+    Several robots are compared with each other, and tables and detections read, by the older engine
+    alone.
     """
-    return (
-        "always" in model_file.fit
-        and _of_one_robot(measurements)
-        and not is_own(measurements, model_file)
-    )
+    robots = {m.track.robot_id if isinstance(m, Measurement) else None for m in measurements}
+    return len(robots) == 1 and None not in robots
 
 
 def is_own(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> bool:
@@ -38,7 +33,7 @@ def with_its_error(
 
     Itself where these are of several robots or tables.
     """
-    if not _of_one_robot(measurements):
+    if not by_probabilities(measurements):
         return model_file
     from twinmill.inference.always import always_of  # slow to import, for who fits alone
     from twinmill.inference.kept import as_table
@@ -48,8 +43,3 @@ def with_its_error(
     found = as_table(always_of(logs, model_file), [m.log_sha256 for m in logs])
     document.setdefault("fit", tomlkit.table())["always"] = found
     return ModelFile.of(model_file.path, tomlkit.dumps(document))
-
-
-def _of_one_robot(measurements: Sequence[Measurement | SteadyTable]) -> bool:
-    robots = {m.track.robot_id if isinstance(m, Measurement) else None for m in measurements}
-    return len(robots) == 1 and None not in robots

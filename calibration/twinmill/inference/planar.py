@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that drive on a floor, ready for inference."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,11 +55,13 @@ class PlanarProblem(Problem):
     Attributes:
         motion: as the base predicts it.
         always: what the base misses in its own log; None where that is not known.
+        same_clock: the offset of the clocks is known.
     """
 
     steps: Steps
     motion: Motion
     always: Always | None
+    same_clock: bool
 
     def candidate(self, name: str, model: native.Model) -> Candidate:
         """Change by an effect of the twin's catalogue beside a model."""
@@ -108,6 +110,8 @@ def problem_of(
     model_file: ModelFile,
     always: Always | None = None,
     sheet: bool = False,
+    *,
+    without: Collection[str] = (),
 ) -> PlanarProblem:
     """Prepares the logs of a robot.
 
@@ -116,6 +120,7 @@ def problem_of(
         model_file: its base model.
         always: what the model misses in the log that it was fitted to.
         sheet: nothing of the base is known but a data sheet.
+        without: effects that do not compete.
     """
     measurements = [m.punctual() for m in measurements]
     whole = model_file.model
@@ -142,7 +147,7 @@ def problem_of(
         effects=always.effects if always else (),
     )
     if sheet:
-        prior = replace(prior, cov=prior.stale, known=False)
+        prior = prior.before_any_log()
     if not same_clock:
         prior, logs = _with_clock(prior, model, logs)
     steps = Steps(logs)
@@ -163,7 +168,8 @@ def problem_of(
         ]
         prior = prior.with_columns(_seen(_missed_by_formulas(changes, motion), noise))
     base = Fitter(steps, noise, prior.columns).fit(Guess.of_base(model, prior))
-    names = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
+    every = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
+    names = [name for name in every if name not in without]
     rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
     wander = {k: discrepancy.in_another_log(p) for k, p in always.wander.items()} if always else {}
     rough = PlanarProblem(
@@ -180,6 +186,7 @@ def problem_of(
         tuple(missed),
         motion,
         always,
+        same_clock,
     )
     noise = flexible_noise(rough)
     base = Fitter(steps, noise, prior.columns).fit(base)

@@ -20,6 +20,7 @@ from twinmill.model.parameters import (
     CLOCK,
     CLOCK_RATE,
     LAG,
+    USUAL_STD,
     WHERE_OR_WHEN,
     Parameter,
     base_parameters,
@@ -108,6 +109,14 @@ class Prior:
         for k, share in enumerate(self.sheet):
             cov[k, k] += (share * PRIORS.sheet * self.mean[k]) ** 2
         return cov
+
+    def before_any_log(self) -> "Prior":
+        """As a fit begins: from a data sheet, whose lag is a guess."""
+        cov = self.stale
+        for k, name in enumerate(self.names):
+            if name == LAG:
+                cov[k, k] += USUAL_STD[LAG] ** 2
+        return replace(self, cov=cov, known=False)
 
     def with_columns(self, columns: np.ndarray) -> "Prior":
         """With a discrepancy more, (K, W, C), whose weights have a standard normal distribution."""

@@ -14,6 +14,7 @@ from twinmill.model.parameters import CLOCK
 
 STEP_S = 0.1  # shorter than the memories looked for, long against the time between poses
 FEWEST = 10  # steps of a stretch: a shorter one has hardly a step that its start does not touch
+STANDS = 1e-6  # m or rad in a step: an axis that is never driven, over which nothing is divided
 BLOCK_S, FEWEST_BLOCKS = 8.0, 6  # blocks of time counted as independent, as in `predict.datasets`
 
 
@@ -182,7 +183,7 @@ class Motion:
     @property
     def moves(self) -> np.ndarray:
         """(W,) 1 where the robot moves, 0 where it stands, linear between."""
-        relative = np.abs(self.moved) / np.maximum(self.top[:3], 1e-9)
+        relative = np.abs(self.moved) / self.top[:3]
         return np.clip(relative.max(axis=1) / 0.1, 0.0, 1.0)
 
     @property
@@ -209,4 +210,4 @@ def _scale(moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     plane = np.hypot(size[0], size[1])
     way = np.hypot(moved[:, 0], moved[:, 1])
     top = [*np.abs(moved).max(axis=0), way.max(), np.abs(moved[:, 2]).max()]
-    return np.array([plane, plane, max(size[2], 1e-6)]), np.array(top)
+    return np.maximum([plane, plane, size[2]], STANDS), np.maximum(top, STANDS)

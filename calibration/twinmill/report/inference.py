@@ -17,7 +17,7 @@ from twinmill.inference.answer import Answer, Named, units_of
 from twinmill.inference.infer import Inference
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
-from twinmill.model.parameters import catalogue
+from twinmill.model.parameters import catalogue, with_role
 from twinmill.report import Figure, Section, comparisons, show, unnamed
 from twinmill.report.canvas import FLOOR, PREDICTED, draw
 from twinmill.report.charted import charts
@@ -124,7 +124,7 @@ def section(
         next_step=next_run(one.answer) if one else "",
         commands=[(f"{why}:", command) for why, command in commands],
         notes=[
-            *([*_formula(one), *_known(one)] if one else [ONE_BY_ONE]),
+            *([*_formula(one), *_left_out(one), *_known(one)] if one else [ONE_BY_ONE]),
             *([_new(written)] if written else []),
         ],
         warnings=[*results[0].strangers, *before.warnings],
@@ -229,7 +229,7 @@ def terminal(result: Inference) -> RenderableType:
         *([] if falls else [Text(SCORES)]),
         Text(),
         *map(show.table, _tables(result)),
-        *map(Text, (*_formula(result), *_known(result))),
+        *map(Text, (*_formula(result), *_left_out(result), *_known(result))),
         *([Text(step)] if (step := next_run(result.answer)) else []),
         *show.warned([*result.strangers, *result.before.warnings]),
     )
@@ -267,11 +267,22 @@ def _formula(result: Inference) -> list[str]:
     ]
 
 
+def _left_out(result: Inference) -> list[str]:
+    """A sentence on effects that `explain` does not add; none where it adds what lasts."""
+    lasting = [n for n in result.answer.added if not with_role(n, "moment")]
+    if result.added or not lasting:
+        return []
+    what, it = f"{lasting[0]} is not sure", "it"
+    if len(lasting) > 1:
+        what, it = f"None of {listed(lasting)} is sure", "them"
+    return [f"{what}, and predictions are no better with {it}: explain leaves {it} out."]
+
+
 def _known(result: Inference) -> list[str]:
     """Errors that are not new, as far as they are known, in sentences."""
     always = result.always
-    if always is None and result.of_own_log:
-        return ["The model was fitted to this log: what it has always missed is told as well."]
+    if always is None and result.told_here:
+        return ["This log told the base, too, so that all is named that the base misses in it."]
     if always is None:
         return [
             "The model's error on the log that it was fitted to is not known, so it may be "
@@ -319,11 +330,11 @@ def _effects(findings: list[Named]) -> Table:
                     Cell(number(value)),
                     Cell(f"± {number(std, 2)}"),
                     Cell(of_unit(units_of(f.effect).get(name, ""))),
-                    Cell("" if k else str(catalogue()[f.effect]["summary"])),
                 ]
             )
-    columns = ["effect", "probability", "number", "value", "std", "unit", "what it is"]
-    return Table("Missing effects", columns, rows, words=(0, 2, 5, 6))
+    columns = ["effect", "probability", "number", "value", "std", "unit"]
+    note = "\n".join(f"{f.effect}: {catalogue()[f.effect]['summary']}" for f in findings)
+    return Table("Missing effects", columns, rows, words=(0, 2, 5), note=note)
 
 
 def _others(answer: Answer) -> Table | None:
@@ -345,4 +356,5 @@ def _dependences(answer: Answer) -> Table:
 def of_rest(answer: Answer) -> str:
     """Share of the likeliest dependence, in a sentence, and what its shares and chances are of."""
     several = f" {SEVERAL}" if len(answer.depends_on) > 1 else ""
-    return f"The first removes {percent(answer.share)}.{several} {SHARES}"
+    first = next(iter(answer.depends_on))
+    return f"What depends on {first} makes {percent(answer.share)}.{several} {SHARES}"

@@ -6,6 +6,7 @@ from nicegui import ui
 from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.parameters import catalogue, instance_of
+from twinmill.report.inference import percent
 from twinmill.workbench.bench import moves
 from twinmill.workbench.panel import PageActions, estimate, markup, scored, tone
 from twinmill.workbench.session import beside_label, effect_of
@@ -67,8 +68,8 @@ class MissingPanel:
                 _card("wrong", "{}", note)
             if found is None:
                 ui.label(
-                    "Diagnose tries every effect of the catalogue, fits each on a part of the logs "
-                    "and judges it on the rest."
+                    "Diagnose compares all effects of the catalogue, alone and together, and "
+                    "causes without a name."
                 ).classes("soft")
                 return
             self._said(found)
@@ -97,7 +98,7 @@ class MissingPanel:
             with ui.element("div").classes("head"):
                 name = REFIT_IN_WORDS if effect == REFIT else effect
                 markup("<b>{}</b>", name).style("flex: 1")
-                ui.label(finding["certainty"]).classes(f"chip {'good' if sure else 'warn'}")
+                ui.label(_chance(finding)).classes(f"chip {'good' if sure else 'warn'}")
                 self._buttons(effect)
             if effect != REFIT:
                 _told(effect)
@@ -111,7 +112,7 @@ class MissingPanel:
             ui.label(estimates).classes("soft")
             if finding["group"]:
                 self._rivals(finding["group"][1:])
-            if finding["why"]:
+            if finding.get("why"):
                 ui.label(finding["why"]).classes("warn")
 
     def _rivals(self, rivals: list[str]) -> None:
@@ -142,18 +143,21 @@ class MissingPanel:
 
     def _rest(self, found: dict) -> None:
         rest = found["rest"]
-        if found["findings"]:
+        if found["findings"] and "certainty" in rest:
             most, other = ("most likely ", " or ") if rest.get("likely") else ("", ", ")
             on = other.join(rest["depends_on"])
             words = f"Unexplained: {100 * rest['share']:.0f} %"
             words += f", depends {most}on {on}" if on and rest.get("told", True) else ""
             certainty = rest["certainty"] if rest.get("told", True) else "no more than noise"
             ui.label(f"{words}: {certainty}.").classes("soft")
+        elif rest["depends_on"]:
+            each = [f"{word} ({percent(p)})" for word, p in rest["probability"].items()]
+            ui.label(f"What is left depends on {', '.join(each)}.").classes("soft")
         for off in found["robots_off"]:
             self._robot(off)
         self._would_show(found.get("robots", []))
-        doubts = [f["why"] for f in found["findings"] if f["why"]]  # which the findings say
-        for note in found["notes"]:
+        doubts = [f["why"] for f in found["findings"] if f.get("why")]  # which the findings say
+        for note in found.get("notes", found["warnings"]):
             if any(why in note for why in doubts):
                 continue
             ui.label(note).classes("soft").style("margin-top: 6px")
@@ -200,10 +204,20 @@ class MissingPanel:
             for r in others:
                 with ui.element("div").classes("line"):
                     ui.label(r["effect"]).style("flex: 1")
-                    ui.label(f"held out {scored(r['score_heldout'])}").classes(
-                        tone(r["score_heldout"])
-                    )
+                    if "probability" in r:
+                        ui.label(percent(r["probability"]))
+                    else:
+                        ui.label(f"held out {scored(r['score_heldout'])}").classes(
+                            tone(r["score_heldout"])
+                        )
                     self._buttons(r["effect"])
+
+
+def _chance(finding: dict) -> str:
+    """How certain a finding is, with its probability where one is told."""
+    if "probability" not in finding:
+        return str(finding["certainty"])
+    return f"{finding['certainty']}, {percent(finding['probability'])}"
 
 
 def _told(effect: str) -> None:

@@ -90,4 +90,10 @@ def tone(score: float | None) -> str:
 def estimate(entry: dict) -> str:
     """A parameter as --json gives it, in the words of the reports."""
     std = float("nan") if entry["std"] is None else entry["std"]
-    return tables.estimate(ParameterEstimate(**{**entry, "std": std}))
+    told = {
+        "at_bound": False,
+        "seen": True,
+        **entry,
+        "std": std,
+    }  # by probabilities neither is told
+    return tables.estimate(ParameterEstimate(**told))

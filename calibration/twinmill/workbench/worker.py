@@ -179,7 +179,10 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     from twinmill.fitting.add import add_to_model
     from twinmill.fitting.compare import compare
     from twinmill.fitting.fit import Choice, fit_model
+    from twinmill.inference.infer import Inference, infer
+    from twinmill.inference.keeping import by_probabilities, with_its_error
     from twinmill.model.model_file import ModelFile
+    from twinmill.report.inference import sentence
 
     model = native.Model.from_toml(work.text, work.model)
     model_file = ModelFile(Path(work.model), work.text, model)
@@ -191,10 +194,15 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     if work.kind in ("diagnose", "next") and known.get("text") != work.text:
         if work.kind == "next":
             check(measurements, model_file, _limits(work.options))
-        known["diagnosis"] = diagnose(measurements, model_file, say)
+        if by_probabilities(measurements):
+            known["diagnosis"] = infer(measurements, model_file, progress=say)
+        else:
+            known["diagnosis"] = diagnose(measurements, model_file, say)
         known["text"] = work.text
     if work.kind == "diagnose":
-        return Done(work, plain(known["diagnosis"].to_json()))
+        found = known["diagnosis"]
+        said = {"sentence": sentence(found.answer)} if isinstance(found, Inference) else {}
+        return Done(work, plain({**found.to_json(), **said}))
     if work.kind == "next":
         plan = design(known["diagnosis"], model_file, _limits(work.options), say)
         return Done(work, plain(_told(plan)))
@@ -216,7 +224,8 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     else:
         choice = Choice(work.held)
         result = fit_model(measurements, model_file, path, work.command, choice=choice)
-    return Done(work, plain(result.to_json()), result.child.text)
+    say("what the model misses")
+    return Done(work, plain(result.to_json()), with_its_error(result.child, measurements).text)
 
 
 def _limits(options: Mapping[str, Any]) -> Any:

@@ -9,7 +9,6 @@ import json
 import os
 import time
 from collections.abc import Iterator, Sequence
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -41,13 +40,6 @@ if working():  # not for --help
     from twinmill_lab.challenge.robots import Robot
     from twinmill_lab.challenge.run import play, write_log
     from twinmill_lab.challenge.scoring import scored, summary
-
-
-class Judge(StrEnum):
-    """The command that an exam examines."""
-
-    DIAGNOSE = "diagnose"
-    INFER = "infer"
 
 
 DONE = "done"  # folder of the cases that are done, while others are not
@@ -87,9 +79,6 @@ def _challenge(
             "each 95 % interval covers the truth.",
         ),
     ] = None,
-    judge: Annotated[
-        Judge, typer.Option(help="Engine to test; infer also sees the log of each base.")
-    ] = Judge.DIAGNOSE,
     as_json: AsJson = False,
 ) -> dict:
     """Blind tests: simulate robots with hidden effects, diagnose their logs, and score the answers.
@@ -107,12 +96,11 @@ def _challenge(
     (out / DONE).mkdir(parents=True, exist_ok=True)
     workers = workers or os.cpu_count() or 1
     command = f"twinmill lab challenge --n {count} --seed {seed} --duration-s {duration_s:g}"
-    command += "" if judge == Judge.DIAGNOSE else f" --judge {judge}"
     how = {"seed": seed, "duration_s": duration_s, "workers": workers, "as_json": as_json}
     with alone_in(out):
         if intervals:
             return _intervals(out, intervals, command=f"{command} --intervals {intervals}", **how)
-        return _exam(out, count, command=command, judge=judge, **how)
+        return _exam(out, count, command=command, **how)
 
 
 def _exam(
@@ -120,7 +108,6 @@ def _exam(
     count: int,
     *,
     command: str,
-    judge: Judge,
     seed: int,
     duration_s: float,
     workers: int,
@@ -133,10 +120,10 @@ def _exam(
     digest = hashlib.sha256(answers.encode()).hexdigest()
     PlainConsole(stderr=True).print(f"sealed answers: sha256 {digest}", soft_wrap=True)
     driven = sorted({case.robot for case in cases})
-    how = {"duration_s": duration_s, "judge": judge}
-    bases = {k: base_of(out, k, robots[k], seed, **how) for k in driven}
+    how = {"seed": seed, "duration_s": duration_s}
+    bases = {k: base_of(out, k, robots[k], **how) for k in driven}
     results, times_s = {}, {}
-    for number, result, time_s in _all(bases, cases, workers, judge):
+    for number, result, time_s in _all(bases, cases, workers):
         results[number], times_s[number] = result, time_s
     ordered = [results[case.number] for case in cases]
     found = {"command": command, "seed": seed, "duration_s": duration_s}
@@ -146,31 +133,20 @@ def _exam(
     write_whole(out / "times.json", json.dumps([times_s[case.number] for case in cases]))
     report = page.write(out, found, list(times_s.values()))
     shutil.rmtree(out / DONE)
-    for log in out.glob("calibration_*.lcmlog"):
-        log.unlink()
     shown = page.shown(found, list(times_s.values()))
     deliver(found, Group(shown, Text(f"Report: {report}")), as_json)
     return found
 
 
-def base_of(
-    folder: Path,
-    number: int,
-    robot: Robot,
-    seed: int,
-    *,
-    duration_s: float,
-    judge: Judge = Judge.DIAGNOSE,
-) -> Path:
-    """The model that a user of the robot has: its sheet, then by turns a fit or an explanation.
+def base_of(folder: Path, number: int, robot: Robot, *, seed: int, duration_s: float) -> Path:
+    """The model that a user of the robot has: its sheet, fitted to a log.
 
     Args:
-        folder: where the model goes, and for `infer` the log that it is fitted to.
-        number: of the robot; those of odd numbers are explained, but for `infer`.
+        folder: where the model goes.
+        number: of the robot.
         robot: who drives.
         seed: of the calibration log.
         duration_s: of that log.
-        judge: what is examined.
     """
     log, sheet = folder / f"calibration_{number}.lcmlog", folder / f"sheet_{number}.toml"
     base = folder / f"base_{number}.toml"
@@ -179,24 +155,20 @@ def base_of(
     plan = calibration(robot, seed, duration_s)
     write_log(plan, play(plan, forces=True), log)
     write_whole(sheet, robot.sheet(np.random.default_rng([seed, 3, number])))
-    how = "explain" if number % 2 and judge == Judge.DIAGNOSE else "fit"
     with contextlib.redirect_stdout(io.StringIO()):
-        code = run([how, str(log), "--model", str(sheet), "-o", str(base), "--json"])
-    if judge == Judge.DIAGNOSE:
-        log.unlink()
+        code = run(["fit", str(log), "--model", str(sheet), "-o", str(base), "--json"])
+    log.unlink()
     if code == STOPPED:
-        base.unlink(missing_ok=True)  # of half an explanation
         raise KeyboardInterrupt
     return base
 
 
-def diagnosed(base: Path, case: Case, judge: Judge = Judge.DIAGNOSE) -> tuple[dict, float]:
+def diagnosed(base: Path, case: Case) -> tuple[dict, float]:
     """Makes the log of a case, diagnoses it, and only then looks at the answer.
 
     Args:
         base: model of the robot; the log is made beside it, and removed.
         case: sealed.
-        judge: what diagnoses.
 
     Returns:
         The score of the case, and how many seconds the diagnosis took.
@@ -204,11 +176,7 @@ def diagnosed(base: Path, case: Case, judge: Judge = Judge.DIAGNOSE) -> tuple[di
     log = base.parent / f"case{case.number:03d}.lcmlog"
     make_log(case, log)
     started = time.monotonic()
-    if judge == Judge.INFER:
-        own = base.parent / f"calibration_{case.robot}.lcmlog"
-        found = tm.infer(log, tm.Model.load(base), own=own).to_json()
-    else:
-        found = tm.diagnose(log, tm.Model.load(base)).to_json()
+    found = tm.diagnose(log, tm.Model.load(base)).to_json()
     time_s = time.monotonic() - started
     log.unlink()
     return scored(case, found), time_s
@@ -258,10 +226,10 @@ def _fitted(folder: Path, number: int, seed: int, duration_s: float) -> tuple[in
 
 
 def _all(
-    bases: dict[int, Path], cases: Sequence[Case], workers: int, judge: Judge
+    bases: dict[int, Path], cases: Sequence[Case], workers: int
 ) -> Iterator[tuple[int, dict, float]]:
     """Every case as it is done: number, result, time."""
-    calls = [(_one, bases[case.robot], case, judge) for case in cases]
+    calls = [(_one, bases[case.robot], case) for case in cases]
     yield from _done(calls, "diagnosing", workers)
 
 
@@ -285,13 +253,13 @@ def _done(calls: Sequence[tuple], what: str, workers: int) -> Iterator:
         pool.shutdown(cancel_futures=True)
 
 
-def _one(base: Path, case: Case, judge: Judge) -> tuple[int, dict, float]:
+def _one(base: Path, case: Case) -> tuple[int, dict, float]:
     """A case, or what a challenge that was stopped found for the same case and base model."""
-    asked = [__version__, case.to_json(), case.plan.seed, base.read_text(), judge]
+    asked = [__version__, case.to_json(), case.plan.seed, base.read_text()]
     name = hashlib.sha256(json.dumps(asked).encode()).hexdigest()
     kept = base.parent / DONE / f"{name}.json"
     if kept.exists():
         return case.number, *json.loads(kept.read_text())
-    result, time_s = diagnosed(base, case, judge)
+    result, time_s = diagnosed(base, case)
     write_whole(kept, json.dumps([result, time_s]))
     return case.number, result, time_s

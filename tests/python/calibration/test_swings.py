@@ -6,6 +6,7 @@ The oscillators are exact filters of SciPy, of a frequency and a damping that th
 
 import io
 import json
+import re
 import subprocess
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -15,6 +16,8 @@ import pytest
 from scipy.signal import cont2discrete, lfilter
 
 from twinmill.data.measurement import load_measurements
+from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.explain import explain
 from twinmill.fitting.compare import compare
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_names
@@ -76,9 +79,9 @@ def log(overshooting, run_log) -> Path:
 
 @pytest.fixture(scope="module")
 def explained(log, one_clock_base, tmp_path_factory) -> dict:
-    """JSON of `explain` for that drive."""
+    """JSON of an explanation of that drive, as several robots are explained."""
     out = tmp_path_factory.mktemp("explained") / "swings.toml"
-    return said_by(["explain", str(log), "--model", str(one_clock_base.path), "-o", str(out)])
+    return explain(load_measurements([log]), one_clock_base, out=out, command="").to_json()
 
 
 def constants(numbers: list[dict]) -> list[dict]:
@@ -94,6 +97,21 @@ def test_an_overshoot_is_proven_with_its_frequency_and_damping(explained):
     rate, damping = (n["value"] for n in constants(proven["numbers"]))
     assert rate == pytest.approx(2 * np.pi * HZ, rel=0.03)
     assert damping == pytest.approx(DAMPING, rel=0.2)
+
+
+def test_by_probabilities_it_is_an_oscillator_of_that_frequency(
+    log, overshooting, run_log, one_clock_base, tmp_path
+):
+    """The frequency is one of a grid, of which each is a seventh more than the last."""
+    out = tmp_path / "swings.toml"
+    words = ["explain", str(log), "--model", str(one_clock_base.path), "-o", str(out)]
+    proven = said_by(words)["rest"]["proven"]
+    assert proven["equation"]["adds_to"] == "rim_mps" and proven["equation"]["state_rate"] == "r"
+    (rate,) = {float(n) for n in re.findall(r"([\d.]+)\*\1\*", proven["equation"]["second_rate"])}
+    assert rate == pytest.approx(2 * np.pi * HZ, rel=1 / 7)
+    other = [load_measurements([run_log(overshooting(), 77, 60.0)])[0]]
+    with_it = compare(other, ModelFile.load(str(out))).score
+    assert with_it < 1.3 < 2 < compare(other, one_clock_base).score
 
 
 def test_explain_tunes_it_by_the_plant(explained):
@@ -133,7 +151,7 @@ def test_its_model_moves_on_both_plants(explained, tmp_path):
 
 def test_a_marker_that_sways_is_told_from_the_robot(swaying, run_log, one_clock_base):
     log = run_log(swaying(), 102, 60.0)
-    proven = said_by(["diagnose", str(log), "--model", str(one_clock_base.path)])["rest"]["proven"]
+    proven = diagnose(load_measurements([log]), one_clock_base).to_json()["rest"]["proven"]
     assert proven["equation"]["adds_to"] == "room_mps" and "sways" in proven["like"]
     rate, damping = (n["value"] for n in constants(proven["numbers"]))
     assert rate == pytest.approx(2 * np.pi * HZ, rel=0.03) and damping < 0.1

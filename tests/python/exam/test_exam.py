@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thirty sealed cases in every check: what was answered rightly must stay so.
+"""Eighteen sealed cases in every check, three of each robot: what was answered rightly stays so.
 
 Right is said by what was hidden, not by an earlier answer: `twinmill lab challenge` draws the
 robots, plays them by formulas of its own, by forces, or on free rollers, and scores. LOST are the
@@ -12,11 +12,11 @@ import warnings
 import pytest
 
 from twinmill_lab.challenge.cases import draw, draw_robots
-from twinmill_lab.challenge.command import Judge, base_of, diagnosed
+from twinmill_lab.challenge.command import base_of, diagnosed
 from twinmill_lab.challenge.scoring import lost
 
-SEED, SECONDS, CASES = 1, 45, 30
-LOST = {2, 14, 15}
+SEED, SECONDS, CASES = 1, 45, 18
+LOST = {2, 6, 13, 16}
 
 
 @pytest.fixture(scope="module")
@@ -25,31 +25,20 @@ def results(tmp_path_factory) -> list[dict]:
     found = []
     for number in range(CASES):
         case = draw(number, SEED, robots, SECONDS)
-        base = base_of(folder, case.robot, robots[case.robot], SEED, duration_s=SECONDS)
+        how = {"seed": SEED, "duration_s": SECONDS}
+        base = base_of(folder, case.robot, robots[case.robot], **how)
         found.append(diagnosed(base, case)[0])
     return found
 
 
-@pytest.fixture(scope="module")
-def inferred(tmp_path_factory) -> list[dict]:
-    """The first case of each robot, by probabilities."""
-    folder, robots = tmp_path_factory.mktemp("inferred"), draw_robots(SEED)
-    found = []
-    for number in range(len(robots)):
-        case, how = draw(number, SEED, robots, SECONDS), {"judge": Judge.INFER}
-        base = base_of(folder, case.robot, robots[case.robot], SEED, duration_s=SECONDS, **how)
-        found.append(diagnosed(base, case, **how)[0])
-    return found
+def test_what_is_called_sure_is_there(results):
+    assert not [r["case"] for r in results if r["outcome"]["wrong_and_sure"]]
 
 
-def test_what_inference_calls_sure_is_there(inferred):
-    assert not [r["case"] for r in inferred if r["outcome"]["wrong_and_sure"]]
-
-
-def test_inference_names_most_single_effects_first(inferred):
-    """At least half of the effects, as one may be lost in half the usual length."""
-    single = [r["outcome"]["first"] for r in inferred if r["kind"] in ("one", "cousin")]
-    assert sum(single) >= len(single) - 1
+def test_most_single_effects_are_named_first(results):
+    """In half the usual length."""
+    single = [r["outcome"]["first"] for r in results if r["kind"] in ("one", "cousin")]
+    assert sum(single) >= 0.8 * len(single)
 
 
 def test_what_was_answered_stays_so(results):
