@@ -75,9 +75,9 @@ def _diagnose(
 
     Example: twinmill diagnose run.lcmlog --model fitted.toml
 
-    With the log that the model was fitted to, or a model that keeps what it
-    misses there, each effect has a probability:
-    twinmill diagnose run.lcmlog --model fitted.toml --own calibration.lcmlog
+    Of one robot each effect has a probability. Several robots are compared with
+    each other. A model that does not keep what it misses in its own log, as those
+    of `fit` do, needs that log: --own calibration.lcmlog
 
     Of a robot that MuJoCo can load:
     twinmill diagnose run.csv --model arm.xml
@@ -275,11 +275,10 @@ def _explain(
     as_json: AsJson = False,
     out: Out = None,
 ) -> Explanation | JointExplanation | list[Inference]:
-    """Diagnose, add the effects found, and write the new model; cross-validated at each step.
+    """Diagnose, add the effects found, and write the new model.
 
-    If an error remains that no effect explains, and a formula for it was
-    validated on data used neither to choose nor to fit it, the formula is added
-    last, if that lowers the held-out error.
+    If an error remains that no effect explains, and a formula for it holds, the
+    formula is added, too. Of several robots and tables each step is cross-validated.
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 

@@ -126,7 +126,7 @@ COMMANDS = (
     (
         "explain",
         "diagnose",
-        "Diagnose, add the effects found, and write the new model; cross-validated at each step.",
+        "Diagnose, add the effects found, and write the new model.",
     ),
     (
         "next",

@@ -108,9 +108,10 @@ def _next(
 ) -> Plan | Narrowing | Excitation:
     """Design the run that best discriminates what these logs cannot, and write its script.
 
-    In question are the effects that `diagnose` cannot distinguish, else those
-    that are not identifiable in these logs. Play the script, record it, and
-    diagnose the old and the new logs together.
+    In question are the effects that `diagnose` neither calls sure nor rules out;
+    of several robots those that it cannot distinguish, else those that are not
+    identifiable in these logs. Play the script, record it, and diagnose the old
+    and the new logs together.
 
     With --for the run reduces the uncertainty of a swarm's predicted success:
     models drawn from the uncertainty of the fits are run as swarms, and the
@@ -118,8 +119,7 @@ def _next(
 
     Example: twinmill next run.lcmlog --model fitted.toml -o script.csv
 
-    With --own, the log that the model was fitted to, all effects are in question
-    that are neither sure nor ruled out. Of an MJCF:
+    Of an MJCF:
     twinmill next run.mcap --model arm.xml -o excitation.csv
     """
     if is_mjcf(model):
