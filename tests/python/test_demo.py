@@ -30,9 +30,9 @@ def explained(*found, groups=None, coasting=0.7, std=0.05):
         for name, value in values.items()
         if name.split(".")[0] in found
     ]
-    findings = [SimpleNamespace(effect=e, group=groups.get(e)) for e in found]
-    diagnosis = SimpleNamespace(found=list(found), findings=findings)
-    return SimpleNamespace(diagnosis=diagnosis, parameters=parameters)
+    findings = [SimpleNamespace(effect=e, group=groups.get(e, ())) for e in found]
+    told = SimpleNamespace(answer=SimpleNamespace(findings=findings))
+    return SimpleNamespace(added=found, found=told, estimates=parameters)
 
 
 def test_both_and_nothing_else_is_right():

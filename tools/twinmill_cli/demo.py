@@ -28,14 +28,14 @@ if working():  # not for --help
     from matplotlib.axes import Axes
     from rich.text import Text
 
-    from twinmill.diagnosis.explain import Explanation
     from twinmill.experiment.rich_script import write_rich_script
     from twinmill.extras import command
+    from twinmill.inference.better import Better
     from twinmill.model.model_file import ModelFile
-    from twinmill.model.parameters import ParameterEstimate
+    from twinmill.model.parameters import ParameterEstimate, catalogue_name
     from twinmill.programs import find_program
     from twinmill.report import Figure, Section, show, write_report
-    from twinmill.report import diagnosis as present
+    from twinmill.report import inference as present
     from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
     from twinmill.report.tables import Cell, Table, Tone, number, tone
     from twinmill.terminal import PlainConsole
@@ -112,7 +112,7 @@ def _demo(
     _simulate(*robot, "--seed", str(seed), "--log", LOG)
     _say("How large are the prediction errors of the model as given?")
     _twinmill("compare", LOG, "--model", GIVEN)
-    _say("Which effects are missing? Only what lowers the held-out error is kept")
+    _say("Which effects are missing, and how probable is each?")
     result = _twinmill("explain", LOG, "--model", GIVEN, "-o", FOUND)
     _say("The sealed answer")
     if _digest() != digest:
@@ -127,7 +127,7 @@ def _demo(
         FOLDER / "report",
         page.title,
         provenance(f"twinmill demo --seed {seed}", ModelFile.load(GIVEN)),
-        [page, present.section(result.diagnosis)],
+        [page, present.section([result.found], written=result)],
     )
     print(f"\nReport: {report.resolve()}")
     program = _as_typed(Path(sys.argv[0]))
@@ -179,15 +179,16 @@ def _unsealed() -> list[Hidden]:
     ]
 
 
-def judged(hidden: list[Hidden], result: Explanation) -> tuple[str, str]:
+def judged(hidden: list[Hidden], result: Better) -> tuple[str, str]:
     """The answer in a word (`right`, `in part` or `wrong`), and in sentences."""
     names = {h.effect for h in hidden}
-    sure = [e for e in result.diagnosis.found if e in names]
-    groups = {f.effect: set(f.group or ()) for f in result.diagnosis.findings}
-    meant = {e: groups.get(e, set()) & names - set(sure) for e in result.diagnosis.found}
+    named = list(map(catalogue_name, result.added))
+    sure = [e for e in named if e in names]
+    groups = {f.effect: set(f.group) for f in result.found.answer.findings}
+    meant = {e: groups.get(e, set()) & names - set(sure) for e in named}
     among = {hidden: e for e, found in meant.items() for hidden in found if e not in names}
     missed = [h.effect for h in hidden if h.effect not in (*sure, *among)]
-    wrong = [e for e in result.diagnosis.found if e not in names and not meant[e]]
+    wrong = [e for e in named if e not in names and not meant[e]]
     if not (missed or wrong or among):
         told = f"Right: {' and '.join(sure)} were hidden, both were found, and nothing else."
         return "right", f"{told} {_sizes(hidden, result)}"
@@ -203,21 +204,21 @@ def judged(hidden: list[Hidden], result: Explanation) -> tuple[str, str]:
     return grade, f"{start}: {'; '.join(words)}."
 
 
-def _sizes(hidden: list[Hidden], result: Explanation) -> str:
+def _sizes(hidden: list[Hidden], result: Better) -> str:
     held = [h for h in hidden if _holds(_estimate(h, result), h)]
     count = {0: "Neither size", 1: "One of the two sizes", 2: "Both sizes"}[len(held)]
     return f"{count} lie{'' if len(held) == 2 else 's'} within the estimated 95 % interval."
 
 
-def _estimate(hidden: Hidden, result: Explanation) -> ParameterEstimate | None:
-    return next((e for e in result.parameters if e.name == hidden.name), None)
+def _estimate(hidden: Hidden, result: Better) -> ParameterEstimate | None:
+    return next((e for e in result.estimates if e.name == hidden.name), None)
 
 
 def _holds(estimate: ParameterEstimate | None, hidden: Hidden) -> bool:
     return estimate is not None and abs(estimate.value - hidden.value) <= WITHIN_95 * estimate.std
 
 
-def _table(hidden: list[Hidden], result: Explanation) -> Table:
+def _table(hidden: list[Hidden], result: Better) -> Table:
     """Hidden beside found."""
     rows = []
     for h in hidden:
@@ -229,8 +230,8 @@ def _table(hidden: list[Hidden], result: Explanation) -> Table:
     )
 
 
-def _section(hidden: list[Hidden], result: Explanation, words: str, grade: str) -> Section:
-    before, after = result.diagnosis.before.score, result.after.score
+def _section(hidden: list[Hidden], result: Better, words: str, grade: str) -> Section:
+    before, after = result.before.score, result.after.score
     return Section(
         "A blind test",
         [
@@ -244,7 +245,7 @@ def _section(hidden: list[Hidden], result: Explanation, words: str, grade: str) 
     )
 
 
-def _answer_figure(hidden: list[Hidden], result: Explanation) -> Figure:
+def _answer_figure(hidden: list[Hidden], result: Better) -> Figure:
     """Ratio of the found size to the sealed one."""
 
     def paint(axes: Axes) -> None:

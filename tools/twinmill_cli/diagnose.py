@@ -46,6 +46,7 @@ if working():  # not for --help
     )
 if TYPE_CHECKING:
     from twinmill.diagnosis.explain import Explanation
+    from twinmill.inference.better import Better
     from twinmill.inference.infer import Inference
     from twinmill.joints.diagnose import JointDiagnosis
     from twinmill.joints.explain import JointExplanation
@@ -67,7 +68,7 @@ def _diagnose(
     own: Own = None,
     as_json: AsJson = False,
     out: Out = None,
-) -> Diagnosis | JointDiagnosis | list[Inference]:
+) -> Diagnosis | JointDiagnosis | list[Inference] | Better:
     """Name the physical effect that a model lacks, or say that none is missing or identifiable.
 
     Works best with a model whose base was fitted to another log of the same robot
@@ -274,7 +275,7 @@ def _explain(
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
-) -> Explanation | JointExplanation | list[Inference]:
+) -> Explanation | JointExplanation | list[Inference] | Better:
     """Diagnose, add the effects found, and write the new model.
 
     If an error remains that no effect explains, and a formula for it holds, the

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -37,6 +37,8 @@ if working():  # not for --help
         told,
         with_own,
     )
+if TYPE_CHECKING:
+    from twinmill.inference.better import Better
 
 
 def register(app: typer.Typer) -> None:
@@ -80,7 +82,7 @@ def _infer(
     force: Force = False,
     as_json: AsJson = False,
     out: Out = None,
-) -> list[Inference]:
+) -> list[Inference] | Better:
     """Posterior probability of each effect that a model may lack, and of an unknown cause.
 
     Effects of the catalogue, dependences without a name (on time, place, heading,
@@ -116,7 +118,7 @@ def inferred(
     force: bool = False,
     as_json: bool,
     out: Path | None,
-) -> list[Inference]:
+) -> list[Inference] | Better:
     """Tells what is missing with its probability, and writes the models that are asked for.
 
     Args:
@@ -129,6 +131,9 @@ def inferred(
         force: replaces what is there.
         as_json: one JSON object in the place of tables.
         out: folder of a report.
+
+    Returns:
+        The answer on each robot; of a model that is written, that model with its answer.
 
     Raises:
         ValueError: files or options do not fit together.
@@ -184,7 +189,7 @@ def inferred(
         as_json=as_json,
         out=out,
     )
-    return results
+    return written or results
 
 
 def _mending(result: Inference, verb: str, given: Given) -> list[tuple[str, str]]:

@@ -21,7 +21,14 @@ from twinmill.inference.infer import Inference
 from twinmill.inference.keeping import with_its_error
 from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.model.parameters import CLOCK, CLOCK_RATE, catalogue_name, instance_of, with_role
+from twinmill.model.parameters import (
+    CLOCK,
+    CLOCK_RATE,
+    ParameterEstimate,
+    catalogue_name,
+    instance_of,
+    with_role,
+)
 
 
 @dataclass(frozen=True)
@@ -32,12 +39,16 @@ class Better:
         file: of it, with what it still misses in these logs as [fit.always].
         added: instances of effects that the given model does not have.
         before, after: comparison of the two models with the logs.
+        found: what was missing in the given one.
+        estimates: of the new model's quantities.
     """
 
     file: ModelFile
     added: tuple[str, ...]
     before: Comparison
     after: Comparison
+    found: Inference
+    estimates: list[ParameterEstimate]
 
     def to_json(self) -> dict[str, Any]:
         """Fields of `twinmill lab infer --output --json`."""
@@ -71,7 +82,8 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
     child = child_of(model_file, fitted, path, command)
     after = comparison(child, open_measurements(found.measurements, child))
     child = child_of(model_file, replace(fitted, score_after=after.score), path, command)
-    return Better(with_its_error(child, found.measurements), added, found.before, after)
+    kept = with_its_error(child, found.measurements)
+    return Better(kept, added, found.before, after, found, fitted.estimates)
 
 
 def _fitted(
