@@ -327,14 +327,13 @@ def _effects(findings: list[Named]) -> Table:
                     Cell("" if k else f.effect),
                     Cell("" if k else percent(f.probability), bar=None if k else f.probability),
                     Cell(name),
-                    Cell(number(value)),
-                    Cell(f"± {number(std, 2)}"),
+                    Cell(f"{number(value)} ± {number(std, 2)}"),
                     Cell(of_unit(units_of(f.effect).get(name, ""))),
                 ]
             )
-    columns = ["effect", "probability", "number", "value", "std", "unit"]
+    columns = ["effect", "probability", "number", "value ± std", "unit"]
     note = "\n".join(f"{f.effect}: {catalogue()[f.effect]['summary']}" for f in findings)
-    return Table("Missing effects", columns, rows, words=(0, 2, 5), note=note)
+    return Table("Missing effects", columns, rows, words=(0, 2, 4), note=note)
 
 
 def _others(answer: Answer) -> Table | None:
