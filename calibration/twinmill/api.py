@@ -215,8 +215,9 @@ class Log(Shown):
                 measured. Rows with NaN are lost poses.
             commands_t_s: (M,) times of the commands, likewise; each is held until the next.
             commands: (M, K) by `kind`. `twist`: vx_mps, vy_mps, omega_radps, or vx_mps,
-                omega_radps. `duty`: percent, and `wheel_speed`: rad/s, of each driven wheel in the
-                model's order. `steering`: vx_mps, steering_rad.
+                omega_radps. `duty`: percent, and `wheel_speed`: rad/s: two columns are left and
+                right (of every axle), three are omni wheels, four are front left, front right,
+                rear left, rear right. `steering`: vx_mps, steering_rad.
             kind: of the commands.
             same_clock: one clock stamped poses and commands; False: their offset is fitted.
             robot_id: 0 to 99.
@@ -252,13 +253,19 @@ class Log(Shown):
         wheelbase_m: float | None = None,
         name: str = "frames",
     ) -> "Log":
-        """Makes a log from two data frames of pandas or polars, or dictionaries of arrays.
+        """Makes a log from data frames of pandas or polars, datasets of xarray, or dictionaries.
+
+        Columns in another unit that their names tell are converted: theta_deg, x_mm, t_ms. Others
+        than those below are ignored.
 
         Args:
-            poses: columns t_s, x_m, y_m, and theta_rad where headings were measured; robot_id
-                where there are several robots; rows where `valid` is false are lost poses.
+            poses: columns t_s (s, or dates), x_m, y_m, and theta_rad, or qw, qx, qy, qz, where
+                headings were measured; robot_id where there are several robots; rows where `valid`
+                is false, or with NaN, are lost poses.
             commands: columns t_s and one group: vx_mps, vy_mps, omega_radps; fl_pct, fr_pct,
-                rl_pct, rr_pct; w1_radps to w4_radps; or vx_mps, steering_rad; robot_id as in poses.
+                rl_pct, rr_pct; left_pct, right_pct (or left_pwm ...); w1_radps to w4_radps, the
+                first three of omni wheels, left_radps, right_radps (or w1_radps, w2_radps) of two;
+                or vx_mps, steering_rad; robot_id as in poses.
             kind: which group; by default the one that is there.
             same_clock: one clock stamped poses and commands; False: their offset is fitted.
             robot_id: of frames that do not say.
@@ -1052,8 +1059,8 @@ class Fit(Reported):
         """Standard errors by name: half a 95 % interval over 1.96.
 
         From the jackknife over blocks of 8 s, widened by Student's t where blocks are few, and by
-        the influence of the priors. All tables, files and intervals have these. NaN for what was
-        held: nothing was estimated.
+        the influence of the usual priors; never above the deviation of a prior in `priors`. All
+        tables, files and intervals have these. NaN for what was held: nothing was estimated.
 
         Examples:
             >>> bool((fitted.stderr**2 - np.diag(fitted.covariance())).abs().max() < 1e-12)
@@ -1143,15 +1150,15 @@ class Fit(Reported):
             name, value, std (half a 95 % interval over 1.96; NaN where held), unit, at_bound, seen
             (false where the log does not determine the quantity, only its prior), together
             (determined in combination with others, not alone), words (what it is, where the name
-            does not say so), held.
+            does not say so), prior (true where one was given in `priors`), held.
 
         Examples:
             >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
             's'
         """
         rows = [{**e.to_json(), "held": False} for e in self._result.parameters]
-        kept = {"std": np.nan, "at_bound": False, "seen": False, "together": False, "held": True}
-        rows += [{**h.to_json(), **kept, "words": h.words} for h in self._result.held]
+        kept = {"std": np.nan, "at_bound": False, "seen": False, "together": False, "prior": False}
+        rows += [{**h.to_json(), **kept, "words": h.words, "held": True} for h in self._result.held]
         return pd.DataFrame(rows)
 
     def plot(self) -> Figure:
@@ -1646,8 +1653,8 @@ def fit(
         model: start of the fit; a model, or the name of one; None is TurboPi's.
         hold: names of parameters that keep their values, free by default or not.
         free: names of the only free parameters, of base, robot or effects; None: the default.
-        priors: mean and standard deviation of normal priors by name, in place of the usual ones,
-            which are wide and about the model's value.
+        priors: mean and standard deviation of normal priors by name, of what is fitted, in place
+            of the usual ones, which are wide and about the model's value.
         settings: convergence criteria.
 
     Returns:
@@ -1655,14 +1662,15 @@ def fit(
 
     Raises:
         LogError: the log cannot be used; one sentence.
-        ModelError: the model cannot be read, has no such quantity, or a prior cannot be.
+        ModelError: the model cannot be read, has no such quantity, one is free and held, or a
+            prior cannot be or is of what is not fitted.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
         >>> fitted.score <= fitted.before.score
         True
         >>> list(fitted.table().columns)
-        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words', 'held']
+        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words', 'prior', 'held']
         >>> gains = ["base.forward_gain", "base.yaw_gain"]
         >>> tm.fit("run.lcmlog", "turbopi.toml", free=gains).stderr.dropna().index.tolist()
         ['base.yaw_gain', 'base.forward_gain']

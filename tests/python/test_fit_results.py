@@ -79,6 +79,30 @@ def test_a_prior_pulls_as_scipy_says(sheet):
     assert 0.8 < best.x < 0.92  # it does pull
 
 
+@pytest.mark.parametrize("deviation", [1e-4, 1e-3, 0.01, 0.1])
+def test_a_posterior_is_as_wide_as_the_conjugate_normal_is(sheet, deviation):
+    """Gelman et al. 2013, eq. 2.12: precisions add, where the prior is about what the data tell."""
+    _, _, log, model = sheet
+    alone = tm.fit(log, model, free=[GAIN], priors={GAIN: (1.0, 100.0)}, settings=EXACT)
+    prior = {GAIN: (float(alone.params[GAIN]), deviation)}
+    fitted = tm.fit(log, model, free=[GAIN], priors=prior, settings=EXACT)
+    width = 1 / np.hypot(1 / deviation, 1 / alone.stderr[GAIN])
+    assert fitted.stderr[GAIN] == pytest.approx(width, rel=0.1)
+    assert fitted.stderr[GAIN] <= deviation
+    assert ("from the prior" in str(fitted)) == (deviation < alone.stderr[GAIN])
+    assert "not determined" not in str(fitted)
+
+
+def test_a_prior_that_contradicts_the_data_is_no_less_sure_than_it_says(sheet):
+    """A posterior is no wider than its normal prior, wherever the data are."""
+    _, _, log, model = sheet
+    fitted = tm.fit(log, model, free=[GAIN], priors={GAIN: (0.8, 0.001)}, settings=EXACT)
+    lower, upper = fitted.conf_int().loc[GAIN]
+    assert fitted.stderr[GAIN] <= 0.001 and (upper - lower) / 2 <= 1.96 * 0.0010001
+    (told,) = fitted.to_json()["parameters"]
+    assert told["std"] == fitted.stderr[GAIN] == np.sqrt(fitted.covariance().iloc[0, 0])
+
+
 def unicycle(gains: tuple[float, float], seed: int) -> tm.Log:
     """A robot whose motion is algebra: arcs at its gains times what it is told, 1 mm of noise."""
     rng = np.random.default_rng(seed)
@@ -170,6 +194,13 @@ def test_what_is_held_keeps_its_value_fitted_or_not(arcs):
         tm.fit(log, model, priors={GAIN: (1.0, 0.0)})
     with pytest.raises(TypeError, match=r"prior of base\.forward_gain: is 1"):
         tm.fit(log, model, priors={GAIN: 1})
+    with pytest.raises(tm.ModelError, match=r"half_track_m: has a prior and is not fitted; name"):
+        tm.fit(log, model, priors={"robot.half_track_m": (0.08, 0.001)})
+    with pytest.raises(tm.ModelError, match=r"yaw_gain: has a prior and is held"):
+        tm.fit(log, model, priors={"base.yaw_gain": (1, 0.1)}, hold=["base.yaw_gain"])
+    for hold in ("base.yaw_gain", "base"):
+        with pytest.raises(tm.ModelError, match=r"yaw_gain: is in `free` and is held"):
+            tm.fit(log, model, free=["base.yaw_gain"], hold=[hold])
     with pytest.raises(tm.ModelError, match="moves nothing"):
         tm.fit(log, model, free=["sensor.range_m"])
 

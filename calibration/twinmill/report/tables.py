@@ -269,10 +269,12 @@ def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) ->
     """Fitted quantities with their uncertainty, then those that were held."""
     rows = []
     for e in estimates:
-        told = e.seen or e.together
+        told = e.told or e.prior
         doubt = "" if e.seen else "known only in combination"
-        if e.at_bound or not told:
-            doubt = "at its bound" if e.at_bound else "not determined by this log"
+        if not e.told:
+            doubt = "from the prior" if e.prior else "not determined by this log"
+        if e.at_bound:
+            doubt = "at its bound"
         remark = "; ".join(words for words in (e.words, doubt) if words)
         value, std = (
             (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")
