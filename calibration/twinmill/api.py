@@ -98,6 +98,7 @@ from twinmill.results import (
     RunComparison,
     SwarmComparison,
     errors_drawn,
+    residuals_table,
 )
 from twinmill.runs.compare import compare_runs as _compare_runs
 from twinmill.runs.compare import of_robot
@@ -115,6 +116,7 @@ Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 LONGEST_RUN_S = 600.0
 LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
+SPREADS = ("idiosyncrasy.theta_a1_std", "idiosyncrasy.theta_a2_std")  # of robots' gains
 NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
@@ -1106,18 +1108,16 @@ class Fit(Reported):
         return pd.DataFrame({"lower": self.params - half, "upper": self.params + half})
 
     def residuals(self) -> pd.DataFrame:
-        """Measured less predicted, of the fitted model.
+        """Each prediction of the fitted model beside what was measured.
 
         Returns:
-            log, robot_id, t_s (start of the prediction), horizon_s, channel, unit, residual and
-            floor (the noise floor, one standard deviation; both in the unit).
+            As of `Comparison.residuals`.
 
         Examples:
             >>> fitted.residuals()["channel"].unique().tolist()
             ['forward', 'left', 'heading']
         """
-        told = self._result.statistics.residuals
-        return pd.concat([pd.DataFrame(r.columns()) for r in told], ignore_index=True)
+        return residuals_table(self._result.statistics.residuals)
 
     def summary(self) -> str:
         """Estimates with errors and intervals, as text.
@@ -2022,8 +2022,14 @@ def simulate(
     plant: str = "planar",
     seed: int = 1,
     script: str | Path | NextRun | None = None,
+    alike: bool = False,
 ) -> Log:
     """Simulates robots in the twin.
+
+    As real robots of a kind, they differ from the model and from each other: gains of speed and of
+    turning are drawn for each with the spread in the model's `[idiosyncrasy]`, 4 % of TurboPi's. So
+    a log's own model may be stale by that much for its robots; with `alike=True` it is right for
+    all of them.
 
     Args:
         model: a model, or the name of one; None is TurboPi's.
@@ -2034,6 +2040,7 @@ def simulate(
         seed: the same seed gives the same log.
         script: CSV of inputs or duties that all play instead of a behaviour, or a run that
             `next_run` designed.
+        alike: all robots have the model's own gains, but for what it states of single ones.
 
     Returns:
         A log like a robot's own, in memory; `Log.save` writes it.
@@ -2048,15 +2055,20 @@ def simulate(
         [0, 1, 2]
         >>> swarm.metrics().shape[0] > 0
         True
+        >>> made = tm.simulate("turbopi.toml", n=1, duration_s=60, alike=True)
+        >>> tm.compare(made, "turbopi.toml").score < 1.3
+        True
     """
     checked("n", n, Integral, "a whole number")
     checked("behavior", behavior, str, "the name of a behaviour, or a mix of them")
     checked("duration_s", duration_s, Real, "a number of seconds")
     checked("plant", plant, str, "`planar` or `mujoco`")
     checked("seed", seed, Integral, "a whole number")
+    checked("alike", alike, *SWITCH)
     if not isinstance(script, NextRun | None):
         script = path_of("script", script, "the path of a CSV file, or a designed run").resolve()
-    file = _model(model).file
+    model = _model(model)
+    file = (model.set(dict.fromkeys(SPREADS, 0.0)) if alike else model).file
     options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s]
     with TemporaryDirectory(prefix="twinmill.") as folder:
         place = Path(folder)

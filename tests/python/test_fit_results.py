@@ -136,6 +136,24 @@ def test_gains_of_a_path_that_is_algebra_are_found_within_their_errors(arcs):
     assert ahead.std() == pytest.approx(np.sqrt(2) * 1e-3, rel=0.15)
 
 
+def test_predictions_stand_beside_what_was_measured(arcs):
+    """Arcs by algebra: at v and w the way forward in t is v t sinc(w t / pi), the turn is w t."""
+    fitted, log, model = arcs
+    poses = log.table().set_index("t_s")[["x_m", "y_m", "theta_rad"]]
+    for rows in (fitted.residuals(), tm.compare(log, model).residuals()):
+        assert len(rows) > 2000
+        away = rows["measured"] - rows["predicted"] - rows["residual"]
+        assert away.abs().max() < 1e-9
+        half = rows.query("horizon_s == 0.5 and t_s == t_s.round(2)")
+        x, y, theta = poses.loc[half["t_s"].unique()].T.to_numpy()
+        ends = (half["t_s"].unique() + 0.5).round(2)
+        end_x, end_y, end_theta = poses.loc[ends].T.to_numpy()
+        ahead = (end_x - x) * np.cos(theta) + (end_y - y) * np.sin(theta)
+        for channel, told in (("forward", ahead), ("heading", end_theta - theta)):
+            measured = half.query("channel == @channel")["measured"]
+            np.testing.assert_allclose(measured, told, atol=0.02)  # headings are smoothed
+
+
 def test_there_is_one_standard_error(arcs):
     fitted, _, _ = arcs
     written = tomllib.loads(fitted.model.file.text)
