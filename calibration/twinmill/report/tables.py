@@ -28,7 +28,7 @@ VERDICTS: dict[str, Tone] = {
     "outside_catalogue": "bad",
 }
 
-OF_RESPONSE = "held-out error of a smooth response to the commands"
+OF_RESPONSE = "error of a smooth response to the commands, in-sample and held out"
 SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
