@@ -150,7 +150,7 @@ def test_predictions_stand_beside_what_was_measured(arcs):
         end_x, end_y, end_theta = poses.loc[ends].T.to_numpy()
         ahead = (end_x - x) * np.cos(theta) + (end_y - y) * np.sin(theta)
         for channel, told in (("forward", ahead), ("heading", end_theta - theta)):
-            measured = half.query("channel == @channel")["measured"]
+            measured = half.loc[half["channel"] == channel, "measured"]
             np.testing.assert_allclose(measured, told, atol=0.02)  # headings are smoothed
 
 

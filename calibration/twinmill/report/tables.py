@@ -376,6 +376,12 @@ def catalogue(entries: list[dict[str, Any]]) -> Table:
     )
 
 
+def effect_texts(entry: dict[str, Any]) -> Table:
+    """Texts that an effect of the user's own is made of."""
+    rows = [[Cell(t["name"]), Cell(t["default"]), Cell(t["doc"])] for t in entry["texts"]]
+    return Table("Texts", ["text", "default", "meaning"], rows, words=(0, 1, 2))
+
+
 def effect_parameters(entry: dict[str, Any]) -> Table:
     """Parameters of an effect's card: unit, default, bounds and meaning."""
     rows = [
