@@ -1013,7 +1013,9 @@ class Model(Shown):
 
     def __repr__(self) -> str:
         effects = ", ".join(self.effects) or "no effects"
-        return f"Model({self.name}: {self.file.model.drive}, {effects})"
+        logs = self.file.fitted_logs
+        fitted = f", fitted to {logs}" if logs else ""
+        return f"Model({self.name}: {self.file.model.drive}, {effects}{fitted})"
 
 
 class Fit(Reported):
@@ -1198,8 +1200,8 @@ class Fit(Reported):
         return show.fit(self._result, NOT_WRITTEN)
 
     def __repr__(self) -> str:
-        name, before = self._result.before.model_name, self.before.score
-        return f"Fit({name}: score {before:.3g} -> {self.score:.3g})"
+        name, logs = self._result.before.model_name, self.model.file.fitted_logs
+        return f"Fit({name}, {logs}: score {self.before.score:.3g} -> {self.score:.3g})"
 
 
 class Addition(Reported):

@@ -223,6 +223,17 @@ def test_what_is_held_keeps_its_value_fitted_or_not(arcs):
         tm.fit(log, model, free=["sensor.range_m"])
 
 
+def test_fits_to_several_logs_are_told_apart_and_are_small(arcs):
+    """A fit pickles to a few times its log, whose numbers it has, and is named by it."""
+    fitted, log, model = arcs
+    assert "arcs1" in repr(fitted) and "arcs1" in repr(fitted.model)
+    assert "fitted" not in repr(tm.Model.load(model))
+    size = len(pickle.dumps(log))
+    assert len(pickle.dumps(fitted)) < 8 * size
+    again = pickle.loads(pickle.dumps(fitted))
+    assert again.residuals().equals(fitted.residuals()) and str(again) == str(fitted)
+
+
 def test_results_go_to_other_processes_and_come_back(arcs):
     fitted, log, model = arcs
     worker = loky.get_reusable_executor(max_workers=1)  # what joblib sends its work to
