@@ -592,8 +592,9 @@ class Log(Shown):
 
         Raises:
             LogError: these are several logs, or there are not two robots at the same time.
-            ValueError: the log is too short, does not name the behaviour, or there are too few
-                runs.
+            ValueError: it has less than 4 s of motion, or gaps, after the swarm starts (so short
+                a log tells little: a minute is usual); it does not name the behaviour; or there
+                are too few runs.
 
         Examples:
             >>> swarm = tm.simulate(n=3, duration_s=20)
@@ -680,7 +681,9 @@ class Model(Shown):
 
     @property
     def file(self) -> ModelFile:
-        """Its text, its hash and the twin's own object.
+        """What it was read from: `path`, `text` (TOML) and `hash` (sha256 of the text).
+
+        Its other attributes are the library's own, and may change.
 
         Examples:
             >>> tm.Model.load("turbopi.toml").file.path.name
@@ -1025,11 +1028,15 @@ class Fit(Reported):
         model: the new one.
         before: comparison of the model as given with the log.
         after: comparison of the new model, on the same noise.
-        score: of the new model on the log it was fitted to.
+        score: of the new model on the log it was fitted to. It may be higher than before where a
+            prior in `priors` holds the model off what the log tells.
         log_likelihood: Gaussian, of errors over the noise floor, maximised over the scale of each
             data set, without priors.
-        nobs: number of independent errors; residuals are more, and overlap.
-        converged: the fit ended before its last round.
+        nobs: number of independent errors, which of a log is counted by time and need not be whole:
+            one for 2 s of each channel, fewer where errors are correlated; `residuals` has more
+            rows, which overlap.
+        converged: the last step lowered the cost by less than the tolerance of `settings`; False:
+            its rounds were used up, and more of them may fit better.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -1049,7 +1056,10 @@ class Fit(Reported):
 
     @property
     def params(self) -> pd.Series:
-        """Values by name: estimates, then what was held, whose standard error is NaN.
+        """Values by name, a series of pandas: estimates, then what was held.
+
+        Each is in the unit that `table` tells: lengths in m, times in s, gains without one. Of what
+        was held the standard error is NaN.
 
         Examples:
             >>> bool(fitted.params["base.motor_lag_s"] > 0)
@@ -1095,7 +1105,7 @@ class Fit(Reported):
             alpha: 0.05 for 95 %.
 
         Returns:
-            lower and upper, by name.
+            lower and upper, by name; NaN for what was held.
 
         Raises:
             ValueError: alpha is not within 0 to 1.
@@ -1211,7 +1221,8 @@ class Addition(Reported):
         effect: its name, with a number if the model had one already: `dead_zone#2`.
         model: the new model.
         heldout_before, heldout_after: scores on data that was not fitted to, without and with the
-            effect, all else refitted.
+            effect, all else refitted in both; lower is better, and 1.0 as good as the log can tell.
+            An effect that does not lower it does not belong into the model.
 
     Examples:
         >>> added = tm.Model.load("fitted.toml").add("dead_zone", "run.lcmlog")
@@ -1722,14 +1733,16 @@ def compare_models(
     Args:
         models: two at least, or a dictionary of them by name.
         log: a log, the path of one, or a list of these.
-        refit: fit each model to the other folds; False: all models predict as they are.
+        refit: fit each model to the other folds of these very logs, also what a fit of yours held;
+            False: all models predict as they are, as held-out logs of a finished model need it.
 
     Returns:
         One row per model, best first: rank, score_heldout (1.0 is as good as the log can tell),
-        elpd (expected log predictive density, of all blocks), elpd_diff (of the best less this
-        one's), dse (standard error of the difference), weight (in the mixture that predicts best:
-        stacking), p_chance (chance of so large a lead of the best, were no model better than this
-        one). `attrs["correction"]` says how p_chance allows for the best being one of many.
+        elpd (expected log predictive density, of all blocks; larger is better), elpd_diff (that of
+        the best less this one's: 0 for the best, else positive), dse (standard error of the
+        difference), weight (in the mixture that predicts best: stacking), p_chance (chance of so
+        large a lead of the best, were no model better than this one). `attrs["correction"]` says
+        how p_chance allows for the best being one of many.
 
     Raises:
         LogError: the log cannot be used; one sentence.
@@ -1956,9 +1969,10 @@ def next_run(
         log: a log, or the path of one.
         model: that a diagnosis would be given; None is TurboPi's.
         duration_s: longest run.
-        floor_m: free floor, along and across the robot at its start.
-        max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
-            highest in its logs.
+        floor_m: free floor, m: how far along the way that the robot looks at its start, and how
+            far across; it starts in the middle.
+        max_duty: highest duty of a wheel as a share of full duty, 0.2 to 1 (not percent); of a
+            robot told velocities, share of the highest in its logs.
         own: the log (or logs) that the model was fitted to; see `infer`.
         progress: called with a sentence on each step.
 

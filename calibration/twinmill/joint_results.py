@@ -114,7 +114,7 @@ class JointDiagnosis(_diagnose.JointDiagnosis, Shown):
     def _text(self) -> RenderableType:
         return joints.diagnosis(self)
 
-    def _said(self) -> tuple[str, ...]:
+    def _above(self) -> tuple[str, ...]:
         return self.warnings
 
     def __repr__(self) -> str:
@@ -201,7 +201,7 @@ class JointExplanation(_explain.JointExplanation, Shown):
                 temporary.write_text(text, encoding="utf-8")
         return [*texts]
 
-    def _said(self) -> tuple[str, ...]:
+    def _above(self) -> tuple[str, ...]:
         return self.diagnosis.warnings
 
     def _text(self) -> RenderableType:
@@ -275,7 +275,7 @@ class JointComparison(_compare.JointComparison, Shown):
 
         return draw(3.0, paint).picture
 
-    def _said(self) -> tuple[str, ...]:
+    def _above(self) -> tuple[str, ...]:
         return self.warnings
 
     def _text(self) -> RenderableType:
@@ -365,7 +365,7 @@ class Excitation(_next.Excitation, Shown):
         with replacing(path_of("path", path, A_PATH), force) as temporary:
             temporary.write_text(self.text(), encoding="utf-8")
 
-    def _said(self) -> tuple[str, ...]:
+    def _above(self) -> tuple[str, ...]:
         return self.diagnosis.warnings
 
     def _text(self) -> RenderableType:
@@ -441,7 +441,7 @@ class ImportedJoints(_import.ImportedJoints, Shown):
         """
         return _positions(self.log, self.mjcf)
 
-    def _said(self) -> tuple[str, ...]:
+    def _above(self) -> tuple[str, ...]:
         return self.notes
 
     def _text(self) -> RenderableType:

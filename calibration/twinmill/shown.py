@@ -50,7 +50,7 @@ class Shown:
         """The numbers; each class says which."""
         raise NotImplementedError
 
-    def _said(self) -> tuple[str, ...]:
+    def _above(self) -> tuple[str, ...]:
         """Sentences that stand above the text."""
         return self.left_out
 
@@ -59,7 +59,7 @@ class Shown:
 
     def __str__(self) -> str:
         out = StringIO()
-        lines = [f"! {said}" for said in self._said()]
+        lines = [f"! {said}" for said in self._above()]
         width = min(shutil.get_terminal_size().columns, WIDEST_COLUMNS)
         PlainConsole(file=out, width=width, color_system=None).print(
             *lines, self._text(), sep="\n", highlight=False

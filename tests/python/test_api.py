@@ -116,6 +116,27 @@ def test_a_comparison_is_that_of_the_command(here, capsys):
     assert len(found.plot().axes) == 3
 
 
+def test_a_swarm_is_judged_on_four_seconds_of_motion_and_not_on_less(here):
+    """As the docstring promises: two means over 2 s are the fewest that can go different ways."""
+    swarm = tm.simulate(n=3, duration_s=6.5, seed=2)
+    assert swarm.compare_swarm(n_seeds=39).table()["t_s"].nunique() >= 2
+    with pytest.raises(ValueError, match="is too short after the swarm starts; at least 4 s"):
+        tm.simulate(n=3, duration_s=3.5, seed=2).compare_swarm(n_seeds=39)
+
+
+def test_robots_that_are_alike_are_their_models(here):
+    """Of the twin's own text: nothing is drawn where the spread is 0; else speeds differ by 4 %."""
+    drawn, alike = (
+        tm.simulate("turbopi.toml", n=1, script="script.csv", duration_s=60, seed=5, alike=same)
+        for same in (False, True)
+    )
+    gains = [tm.fit(log, "turbopi.toml", free=["base.yaw_gain"]) for log in (drawn, alike)]
+    own = tm.Model.load("turbopi.toml")["base.yaw_gain"]
+    off = [abs(fit.params["base.yaw_gain"] / own - 1) for fit in gains]
+    assert off[1] < 0.01 < off[0]
+    assert tm.compare(alike, "turbopi.toml").score < 1.15
+
+
 def test_a_comparison_of_runs_is_that_of_the_command(here, capsys):
     run(["compare-runs", "run.lcmlog", "other.lcmlog", "--model", "fitted.toml", "--json"])
     told = json.loads(capsys.readouterr().out)
