@@ -27,6 +27,7 @@ from twinmill.joints import next as _next
 from twinmill.joints.diagnose import Logs
 from twinmill.joints.hook import hook_beside
 from twinmill.joints.importers import import_joints as _import
+from twinmill.joints.importers.names import Given
 from twinmill.joints.log import JointLog
 from twinmill.joints.mjcf import Mjcf
 from twinmill.report import inference, joints
@@ -582,7 +583,7 @@ def next_joints(
 def import_joints(
     files: Path | str | Sequence[Path | str],
     model: Mjcf | Path | str,
-    given: _import.Given = _import.NOTHING_SAID,
+    given: Given = _import.NOTHING_SAID,
     topics: _import.Topics = _import.ANY,
 ) -> ImportedJoints:
     """Reads files of one machine.

@@ -125,16 +125,12 @@ def test_a_swarm_is_judged_on_four_seconds_of_motion_and_not_on_less(here):
 
 
 def test_robots_that_are_alike_are_their_models(here):
-    """Of the twin's own text: nothing is drawn where the spread is 0; else speeds differ by 4 %."""
-    drawn, alike = (
-        tm.simulate("turbopi.toml", n=1, script="script.csv", duration_s=60, seed=5, alike=same)
+    """The truth is the twin's own model: right for robots without a spread, wrong by 4 % else."""
+    scores = [
+        tm.compare(tm.simulate(n=3, duration_s=60, seed=4, alike=same), "turbopi.toml").score
         for same in (False, True)
-    )
-    gains = [tm.fit(log, "turbopi.toml", free=["base.yaw_gain"]) for log in (drawn, alike)]
-    own = tm.Model.load("turbopi.toml")["base.yaw_gain"]
-    off = [abs(fit.params["base.yaw_gain"] / own - 1) for fit in gains]
-    assert off[1] < 0.01 < off[0]
-    assert tm.compare(alike, "turbopi.toml").score < 1.15
+    ]
+    assert scores[1] < 1.15 < 1.5 < scores[0]
 
 
 def test_a_comparison_of_runs_is_that_of_the_command(here, capsys):

@@ -132,7 +132,7 @@ def check_wheels(track: Track, model: native.Model, label: str) -> list[InputFin
     if track.command_kind not in ("duty", "wheel_speed") or track.command_kind != model.drive:
         return []
     words = [wheel["words"] for wheel in model.wheels()]
-    told = track.command[:, : len(words)].any(axis=0)
+    told: list[bool] = (track.command[:, : len(words)] != 0).any(axis=0).tolist()
     if len(words) == OMNI and track.command[:, OMNI:].any():
         return [
             InputFinding(
@@ -145,13 +145,13 @@ def check_wheels(track: Track, model: native.Model, label: str) -> list[InputFin
             )
         ]
     idle = [word for word, own in zip(words, told, strict=True) if not own]
-    if not idle or not told.any():
+    if not idle or not any(told):
         return []
     those = " and ".join(filter(None, [", ".join(idle[:-1]), idle[-1]]))
     return [
         InputFinding(
             f"no command drives {those}, which the model has among its {len(words)} driven wheels",
-            f"its commands are 0 throughout, and those of {counted(int(told.sum()), 'wheel')} not",
+            f"its commands are 0 throughout, and those of {counted(sum(told), 'wheel')} not",
             "if the robot has two wheels, give the model half_wheelbase_m = 0 in [robot]; if each "
             "motor drives a side, log its command for both wheels there",
             False,
