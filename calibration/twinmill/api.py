@@ -681,7 +681,7 @@ class Model(Shown):
 
     @property
     def file(self) -> ModelFile:
-        """What it was read from: `path`, `text` (TOML) and `hash` (sha256 of the text).
+        """Source of the model: `path`, `text` (TOML) and `hash` (sha256 of the text).
 
         Its other attributes are the library's own, and may change.
 

@@ -46,7 +46,7 @@ def folder(tmp_path_factory):
 
 
 def _made(result, *_, **__):
-    """What a call of the examples returns, which was made with these arguments already."""
+    """Result of a call of the examples, which was made with these arguments already."""
     return result
 
 
