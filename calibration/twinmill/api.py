@@ -1141,8 +1141,14 @@ class Fit(Reported):
         rows = pd.DataFrame({"value": self.params, "stderr": self.stderr})
         rows = rows.join(self.conf_int().set_axis(["[0.025", "0.975]"], axis=1))
         rows["unit"] = [p.unit for p in (*self._result.parameters, *self._result.held)]
-        if self._result.held:
-            rows[""] = ["(held)" if h else "" for h in self.table()["held"]]
+        table = self.table()
+        told = np.select(
+            [table["held"], table["prior"] & ~(table["seen"] | table["together"])],
+            ["(held)", "(from the prior)"],
+            "",
+        )
+        if any(told):
+            rows[""] = told
         head = {
             "model": self.model.name,
             "score": f"{self.before.score:.3g} -> {self.score:.3g}",
@@ -1152,8 +1158,8 @@ class Fit(Reported):
             "converged": "yes" if self.converged else "no",
         }
         lines = [f"{name:20}{value}" for name, value in head.items()]
-        told = rows.to_string(float_format="{:.4g}".format, na_rep="")
-        return "\n".join([*lines, "", *(line.rstrip() for line in told.splitlines())])
+        text = rows.to_string(float_format="{:.4g}".format, na_rep="")
+        return "\n".join([*lines, "", *(line.rstrip() for line in text.splitlines())])
 
     def table(self) -> pd.DataFrame:
         """Fitted quantities, then those that were held.

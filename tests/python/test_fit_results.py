@@ -91,6 +91,7 @@ def test_a_posterior_is_as_wide_as_the_conjugate_normal_is(sheet, deviation):
     assert fitted.stderr[GAIN] <= deviation
     assert ("from the prior" in str(fitted)) == (deviation < alone.stderr[GAIN])
     assert "not determined" not in str(fitted)
+    assert ("(from the prior)" in fitted.summary()) == (deviation < alone.stderr[GAIN])
 
 
 def test_a_prior_that_contradicts_the_data_is_no_less_sure_than_it_says(sheet):
