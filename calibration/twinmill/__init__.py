@@ -45,17 +45,17 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.defaults import Certainty as Certainty
     from twinmill.defaults import Verdict as Verdict
     from twinmill.fitting.settings import FitSettings as FitSettings
-    from twinmill.joints.compare import JointComparison as JointComparison
-    from twinmill.joints.compare import compare_joints as compare_joints
-    from twinmill.joints.diagnose import JointDiagnosis as JointDiagnosis
-    from twinmill.joints.diagnose import diagnose_joints as diagnose_joints
-    from twinmill.joints.explain import JointExplanation as JointExplanation
-    from twinmill.joints.explain import explain_joints as explain_joints
-    from twinmill.joints.importers.import_joints import ImportedJoints as ImportedJoints
-    from twinmill.joints.importers.import_joints import import_joints as import_joints
+    from twinmill.joint_results import Excitation as Excitation
+    from twinmill.joint_results import ImportedJoints as ImportedJoints
+    from twinmill.joint_results import JointComparison as JointComparison
+    from twinmill.joint_results import JointDiagnosis as JointDiagnosis
+    from twinmill.joint_results import JointExplanation as JointExplanation
+    from twinmill.joint_results import compare_joints as compare_joints
+    from twinmill.joint_results import diagnose_joints as diagnose_joints
+    from twinmill.joint_results import explain_joints as explain_joints
+    from twinmill.joint_results import import_joints as import_joints
+    from twinmill.joint_results import next_joints as next_joints
     from twinmill.joints.log import JointLog as JointLog
-    from twinmill.joints.next import Excitation as Excitation
-    from twinmill.joints.next import next_joints as next_joints
     from twinmill.model.model_file import ModelError as ModelError
     from twinmill.model.python_effect import Number as Number
     from twinmill.model.python_effect import PythonEffect as PythonEffect
@@ -72,12 +72,16 @@ _HOME = {
     "Verdict": "twinmill.defaults",
     "FitSettings": "twinmill.fitting.settings",
     "LogError": "twinmill.data.log",
-    **dict.fromkeys(("JointComparison", "compare_joints"), "twinmill.joints.compare"),
-    **dict.fromkeys(("JointDiagnosis", "diagnose_joints"), "twinmill.joints.diagnose"),
-    **dict.fromkeys(("JointExplanation", "explain_joints"), "twinmill.joints.explain"),
-    **dict.fromkeys(("ImportedJoints", "import_joints"), "twinmill.joints.importers.import_joints"),
+    **dict.fromkeys(
+        (
+            *("Excitation", "ImportedJoints", "JointComparison"),
+            *("JointDiagnosis", "JointExplanation"),
+            *("compare_joints", "diagnose_joints", "explain_joints"),
+            *("import_joints", "next_joints"),
+        ),
+        "twinmill.joint_results",
+    ),
     "JointLog": "twinmill.joints.log",
-    **dict.fromkeys(("Excitation", "next_joints"), "twinmill.joints.next"),
     "ModelError": "twinmill.model.model_file",
     **dict.fromkeys(("Number", "PythonEffect", "python_effect"), "twinmill.model.python_effect"),
     **dict.fromkeys(

@@ -101,6 +101,7 @@ from twinmill.results import (
     RunComparison,
     SwarmComparison,
     errors_drawn,
+    residuals_table,
 )
 from twinmill.runs.compare import compare_runs as _compare_runs
 from twinmill.runs.compare import of_robot
@@ -118,6 +119,7 @@ Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
 NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 LONGEST_RUN_S = 600.0
 LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
+SPREADS = ("idiosyncrasy.theta_a1_std", "idiosyncrasy.theta_a2_std")  # of robots' gains
 NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
@@ -218,8 +220,9 @@ class Log(Shown):
                 measured. Rows with NaN are lost poses.
             commands_t_s: (M,) times of the commands, likewise; each is held until the next.
             commands: (M, K) by `kind`. `twist`: vx_mps, vy_mps, omega_radps, or vx_mps,
-                omega_radps. `duty`: percent, and `wheel_speed`: rad/s, of each driven wheel in the
-                model's order. `steering`: vx_mps, steering_rad.
+                omega_radps. `duty`: percent, and `wheel_speed`: rad/s: two columns are left and
+                right (of every axle), three are omni wheels, four are front left, front right,
+                rear left, rear right. `steering`: vx_mps, steering_rad.
             kind: of the commands.
             same_clock: one clock stamped poses and commands; False: their offset is fitted.
             robot_id: 0 to 99.
@@ -255,13 +258,19 @@ class Log(Shown):
         wheelbase_m: float | None = None,
         name: str = "frames",
     ) -> "Log":
-        """Makes a log from two data frames of pandas or polars, or dictionaries of arrays.
+        """Makes a log from data frames of pandas or polars, datasets of xarray, or dictionaries.
+
+        Columns in another unit that their names tell are converted: theta_deg, x_mm, t_ms. Others
+        than those below are ignored.
 
         Args:
-            poses: columns t_s, x_m, y_m, and theta_rad where headings were measured; robot_id
-                where there are several robots; rows where `valid` is false are lost poses.
+            poses: columns t_s (s, or dates), x_m, y_m, and theta_rad, or qw, qx, qy, qz, where
+                headings were measured; robot_id where there are several robots; rows where `valid`
+                is false, or with NaN, are lost poses.
             commands: columns t_s and one group: vx_mps, vy_mps, omega_radps; fl_pct, fr_pct,
-                rl_pct, rr_pct; w1_radps to w4_radps; or vx_mps, steering_rad; robot_id as in poses.
+                rl_pct, rr_pct; left_pct, right_pct (or left_pwm ...); w1_radps to w4_radps, the
+                first three of omni wheels, left_radps, right_radps (or w1_radps, w2_radps) of two;
+                or vx_mps, steering_rad; robot_id as in poses.
             kind: which group; by default the one that is there.
             same_clock: one clock stamped poses and commands; False: their offset is fitted.
             robot_id: of frames that do not say.
@@ -586,8 +595,9 @@ class Log(Shown):
 
         Raises:
             LogError: these are several logs, or there are not two robots at the same time.
-            ValueError: the log is too short, does not name the behaviour, or there are too few
-                runs.
+            ValueError: it has less than 4 s of motion, or gaps, after the swarm starts (so short
+                a log tells little: a minute is usual); it does not name the behaviour; or there
+                are too few runs.
 
         Examples:
             >>> swarm = tm.simulate(n=3, duration_s=20)
@@ -674,7 +684,9 @@ class Model(Shown):
 
     @property
     def file(self) -> ModelFile:
-        """Its text, its hash and the twin's own object.
+        """Source of the model: `path`, `text` (TOML) and `hash` (sha256 of the text).
+
+        Its other attributes are the library's own, and may change.
 
         Examples:
             >>> tm.Model.load("turbopi.toml").file.path.name
@@ -1001,7 +1013,9 @@ class Model(Shown):
 
     def __repr__(self) -> str:
         effects = ", ".join(self.effects) or "no effects"
-        return f"Model({self.name}: {self.file.model.drive}, {effects})"
+        logs = self.file.fitted_logs
+        fitted = f", fitted to {logs}" if logs else ""
+        return f"Model({self.name}: {self.file.model.drive}, {effects}{fitted})"
 
 
 class Fit(Reported):
@@ -1011,11 +1025,15 @@ class Fit(Reported):
         model: the new one.
         before: comparison of the model as given with the log.
         after: comparison of the new model, on the same noise.
-        score: of the new model on the log it was fitted to.
+        score: of the new model on the log it was fitted to. It may be higher than before where a
+            prior in `priors` holds the model off what the log tells.
         log_likelihood: Gaussian, of errors over the noise floor, maximised over the scale of each
             data set, without priors.
-        nobs: number of independent errors; residuals are more, and overlap.
-        converged: the fit ended before its last round.
+        nobs: number of independent errors, which of a log is counted by time and need not be whole:
+            one for 2 s of each channel, fewer where errors are correlated; `residuals` has more
+            rows, which overlap.
+        converged: the last step lowered the cost by less than the tolerance of `settings`; False:
+            its rounds were used up, and more of them may fit better.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
@@ -1035,7 +1053,10 @@ class Fit(Reported):
 
     @property
     def params(self) -> pd.Series:
-        """Values by name: estimates, then what was held, whose standard error is NaN.
+        """Values by name, a series of pandas: estimates, then what was held.
+
+        Each is in the unit that `table` tells: lengths in m, times in s, gains without one. Of what
+        was held the standard error is NaN.
 
         Examples:
             >>> bool(fitted.params["base.motor_lag_s"] > 0)
@@ -1049,8 +1070,8 @@ class Fit(Reported):
         """Standard errors by name: half a 95 % interval over 1.96.
 
         From the jackknife over blocks of 8 s, widened by Student's t where blocks are few, and by
-        the influence of the priors. All tables, files and intervals have these. NaN for what was
-        held: nothing was estimated.
+        the influence of the usual priors; never above the deviation of a prior in `priors`. All
+        tables, files and intervals have these. NaN for what was held: nothing was estimated.
 
         Examples:
             >>> bool((fitted.stderr**2 - np.diag(fitted.covariance())).abs().max() < 1e-12)
@@ -1081,7 +1102,7 @@ class Fit(Reported):
             alpha: 0.05 for 95 %.
 
         Returns:
-            lower and upper, by name.
+            lower and upper, by name; NaN for what was held.
 
         Raises:
             ValueError: alpha is not within 0 to 1.
@@ -1096,18 +1117,16 @@ class Fit(Reported):
         return pd.DataFrame({"lower": self.params - half, "upper": self.params + half})
 
     def residuals(self) -> pd.DataFrame:
-        """Measured less predicted, of the fitted model.
+        """Each prediction of the fitted model beside what was measured.
 
         Returns:
-            log, robot_id, t_s (start of the prediction), horizon_s, channel, unit, residual and
-            floor (the noise floor, one standard deviation; both in the unit).
+            As of `Comparison.residuals`.
 
         Examples:
             >>> fitted.residuals()["channel"].unique().tolist()
             ['forward', 'left', 'heading']
         """
-        told = self._result.statistics.residuals
-        return pd.concat([pd.DataFrame(r.columns()) for r in told], ignore_index=True)
+        return residuals_table(self._result.statistics.residuals)
 
     def summary(self) -> str:
         """Estimates with errors and intervals, as text.
@@ -1119,8 +1138,14 @@ class Fit(Reported):
         rows = pd.DataFrame({"value": self.params, "stderr": self.stderr})
         rows = rows.join(self.conf_int().set_axis(["[0.025", "0.975]"], axis=1))
         rows["unit"] = [p.unit for p in (*self._result.parameters, *self._result.held)]
-        if self._result.held:
-            rows[""] = ["(held)" if h else "" for h in self.table()["held"]]
+        table = self.table()
+        told = np.select(
+            [table["held"], table["prior"] & ~(table["seen"] | table["together"])],
+            ["(held)", "(from the prior)"],
+            "",
+        )
+        if any(told):
+            rows[""] = told
         head = {
             "model": self.model.name,
             "score": f"{self.before.score:.3g} -> {self.score:.3g}",
@@ -1130,8 +1155,8 @@ class Fit(Reported):
             "converged": "yes" if self.converged else "no",
         }
         lines = [f"{name:20}{value}" for name, value in head.items()]
-        told = rows.to_string(float_format="{:.4g}".format, na_rep="")
-        return "\n".join([*lines, "", *(line.rstrip() for line in told.splitlines())])
+        text = rows.to_string(float_format="{:.4g}".format, na_rep="")
+        return "\n".join([*lines, "", *(line.rstrip() for line in text.splitlines())])
 
     def table(self) -> pd.DataFrame:
         """Fitted quantities, then those that were held.
@@ -1140,15 +1165,15 @@ class Fit(Reported):
             name, value, std (half a 95 % interval over 1.96; NaN where held), unit, at_bound, seen
             (false where the log does not determine the quantity, only its prior), together
             (determined in combination with others, not alone), words (what it is, where the name
-            does not say so), held.
+            does not say so), prior (true where one was given in `priors`), held.
 
         Examples:
             >>> fitted.table().set_index("name").loc["base.motor_lag_s", "unit"]
             's'
         """
         rows = [{**e.to_json(), "held": False} for e in self._result.parameters]
-        kept = {"std": np.nan, "at_bound": False, "seen": False, "together": False, "held": True}
-        rows += [{**h.to_json(), **kept, "words": h.words} for h in self._result.held]
+        kept = {"std": np.nan, "at_bound": False, "seen": False, "together": False, "prior": False}
+        rows += [{**h.to_json(), **kept, "words": h.words, "held": True} for h in self._result.held]
         return pd.DataFrame(rows)
 
     def plot(self) -> Figure:
@@ -1188,8 +1213,8 @@ class Fit(Reported):
         return show.fit(self._result, NOT_WRITTEN)
 
     def __repr__(self) -> str:
-        name, before = self._result.before.model_name, self.before.score
-        return f"Fit({name}: score {before:.3g} -> {self.score:.3g})"
+        name, logs = self._result.before.model_name, self.model.file.fitted_logs
+        return f"Fit({name}, {logs}: score {self.before.score:.3g} -> {self.score:.3g})"
 
 
 class Addition(Reported):
@@ -1199,7 +1224,8 @@ class Addition(Reported):
         effect: its name, with a number if the model had one already: `dead_zone#2`.
         model: the new model.
         heldout_before, heldout_after: scores on data that was not fitted to, without and with the
-            effect, all else refitted.
+            effect, all else refitted in both; lower is better, and 1.0 as good as the log can tell.
+            An effect that does not lower it does not belong into the model.
 
     Examples:
         >>> added = tm.Model.load("fitted.toml").add("dead_zone", "run.lcmlog")
@@ -1821,8 +1847,8 @@ def fit(
         model: start of the fit; a model, or the name of one; None is TurboPi's.
         hold: names of parameters that keep their values, free by default or not.
         free: names of the only free parameters, of base, robot or effects; None: the default.
-        priors: mean and standard deviation of normal priors by name, in place of the usual ones,
-            which are wide and about the model's value.
+        priors: mean and standard deviation of normal priors by name, of what is fitted, in place
+            of the usual ones, which are wide and about the model's value.
         settings: convergence criteria.
 
     Returns:
@@ -1830,14 +1856,15 @@ def fit(
 
     Raises:
         LogError: the log cannot be used; one sentence.
-        ModelError: the model cannot be read, has no such quantity, or a prior cannot be.
+        ModelError: the model cannot be read, has no such quantity, one is free and held, or a
+            prior cannot be or is of what is not fitted.
 
     Examples:
         >>> fitted = tm.fit("run.lcmlog", "turbopi.toml")
         >>> fitted.score <= fitted.before.score
         True
         >>> list(fitted.table().columns)
-        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words', 'held']
+        ['name', 'value', 'std', 'unit', 'at_bound', 'seen', 'together', 'words', 'prior', 'held']
         >>> gains = ["base.forward_gain", "base.yaw_gain"]
         >>> tm.fit("run.lcmlog", "turbopi.toml", free=gains).stderr.dropna().index.tolist()
         ['base.yaw_gain', 'base.forward_gain']
@@ -1887,14 +1914,16 @@ def compare_models(
     Args:
         models: two at least, or a dictionary of them by name.
         log: a log, the path of one, or a list of these.
-        refit: fit each model to the other folds; False: all models predict as they are.
+        refit: fit each model to the other folds of these very logs, also what a fit of yours held;
+            False: all models predict as they are, as held-out logs of a finished model need it.
 
     Returns:
         One row per model, best first: rank, score_heldout (1.0 is as good as the log can tell),
-        elpd (expected log predictive density, of all blocks), elpd_diff (of the best less this
-        one's), dse (standard error of the difference), weight (in the mixture that predicts best:
-        stacking), p_chance (chance of so large a lead of the best, were no model better than this
-        one). `attrs["correction"]` says how p_chance allows for the best being one of many.
+        elpd (expected log predictive density, of all blocks; larger is better), elpd_diff (that of
+        the best less this one's: 0 for the best, else positive), dse (standard error of the
+        difference), weight (in the mixture that predicts best: stacking), p_chance (chance of so
+        large a lead of the best, were no model better than this one). `attrs["correction"]` says
+        how p_chance allows for the best being one of many.
 
     Raises:
         LogError: the log cannot be used; one sentence.
@@ -2088,9 +2117,10 @@ def next_run(
         log: a log, or the path of one.
         model: that a diagnosis would be given; None is TurboPi's.
         duration_s: longest run.
-        floor_m: free floor, along and across the robot at its start.
-        max_duty: highest duty of a wheel, 0.2 to 1; of a robot told velocities, share of the
-            highest in its logs.
+        floor_m: free floor, m: how far along the way that the robot looks at its start, and how
+            far across; it starts in the middle.
+        max_duty: highest duty of a wheel as a share of full duty, 0.2 to 1 (not percent); of a
+            robot told velocities, share of the highest in its logs.
         own: the log (or logs) that the model was fitted to; see `diagnose`.
         progress: called with a sentence on each step.
 
@@ -2156,8 +2186,14 @@ def simulate(
     plant: str = "planar",
     seed: int = 1,
     script: str | Path | NextRun | None = None,
+    alike: bool = False,
 ) -> Log:
     """Simulates robots in the twin.
+
+    As real robots of a kind, they differ from the model and from each other: gains of speed and of
+    turning are drawn for each with the spread in the model's `[idiosyncrasy]`, 4 % of TurboPi's. So
+    a log's own model may be stale by that much for its robots; with `alike=True` it is right for
+    all of them.
 
     Args:
         model: a model, or the name of one; None is TurboPi's.
@@ -2168,6 +2204,7 @@ def simulate(
         seed: the same seed gives the same log.
         script: CSV of inputs or duties that all play instead of a behaviour, or a run that
             `next_run` designed.
+        alike: all robots have the model's own gains, but for what it states of single ones.
 
     Returns:
         A log like a robot's own, in memory; `Log.save` writes it.
@@ -2182,15 +2219,20 @@ def simulate(
         [0, 1, 2]
         >>> swarm.metrics().shape[0] > 0
         True
+        >>> made = tm.simulate("turbopi.toml", n=1, duration_s=60, alike=True)
+        >>> tm.compare(made, "turbopi.toml").score < 1.3
+        True
     """
     checked("n", n, Integral, "a whole number")
     checked("behavior", behavior, str, "the name of a behaviour, or a mix of them")
     checked("duration_s", duration_s, Real, "a number of seconds")
     checked("plant", plant, str, "`planar` or `mujoco`")
     checked("seed", seed, Integral, "a whole number")
+    checked("alike", alike, *SWITCH)
     if not isinstance(script, NextRun | None):
         script = path_of("script", script, "the path of a CSV file, or a designed run").resolve()
-    file = _model(model).file
+    model = _model(model)
+    file = (model.set(dict.fromkeys(SPREADS, 0.0)) if alike else model).file
     options = ["--plant", plant, "--n", n, "--seed", seed, "--duration-s", duration_s]
     with TemporaryDirectory(prefix="twinmill.") as folder:
         place = Path(folder)

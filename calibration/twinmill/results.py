@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results without a model of their own: comparisons, designed runs, cards."""
 
+from collections.abc import Iterable
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from twinmill.experiment.design import Plan
 from twinmill.experiment.played import csv_text
 from twinmill.files import plain, replacing
 from twinmill.fitting import compare as _compare
+from twinmill.fitting.residuals import Residuals
 from twinmill.report import (
     comparisons,
     error_figures,
@@ -68,6 +70,22 @@ class Comparison(Reported):
             for robot in robots
             for row in robot["errors"]
         )
+
+    def residuals(self) -> pd.DataFrame:
+        """Each prediction beside what was measured.
+
+        Returns:
+            log, robot_id, t_s (start of the prediction), horizon_s, channel, unit, measured and
+            predicted (how far forward, left and round it goes, seen from the start), residual
+            (measured less predicted, the short way round) and floor (the noise floor, one standard
+            deviation), all in the unit. In a steady-state table t_s and horizon_s are NaN.
+
+        Examples:
+            >>> rows = found.residuals().query("channel == 'forward' and horizon_s == 0.5")
+            >>> bool(np.allclose(rows["measured"] - rows["predicted"], rows["residual"]))
+            True
+        """
+        return residuals_table(Residuals.of(robot) for robot in self._result.robots)
 
     def plot(self) -> Figure:
         """Errors over the horizon, with the noise floor; for a steady-state table, its values.
@@ -345,6 +363,11 @@ class Effect(Shown):
 
     def __repr__(self) -> str:
         return f"Effect({self.name}: {self.summary})"
+
+
+def residuals_table(residuals: Iterable[Residuals]) -> pd.DataFrame:
+    """A row for each prediction of all robots."""
+    return pd.concat([pd.DataFrame(own.columns()) for own in residuals], ignore_index=True)
 
 
 def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:

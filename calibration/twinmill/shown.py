@@ -50,12 +50,16 @@ class Shown:
         """The numbers; each class says which."""
         raise NotImplementedError
 
+    def _above(self) -> tuple[str, ...]:
+        """Sentences that stand above the text."""
+        return self.left_out
+
     def _text(self) -> RenderableType:
         return repr(self)
 
     def __str__(self) -> str:
         out = StringIO()
-        lines = [f"! {said}" for said in self.left_out]
+        lines = [f"! {said}" for said in self._above()]
         width = min(shutil.get_terminal_size().columns, WIDEST_COLUMNS)
         PlainConsole(file=out, width=width, color_system=None).print(
             *lines, self._text(), sep="\n", highlight=False

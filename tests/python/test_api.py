@@ -117,6 +117,23 @@ def test_a_comparison_is_that_of_the_command(here, capsys):
     assert len(found.plot().axes) == 3
 
 
+def test_a_swarm_is_judged_on_four_seconds_of_motion_and_not_on_less(here):
+    """As the docstring promises: two means over 2 s are the fewest that can go different ways."""
+    swarm = tm.simulate(n=3, duration_s=6.5, seed=2)
+    assert swarm.compare_swarm(n_seeds=39).table()["t_s"].nunique() >= 2
+    with pytest.raises(ValueError, match="is too short after the swarm starts; at least 4 s"):
+        tm.simulate(n=3, duration_s=3.5, seed=2).compare_swarm(n_seeds=39)
+
+
+def test_robots_that_are_alike_are_their_models(here):
+    """The truth is the twin's own model: right for robots without a spread, wrong by 4 % else."""
+    scores = [
+        tm.compare(tm.simulate(n=3, duration_s=60, seed=4, alike=same), "turbopi.toml").score
+        for same in (False, True)
+    ]
+    assert scores[1] < 1.15 < 1.5 < scores[0]
+
+
 def test_a_comparison_of_runs_is_that_of_the_command(here, capsys):
     run(["compare-runs", "run.lcmlog", "other.lcmlog", "--model", "fitted.toml", "--json"])
     told = json.loads(capsys.readouterr().out)

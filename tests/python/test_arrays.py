@@ -151,6 +151,88 @@ def test_steering_turns_as_a_bicycle():
     np.testing.assert_allclose(log.commands()["omega_radps"], OMEGA_RADPS)
 
 
+WHEEL_M, HALF_TRACK_M, LAG_S = 0.03, 0.08, 0.1
+TWO_WHEELS = f"""[robot]
+wheel_radius_m = {WHEEL_M}
+half_track_m = {HALF_TRACK_M}
+[base]
+drive = "wheel_speed"
+wheels = "differential"
+motor_lag_s = {LAG_S}
+control_period_s = 0.1
+"""
+
+
+def two_wheels():
+    """Times, poses and commands of two wheels that lag, integrated here: speed R (l + r) / 2."""
+    random = np.random.default_rng(0)
+    told_t_s, t_s = np.arange(0, 90, 0.1), np.arange(0, 90, 0.005)
+    told = np.repeat(random.uniform(-8, 8, (60, 2)), 15, axis=0)
+    wheels, pose = np.zeros(2), np.zeros((len(t_s) + 1, 3))
+    for k in range(len(t_s)):
+        before, wheels = wheels, told[k // 20] + (wheels - told[k // 20]) * np.exp(-0.005 / LAG_S)
+        mean = (before + wheels) / 2
+        v, turn = WHEEL_M * mean.mean(), WHEEL_M * np.diff(mean)[0] / (2 * HALF_TRACK_M)
+        theta = pose[k, 2] + 0.0025 * turn
+        pose[k + 1] = pose[k] + 0.005 * np.array([v * np.cos(theta), v * np.sin(theta), turn])
+    seen = pose[1::4] + random.normal(0, [5e-4, 5e-4, 3e-3], (len(t_s) // 4, 3))
+    return t_s[::4] + 0.005, seen, told_t_s, told
+
+
+@pytest.mark.parametrize("more", ["", "half_wheelbase_m = 0"])
+def test_two_columns_are_left_and_right_of_every_axle(tmp_path, more):
+    t_s, pose, told_t_s, told = two_wheels()
+    (tmp_path / "two.toml").write_text(TWO_WHEELS.replace("[base]", f"{more}\n[base]"))
+    log = tm.Log.from_arrays(t_s, pose, told_t_s, told, kind="wheel_speed", same_clock=True)
+    found = tm.compare(log, tmp_path / "two.toml")
+    assert found.score < 1.3 and not found.left_out
+    stored = log.commands()[["w1_radps", "w2_radps", "w3_radps", "w4_radps"]]
+    np.testing.assert_allclose(stored, told[:, [0, 1, 0, 1]])
+    axle = np.column_stack([told, np.zeros_like(told)])
+    idle = tm.Log.from_arrays(t_s, pose, told_t_s, axle, kind="wheel_speed", same_clock=True)
+    said = " ".join(tm.compare(idle, tmp_path / "two.toml").left_out)
+    assert ("no command drives rear left wheel and rear right wheel" in said) == (not more)
+
+
+NAMED = {
+    "w1_radps,w2_radps": ("wheel_speed", 1.0),
+    "left_radps,right_radps": ("wheel_speed", 1.0),
+    "left_rpm,right_rpm": ("wheel_speed", np.pi / 30),
+    "left_pct,right_pct": ("duty", 1.0),
+    "left_pwm,right_pwm": ("duty", 100 / 255),
+}
+
+
+@pytest.mark.parametrize("names", NAMED)
+def test_frames_and_files_of_two_wheels_tell_one_thing(tmp_path, names):
+    kind, factor = NAMED[names]
+    told = pd.DataFrame(np.tile([[20.0, 30.0], [-7.0, 25.0]], (150, 1)), columns=names.split(","))
+    told.insert(0, "t_s", COMMANDS_T_S)
+    log = tm.Log.from_frames(POSES_FRAME, told)
+    stored = log.commands().query("t_s == t_s.round(1)").iloc[:2]
+    assert set(stored["kind"]) == {kind}
+    both = factor * told.iloc[:2, [1, 2, 1, 2]].to_numpy()
+    np.testing.assert_allclose(stored.iloc[:, 4:8], both)
+    told.to_csv(tmp_path / "commands.csv", index=False)
+    pd.DataFrame(POSES_FRAME).to_csv(tmp_path / "poses.csv", index=False)
+    again = tm.import_log(tmp_path / "poses.csv", tmp_path / "commands.csv", robot_id=0)
+    np.testing.assert_allclose(again.commands().query("t_s == t_s.round(1)").iloc[:2, 4:8], both)
+
+
+def test_other_numbers_of_wheels_are_refused_or_told(tmp_path):
+    t_s, pose, told_t_s, told = two_wheels()
+    for kind in ("duty", "wheel_speed"):
+        with pytest.raises(tm.LogError, match=r"2 \(left, right\), 3 \(omni wheels\) or 4 \(fl"):
+            tm.Log.from_arrays(t_s, pose, told_t_s, told[:, :1], kind=kind)
+    (tmp_path / "omni.toml").write_text(TWO_WHEELS.replace("differential", "omni3"))
+    log = tm.Log.from_arrays(t_s, pose, told_t_s, told, kind="wheel_speed", same_clock=True)
+    with pytest.raises(tm.LogError):
+        tm.compare(log, tmp_path / "omni.toml")
+    odd = pd.DataFrame({"t_s": told_t_s, "left_radps": told[:, 0], "left_rpm": told[:, 0]})
+    with pytest.raises(tm.LogError, match="left_rpm: holds what left_radps does"):
+        tm.Log.from_frames(POSES_FRAME, odd)
+
+
 def test_a_saved_log_is_one_of_lcm(tmp_path):
     circle().save(tmp_path / "circle.lcmlog")
     events = [e for e in lcm.EventLog(str(tmp_path / "circle.lcmlog"), "r")]
@@ -165,7 +247,7 @@ def test_a_saved_log_is_one_of_lcm(tmp_path):
 
 BACK_S = np.r_[T_S[1], T_S[0], T_S[2:]]
 WRONG = {
-    "widths": ((T_S, POSE[:, :1], COMMANDS_T_S, COMMANDS), "pose: has shape .* 2 to 3 columns"),
+    "widths": ((T_S, POSE[:, :1], COMMANDS_T_S, COMMANDS), "pose: has shape .* 2 or 3 columns"),
     "lengths": ((T_S, POSE[1:], COMMANDS_T_S, COMMANDS), r"pose: has shape \(1499, 3\), .* 1500"),
     "order": ((BACK_S, POSE, COMMANDS_T_S, COMMANDS), "t_s: row 1 is not later"),
     "NaN": ((T_S, POSE, COMMANDS_T_S, COMMANDS * np.nan), "commands: have NaN"),

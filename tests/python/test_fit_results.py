@@ -79,6 +79,31 @@ def test_a_prior_pulls_as_scipy_says(sheet):
     assert 0.8 < best.x < 0.92  # it does pull
 
 
+@pytest.mark.parametrize("deviation", [1e-4, 1e-3, 0.01, 0.1])
+def test_a_posterior_is_as_wide_as_the_conjugate_normal_is(sheet, deviation):
+    """Gelman et al. 2013, eq. 2.12: precisions add, where the prior is about what the data tell."""
+    _, _, log, model = sheet
+    alone = tm.fit(log, model, free=[GAIN], priors={GAIN: (1.0, 100.0)}, settings=EXACT)
+    prior = {GAIN: (float(alone.params[GAIN]), deviation)}
+    fitted = tm.fit(log, model, free=[GAIN], priors=prior, settings=EXACT)
+    width = 1 / np.hypot(1 / deviation, 1 / alone.stderr[GAIN])
+    assert fitted.stderr[GAIN] == pytest.approx(width, rel=0.1)
+    assert fitted.stderr[GAIN] <= deviation
+    assert ("from the prior" in str(fitted)) == (deviation < alone.stderr[GAIN])
+    assert "not determined" not in str(fitted)
+    assert ("(from the prior)" in fitted.summary()) == (deviation < alone.stderr[GAIN])
+
+
+def test_a_prior_that_contradicts_the_data_is_no_less_sure_than_it_says(sheet):
+    """A posterior is no wider than its normal prior, wherever the data are."""
+    _, _, log, model = sheet
+    fitted = tm.fit(log, model, free=[GAIN], priors={GAIN: (0.8, 0.001)}, settings=EXACT)
+    lower, upper = fitted.conf_int().loc[GAIN]
+    assert fitted.stderr[GAIN] <= 0.001 and (upper - lower) / 2 <= 1.96 * 0.0010001
+    (told,) = fitted.to_json()["parameters"]
+    assert told["std"] == fitted.stderr[GAIN] == np.sqrt(fitted.covariance().iloc[0, 0])
+
+
 def unicycle(gains: tuple[float, float], seed: int) -> tm.Log:
     """A robot whose motion is algebra: arcs at its gains times what it is told, 1 mm of noise."""
     rng = np.random.default_rng(seed)
@@ -110,6 +135,24 @@ def test_gains_of_a_path_that_is_algebra_are_found_within_their_errors(arcs):
     ahead = fitted.residuals().query("channel == 'forward' and horizon_s == 0.1")["residual"]
     # A millimetre at the start and one at the end; 0.15 is three errors of a deviation of 240.
     assert ahead.std() == pytest.approx(np.sqrt(2) * 1e-3, rel=0.15)
+
+
+def test_predictions_stand_beside_what_was_measured(arcs):
+    """Arcs by algebra: at v and w the way forward in t is v t sinc(w t / pi), the turn is w t."""
+    fitted, log, model = arcs
+    poses = log.table().set_index("t_s")[["x_m", "y_m", "theta_rad"]]
+    for rows in (fitted.residuals(), tm.compare(log, model).residuals()):
+        assert len(rows) > 2000
+        away = rows["measured"] - rows["predicted"] - rows["residual"]
+        assert away.abs().max() < 1e-9
+        half = rows.query("horizon_s == 0.5 and t_s == t_s.round(2)")
+        x, y, theta = poses.loc[half["t_s"].unique()].T.to_numpy()
+        ends = (half["t_s"].unique() + 0.5).round(2)
+        end_x, end_y, end_theta = poses.loc[ends].T.to_numpy()
+        ahead = (end_x - x) * np.cos(theta) + (end_y - y) * np.sin(theta)
+        for channel, told in (("forward", ahead), ("heading", end_theta - theta)):
+            measured = half.loc[half["channel"] == channel, "measured"]
+            np.testing.assert_allclose(measured, told, atol=0.02)  # headings are smoothed
 
 
 def test_there_is_one_standard_error(arcs):
@@ -170,8 +213,26 @@ def test_what_is_held_keeps_its_value_fitted_or_not(arcs):
         tm.fit(log, model, priors={GAIN: (1.0, 0.0)})
     with pytest.raises(TypeError, match=r"prior of base\.forward_gain: is 1"):
         tm.fit(log, model, priors={GAIN: 1})
+    with pytest.raises(tm.ModelError, match=r"half_track_m: has a prior and is not fitted; name"):
+        tm.fit(log, model, priors={"robot.half_track_m": (0.08, 0.001)})
+    with pytest.raises(tm.ModelError, match=r"yaw_gain: has a prior and is held"):
+        tm.fit(log, model, priors={"base.yaw_gain": (1, 0.1)}, hold=["base.yaw_gain"])
+    for hold in ("base.yaw_gain", "base"):
+        with pytest.raises(tm.ModelError, match=r"yaw_gain: is in `free` and is held"):
+            tm.fit(log, model, free=["base.yaw_gain"], hold=[hold])
     with pytest.raises(tm.ModelError, match="moves nothing"):
         tm.fit(log, model, free=["sensor.range_m"])
+
+
+def test_fits_to_several_logs_are_told_apart_and_are_small(arcs):
+    """A fit pickles to a few times its log, whose numbers it has, and is named by it."""
+    fitted, log, model = arcs
+    assert "arcs1" in repr(fitted) and "arcs1" in repr(fitted.model)
+    assert "fitted" not in repr(tm.Model.load(model))
+    size = len(pickle.dumps(log))
+    assert len(pickle.dumps(fitted)) < 8 * size
+    again = pickle.loads(pickle.dumps(fitted))
+    assert again.residuals().equals(fitted.residuals()) and str(again) == str(fitted)
 
 
 def test_results_go_to_other_processes_and_come_back(arcs):

@@ -25,6 +25,34 @@ def grain(vx, theta, along_x, along_y):
     return vx * (along_x * np.cos(theta) + along_y * np.sin(theta))
 
 
+UNKNOWN = {
+    "quantity": (("vx_mp", lambda vx, p: p * vx, {}), "adds_to = 'vx_mp' is unknown; .* 'vx_mps'"),
+    "signal": (("vx_mps", lambda speed, p: p * speed, {}), "unknown name 'speed'"),
+    "signal of wheels": (("vx_mps", lambda rim, p: p * rim, {}), "unknown name 'rim'"),
+    "signal of a rate": (
+        ("vx_mps", lambda s, p: p * s, {"state_rate": lambda vz, s, p: vz - s}),
+        "state_rate = .*unknown name 'vz'",
+    ),
+}
+
+
+@pytest.mark.parametrize(("effect", "said"), UNKNOWN.values(), ids=UNKNOWN)
+def test_what_no_formula_knows_is_refused_where_it_is_written(effect, said):
+    adds_to, function, rates = effect
+    with pytest.raises(ValueError, match=said) as refused:
+        tm.python_effect(adds_to, {"p": tm.Number()}, **rates)(function)
+    assert "\n" not in str(refused.value)
+
+
+def test_the_card_names_all_quantities_that_can_be_added_to():
+    """Those that the twin takes: each is tried."""
+    card = str(tm.effect("equation"))
+    for name in ("duty", "rim_mps", "vx_mps", "vy_mps", "omega_radps", "travel", "motion", "aside"):
+        tm.python_effect(name, {"p": tm.Number()})(lambda t, p: p * t)
+        assert name in card
+    assert {"room_mps", "theta_rad", "adds_to"} <= set(card.replace(",", " ").split())
+
+
 def test_an_effect_pickles_as_the_function_in_whose_place_it_stands():
     assert pickle.loads(pickle.dumps(grain)) is grain
 
@@ -182,13 +210,9 @@ def test_what_no_formula_can_do_is_said(function, error, says):
         tm.python_effect("vx_mps", {"k": tm.Number()})(function)
 
 
-def test_a_number_with_the_name_of_a_signal_is_refused(carpet):
-    @tm.python_effect("vx_mps", {"x": tm.Number()})
-    def push(vx, x):
-        return vx * x
-
+def test_a_number_with_the_name_of_a_signal_is_refused():
     with pytest.raises(ValueError, match="'x' means something else in a formula; take another"):
-        carpet[1].add(push, carpet[0])
+        tm.python_effect("vx_mps", {"x": tm.Number()})(lambda vx, x: vx * x)
     with pytest.raises(ValueError, match="'größe' must be called by letters of English"):
         tm.python_effect("vx_mps", {"größe": tm.Number()})(lambda vx, größe: vx * größe)
     with pytest.raises(ValueError, match="has a comma"):

@@ -319,3 +319,32 @@ def test_detections_say_seen_in_words_and_have_no_range_of_nothing(imported, tmp
     summary = import_log(*files, tmp_path / "d.lcmlog", detections=tmp_path / "d.csv")
     np.testing.assert_array_equal(read_log(tmp_path / "d.lcmlog").robots[4].seen, seen)
     assert any("30 rows with range_m though seen is 0" in w for w in summary["warnings"])
+
+
+@pytest.mark.parametrize("turns", [1.3, 30.0])
+@pytest.mark.parametrize("factor", [1.0, 180 / np.pi])
+@pytest.mark.parametrize("aside", [False, True])
+def test_a_heading_without_a_unit_is_told_by_how_its_path_turns(imported, turns, factor, aside):
+    """On a circle of 0.3 m the heading is the course, by algebra, however often it goes round."""
+    t_s = np.arange(0, 30, 0.05)
+    theta = 2 * np.pi * turns * t_s / 30
+    noise = np.random.default_rng(1).normal(0, 0.0005, (2, len(t_s)))
+    x, y = 0.3 * np.array([np.sin(theta), -np.cos(theta)]) + noise
+    rows = pd.DataFrame({"t_s": t_s, "x_m": x, "y_m": y, "theta": factor * theta})
+    if aside:
+        own = rows.drop(columns="t_s")
+        rows = pd.concat([rows[["t_s"]], own.add_prefix("r4_"), own.add_prefix("r5_")], axis=1)
+    else:
+        rows["robot_id"] = 4
+    unit = "theta_rad" if factor == 1 else "theta_deg"
+    with pytest.raises(LogError, match=f"so it looks like .*rename={{'theta': '{unit}'}}") as told:
+        imported(rows)
+    assert "turns as the path does" in str(told.value)
+
+
+def test_a_heading_that_nothing_tells_may_be_of_either_unit(imported):
+    """It goes to 8 on a straight line: 8 degrees, or a robot that drives sideways."""
+    t_s = np.arange(0, 30, 0.05)
+    rows = {"t_s": t_s, "robot_id": 4, "x_m": 0.1 * t_s, "y_m": 0.0, "theta": 8 * t_s / 30}
+    with pytest.raises(LogError, match="like degrees, or like radians that go on beyond a whole"):
+        imported(pd.DataFrame(rows))

@@ -38,7 +38,10 @@ FIELD = re.compile(r"^\s*(\w+)\s+(\w+)(?:\[(\d+)\])?;", re.MULTILINE)
 
 
 class LogError(ValueError):
-    """A measurement cannot be used; the message is one sentence: what, value, why, what to do."""
+    """A measurement cannot be used; the message is one sentence: what, value, why, what to do.
+
+    It is a ValueError: who catches those catches it, too.
+    """
 
 
 class Payloads(Sequence[bytes]):

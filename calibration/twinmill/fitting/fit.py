@@ -170,11 +170,15 @@ class Choice:
         """Parameters to fit, chosen from the usual ones.
 
         Raises:
-            ModelError: a name is of nothing that a fit of the motion can move.
+            ModelError: a name is of nothing that a fit of the motion can move, is to be free and
+                held, or has a prior and is not free.
         """
         known = quantity_names(model)
         for name in (*self.hold, *(self.free or ()), *self.priors):
             _check_name(name, known)
+        for name in self.free or ():
+            if _among(name, self.hold):
+                raise ModelError(f"{name}: is in `free` and is held; name it in one of them.")
         chosen = list(usual)
         if self.free is not None:
             others = [n for n in known if n.startswith(MOTION) and _among(n, self.free)]
@@ -184,7 +188,21 @@ class Choice:
             for name in self.free:
                 if not any(_among(p.name, (name,)) for p in chosen):
                     raise ModelError(f"{name}: moves nothing in these measurements; leave it out.")
-        return [self._informed(p) for p in chosen if not _among(p.name, self.hold)]
+        moved = [p for p in chosen if not _among(p.name, self.hold)]
+        self._check_priors([p.name for p in moved])
+        return [self._informed(p) for p in moved]
+
+    def _check_priors(self, moved: Collection[str]) -> None:
+        """Raises ModelError where a prior is of nothing that is moved."""
+        for name in self.priors:
+            if name in moved:
+                continue
+            if _among(name, self.hold):
+                raise ModelError(f"{name}: has a prior and is held; leave one of them out.")
+            raise ModelError(
+                f"{name}: has a prior and is not fitted; name it in `free`, with all else that is "
+                f"to be fitted (without a choice these are: {', '.join(moved)})."
+            )
 
     def held(self, usual: Sequence[Parameter], model: native.Model) -> tuple[Held, ...]:
         """Quantities that keep their values by this choice, in the order of the usual ones.
@@ -211,7 +229,7 @@ class Choice:
                 f"{p.name}: a prior of {mean:g} +- {std:g} cannot be; its mean must be within "
                 f"{p.min:g} to {p.max:g} and its standard deviation above 0."
             )
-        return replace(p, usual=float(mean), std=float(std))
+        return replace(p, usual=float(mean), std=float(std), prior=True)
 
 
 MOTION = ("base.", "robot.")  # sections whose numbers say how a robot moves

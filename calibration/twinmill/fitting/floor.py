@@ -3,6 +3,8 @@
 
 It is a property of the log. Of the model file only the robot's form is used (drive, wheels,
 geometry), with numbers refitted to this very log. So better predictions never get a worse score.
+It is the root mean square of the response's errors on the parts that it was fitted to, which are
+less than the noise, and on those that it was not, which are more.
 """
 
 from collections.abc import Sequence

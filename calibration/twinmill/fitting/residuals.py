@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.fitting.compare import RobotComparison
 from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict import steady_states, windows
 from twinmill.predict.datasets import Trajectory
+from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.predict.steady_states import SteadyStates
 
 
@@ -20,6 +22,7 @@ class Residuals:
         start_s: (W,) when predictions start, capture's clock; NaN in a table.
         horizon_s: (H,) how far they go; NaN in a table.
         channels: C names with their units.
+        measured: (W, H, C) displacements seen from the start, or what a table tells.
         errors: (W, H, C); NaN where there is none that is judged.
         floor: (W, H, C) errors that count as one.
     """
@@ -29,8 +32,30 @@ class Residuals:
     start_s: np.ndarray
     horizon_s: np.ndarray
     channels: tuple[tuple[str, str], ...]
+    measured: np.ndarray
     errors: np.ndarray
     floor: np.ndarray
+
+    @classmethod
+    def of(cls, robot: RobotComparison | SteadyComparison) -> "Residuals":
+        """Residuals of one robot that a model was compared with."""
+        name, errors = robot.measurement.log_name, robot.errors
+        if isinstance(robot, SteadyComparison):
+            nothing = np.full(len(errors), np.nan)
+            parts = (robot.predicted + errors, errors, robot.modelled.floor())
+            return cls(
+                *(name, robot.robot_id, nothing, np.array([np.nan])),
+                tuple(robot.modelled.channels),
+                *(part[:, None] for part in parts),
+            )
+        track, own = robot.measurement.track, robot.windows
+        return cls(
+            *(name, robot.robot_id, track.pose_t_s[own.starts], np.array(windows.HORIZONS_S)),
+            windows.CHANNELS,
+            own.measured(robot.measurement),
+            errors,
+            np.broadcast_to(robot.floor.rms, errors.shape),
+        )
 
     def columns(self) -> dict[str, np.ndarray | str | int]:
         """Columns of a table with a row for each error."""
@@ -44,6 +69,8 @@ class Residuals:
             "horizon_s": self.horizon_s[horizon],
             "channel": names[channel],
             "unit": units[channel],
+            "measured": self.measured[known],
+            "predicted": self.measured[known] - self.errors[known],
             "residual": self.errors[known],
             "floor": self.floor[known],
         }
@@ -55,17 +82,18 @@ def residuals_of(fit: ScoreFit) -> list[Residuals]:
     for data, model, rows in zip(fit.datasets, fit.models, fit.state[0], strict=True):
         if isinstance(data, Trajectory):
             errors = data.as_errors(rows)
-            floor = np.broadcast_to(data.floor, errors.shape)
+            floor, measured = np.broadcast_to(data.floor, errors.shape), data.measured
             start_s, horizon_s = data.start_s, np.array(windows.HORIZONS_S)
             channels = windows.CHANNELS
         elif isinstance(data, SteadyStates):
-            errors, floor = data.fitted(model).errors()[:, None], data.floor()[:, None]
+            own = data.fitted(model)
+            errors, floor = own.errors()[:, None], data.floor()[:, None]
+            measured = errors + own.predicted()[:, None]
             start_s, horizon_s = np.full(len(errors), np.nan), np.array([np.nan])
             channels = steady_states.CHANNELS
         else:
             raise TypeError(f"{data.label}: has no errors in a unit of its own.")
         name = data.measurement.log_name
-        found.append(
-            Residuals(name, data.robot_id, start_s, horizon_s, tuple(channels), errors, floor)
-        )
+        told = (measured, errors, floor)
+        found.append(Residuals(name, data.robot_id, start_s, horizon_s, tuple(channels), *told))
     return found

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import twinmill_native as native
@@ -167,6 +168,15 @@ class Response:
         for name in ("starts", "ends", "within", "across", "unboosted"):
             setattr(other, name, getattr(self, name)[::every])
         other._index_windows()
+        return other
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the features, most of its memory, which a fit alone needs: it is over."""
+        return {name: value for name, value in vars(self).items() if name != "features"}
+
+    def __copy__(self) -> "Response":
+        other = Response.__new__(Response)
+        vars(other).update(vars(self))
         return other
 
     # -- where features are taken ---------------------------------------------------------------

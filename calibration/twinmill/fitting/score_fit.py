@@ -768,12 +768,18 @@ class ScoreFit:
     def _intervals(self) -> np.ndarray:
         """(P, P) the same, its scatter widened by Student's t for so few blocks.
 
-        And by how far the prior pulled what came out far from it: G^-1 D (x - usual), to first
-        order, by the curvature G and the prior's precision D.
+        And by how far a usual prior pulled what came out far from it: G^-1 D (x - usual), to first
+        order, by the curvature G and the prior's precision D. A prior that was given is no such
+        guess but knowledge: its pull is no error, and what it tells is never less sure than it.
         """
         widening = t_quantile(0.975, max(self.blocks - 1, 1)) / NORMAL_95
-        pull = np.linalg.pinv(self._curvature) @ ((self.x - self.usual) / self.std**2)
-        return self.covariance + (widening**2 - 1) * self._scatter_covariance + np.outer(pull, pull)
+        given = np.array([u.parameter.prior for u in self.unknowns], bool)
+        away = np.where(given, 0.0, self.x - self.usual)
+        pull = np.linalg.pinv(self._curvature) @ (away / self.std**2)
+        wide = self.covariance + (widening**2 - 1) * self._scatter_covariance + np.outer(pull, pull)
+        over = np.sqrt(np.diag(wide)) / self.std
+        narrowed = np.where(given & (over > 1), 1 / np.maximum(over, 1e-300), 1.0)
+        return wide * np.outer(narrowed, narrowed)
 
     @property
     def stds(self) -> np.ndarray:
@@ -818,6 +824,7 @@ class ScoreFit:
                 seen,
                 not seen and bool(rest < SEEN * p.std),
                 p.words,
+                p.prior,
             )
             found.append(known_to_gap(estimate, gaps) if p.role == "moment" else estimate)
         return found

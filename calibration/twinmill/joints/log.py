@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from twinmill.counted import counted
 from twinmill.data.lcm_log import LogError
 
 FEWEST = 40  # samples: five steps of a joint
@@ -18,7 +19,7 @@ GAP = 3.0  # periods between two samples, from which something is missing betwee
 APART_S = 1.0  # between runs that are joined: more than a command is late
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class JointLog:
     """N samples of a run, as MuJoCo names and measures: rad, m, and the units of `ctrl`.
 
@@ -109,6 +110,16 @@ class JointLog:
 
     def _period_s(self, run: slice) -> float:
         return float(np.median(np.diff(self.t_s[run])))
+
+    @property
+    def duration_s(self) -> float:
+        """Length of all runs together."""
+        return float(sum(np.ptp(self.t_s[run]) for run in self.runs))
+
+    def __repr__(self) -> str:
+        joints, acts = self.qpos.shape[1], self.ctrl.shape[1]
+        counts = f"{counted(joints, 'joint')}, {counted(acts, 'actuator')}"
+        return f"JointLog({self.name}: {counts}, {self.duration_s:.0f} s)"
 
     @property
     def stretches(self) -> list[slice]:

@@ -103,6 +103,10 @@ class JointModel:
         return {n: v for n, v in every.items() if instance_of(n) == instance}
 
 
+def unchanged(_: Action) -> None:
+    """The base as its file has it."""
+
+
 @dataclass(frozen=True)
 class Plant:
     """MuJoCo at the states of a log.
@@ -117,12 +121,12 @@ class Plant:
     mjcf: Mjcf
     series: Series
     run: Run | None = None
-    act: Act = field(default=lambda _: None, repr=False)
+    act: Act = field(default=unchanged, repr=False)
 
     @classmethod
     def of(cls, mjcf: Mjcf, series: Series) -> "Plant":
         """Runs the model by the commands of a log."""
-        return cls(mjcf, series).about(lambda _: None)
+        return cls(mjcf, series).about(unchanged)
 
     def about(self, act: Act) -> "Plant":
         """With the states of a run of the base once it is changed."""

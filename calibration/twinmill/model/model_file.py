@@ -176,6 +176,12 @@ class ModelFile:
         return dict(self._document.get("fit", {}))
 
     @property
+    def fitted_logs(self) -> str:
+        """Names of the logs that it was fitted to, of many the first; empty without a fit."""
+        first, *others = self.fit.get("logs", []) or [""]
+        return f"{first} and {len(others)} more" if len(others) > 1 else ", ".join([first, *others])
+
+    @property
     def covariance(self) -> Covariance:
         """Covariance of the estimates; empty without a fit, or in a file of an older version.
 

@@ -77,6 +77,7 @@ class Parameter:
             or PHASE.
         strength: an effect's default less its neutral value.
         words: what it is, where its name does not say so: `speed at 50 % duty`.
+        prior: the prior was given as what is known; else it is weak, about a usual size.
     """
 
     name: str
@@ -91,6 +92,7 @@ class Parameter:
     role: str = "size"
     strength: float = 0.0
     words: str = ""
+    prior: bool = False
 
     def at(self, value: float) -> "Parameter":
         """A parameter that starts elsewhere; the prior of a place or a moment moves with it."""
@@ -106,7 +108,7 @@ class ParameterEstimate:
         at_bound: it ended at a bound.
         seen: false where the log does not tell it by itself, and the prior holds it.
         together: the log tells it once others are known, as left wheels of which the sum is told.
-        words: as of the parameter.
+        words, prior: as of the parameter.
     """
 
     name: str
@@ -117,6 +119,7 @@ class ParameterEstimate:
     seen: bool
     together: bool = False
     words: str = ""
+    prior: bool = False
 
     @property
     def told(self) -> bool:

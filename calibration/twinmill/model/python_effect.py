@@ -23,6 +23,13 @@ from twinmill.model.parameters import FORMULA_NUMBERS, effect_names
 PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # names that the twin's formulas can have
 STATES = ("state_rate", "second_rate")
 EQUATION = ("adds_to", "formula", *STATES)  # those of the texts that compute
+ANY_ROBOT = """name = "any"
+[base]
+drive = "twist"
+wheels = "none"
+control_period_s = 0.02
+speed_per_input_mps = 0.1
+"""
 TRIED = np.random.default_rng(1).uniform(0.05, 0.4, (16, 32))  # signals, as of slow robots
 
 # numpy's functions in the words of muParser.
@@ -153,6 +160,7 @@ class PythonEffect:
         self.texts = {"adds_to": adds_to, "formula": self._formula(function)}
         self.texts |= {key: self._formula(rate) for key, rate in rates.items() if rate is not None}
         self.texts |= self._named()
+        self._check_known()
         self._check_neutral()
 
     @property
@@ -219,6 +227,13 @@ class PythonEffect:
         own = {name: number.text(name) for name, number in self.numbers.items()}
         return _text(function(*(Symbol(own.get(name, name)) for name in _arguments(function))))
 
+    def _check_known(self) -> None:
+        """Raises ValueError where the twin knows no such quantity, signal or number."""
+        try:
+            native.Model.from_toml(ANY_ROBOT, "any").add_effect("equation", self.texts)
+        except ValueError as error:
+            raise ValueError(f"{self.name}: {error}.") from error
+
     def _check_neutral(self) -> None:
         """Raises ValueError where it adds something though its numbers are all zero."""
         zero = {name: np.clip(0.0, n.low, n.high) for name, n in self.numbers.items()}
@@ -251,7 +266,9 @@ def python_effect(
     where its numbers are zero.
 
     Args:
-        adds_to: the quantity, as `vx_mps`; `effect("equation")` lists them.
+        adds_to: the quantity: vx_mps, vy_mps, omega_radps, travel, motion, aside, theta_rad;
+            of each wheel rim_mps, duty. `print(tm.effect("equation"))` tells what they
+            are, and which signals each has.
         numbers: what fits find, by the name of the argument; one to four.
         state_rate: of an effect that remembers: ds/dt, a function of signals, numbers and `s`,
             which then are arguments of the effect's function, too.
@@ -262,7 +279,7 @@ def python_effect(
 
     Raises:
         ValueError: the function adds something where its numbers are zero, or has no number or too
-            many.
+            many; there is no such quantity, or no such signal there.
         TypeError: the function does what no formula can.
 
     Examples:

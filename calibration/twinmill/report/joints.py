@@ -102,13 +102,13 @@ def comparison(found: JointComparison, hook: Path | None) -> RenderableType:
     return show.table(Table("RMS errors of positions", columns, rows, note=note))
 
 
-def excitation(found: Excitation, path: Path, then: str) -> RenderableType:
+def excitation(found: Excitation, path: Path | None, then: str) -> RenderableType:
     """Text of `twinmill next` of an MJCF.
 
     Args:
         found: the motion.
-        path: of the script.
-        then: the command that judges what it was for.
+        path: of the script; None: it is not written.
+        then: the command that judges what it was for; empty: none is told.
     """
     rows = [
         [Cell(a), Cell(b or "nothing"), Cell(percent(sure(found.before[a, b]))),
@@ -124,12 +124,13 @@ def excitation(found: Excitation, path: Path, then: str) -> RenderableType:
     table = Table("Told apart by", columns, rows[:QUESTIONS], note=note, words=(0, 1))
     pose = zip(found.mjcf.joints, found.log.qpos[0], found.mjcf.units, strict=True)
     begin = ", ".join(f"{joint} {number(float(q))} {unit}" for joint, q, unit in pose)
+    written = f"Written: {path}" if path else "Not written yet (`save(path)` does that)"
     lines = [
-        f"Written: {path}, the best of {found.kept} motions within the limits ({found.tried} "
+        f"{written}, the best of {found.kept} motions within the limits ({found.tried} "
         f"tried). It begins at rest at {begin}.",
         "ctrl.* is what to command; where actuators are told forces let a controller follow "
         "qpos.*, and record what it commands.",
-        f"then: {then}",
+        *([f"then: {then}"] if then else []),
     ]
     return Group(show.table(table), Text(), *map(Text, lines))
 

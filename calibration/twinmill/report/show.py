@@ -122,6 +122,7 @@ def effect(entry: dict[str, Any]) -> RenderableType:
         lines,
         Text(),
         table(tables.effect_parameters(entry)),
+        *([table(tables.effect_texts(entry))] if entry.get("texts") else []),
     )
 
 

@@ -28,7 +28,7 @@ VERDICTS: dict[str, Tone] = {
     "outside_catalogue": "bad",
 }
 
-OF_RESPONSE = "held-out error of a smooth response to the commands"
+OF_RESPONSE = "error of a smooth response to the commands, in-sample and held out"
 SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
@@ -269,10 +269,12 @@ def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) ->
     """Fitted quantities with their uncertainty, then those that were held."""
     rows = []
     for e in estimates:
-        told = e.seen or e.together
+        told = e.told or e.prior
         doubt = "" if e.seen else "known only in combination"
-        if e.at_bound or not told:
-            doubt = "at its bound" if e.at_bound else "not determined by this log"
+        if not e.told:
+            doubt = "from the prior" if e.prior else "not determined by this log"
+        if e.at_bound:
+            doubt = "at its bound"
         remark = "; ".join(words for words in (e.words, doubt) if words)
         value, std = (
             (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")
@@ -372,6 +374,12 @@ def catalogue(entries: list[dict[str, Any]]) -> Table:
         "twinmill twin effects NAME shows one with its equation and parameters.",
         (0, 1, 2),
     )
+
+
+def effect_texts(entry: dict[str, Any]) -> Table:
+    """Texts that an effect of the user's own is made of."""
+    rows = [[Cell(t["name"]), Cell(t["default"]), Cell(t["doc"])] for t in entry["texts"]]
+    return Table("Texts", ["text", "default", "meaning"], rows, words=(0, 1, 2))
 
 
 def effect_parameters(entry: dict[str, Any]) -> Table:

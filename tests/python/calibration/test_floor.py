@@ -61,6 +61,14 @@ def test_floor_is_how_far_noise_takes_the_robot(opened, tanh_robot, measure):
     assert np.all((opened.floor.rms / truth > 0.6) & (opened.floor.rms / truth < 1.6))
 
 
+def test_the_floor_is_of_errors_within_and_across_together(opened):
+    """A fit misses less than the noise where it was fitted, and more elsewhere."""
+    floor, response = opened.floor.rms, opened.floor.response
+    within, across = (rms(errors) for errors in (response.within, response.across))
+    np.testing.assert_allclose(floor**2, (within**2 + across**2) / 2)
+    assert np.all(within < floor) and np.all(floor < across)
+
+
 def test_a_gain_that_swells_and_ebbs_is_not_all_noise(tanh_robot, measure, model_file):
     """A quarter of the speed more and less, over 20 s: no command tells it, but the time does.
 

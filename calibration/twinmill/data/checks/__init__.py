@@ -22,6 +22,7 @@ from twinmill.data.checks.commands import (
     check_exchange,
     check_foreign,
     check_lever,
+    check_wheels,
 )
 from twinmill.data.checks.finding import CheckedTrack, InputFinding
 from twinmill.data.checks.rolling import check_rolling
@@ -76,6 +77,7 @@ def check_recorded(tracks: Tracks, model: native.Model | None) -> list[InputFind
     for label, track in tracks:
         own = own_option(track.robot_id, robots[label])
         found += check_drive(track, model, label) if model else check_rolling(track, label)
+        found += check_wheels(track, model, label) if model else []
         found += check_track(track, label, own)
     return of_all_robots(found, robots)
 

@@ -7,6 +7,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.arguments import option, options
+from twinmill.counted import counted
 from twinmill.data.checks.alternatives import (
     OWN,
     Alternative,
@@ -28,6 +29,7 @@ from twinmill.data.checks.words import described
 from twinmill.data.log import KINDS, CommandKind
 from twinmill.data.track import Track
 
+OMNI = 3  # wheels of the only robots with an odd number
 OTHER_DRIVE = "take a model of this robot, or import the commands that the model is driven by"
 OTHER_WHEELS = ", or, if the columns are right, check base.wheels and the sizes of the model"
 DRIVEN_BY = {
@@ -116,6 +118,43 @@ def check_drive(track: Track, model: native.Model, label: str) -> list[InputFind
             if model.drive in KINDS
             else 'take drive = "twist": logs hold steering angles as the velocities they ask for',
             True,
+            label,
+            track.robot_id,
+        )
+    ]
+
+
+def check_wheels(track: Track, model: native.Model, label: str) -> list[InputFinding]:
+    """A finding where the wheels that are commanded are not those that the model has.
+
+    Of two wheels the columns of both axles may tell the same; of three omni wheels the fourth is 0.
+    """
+    if track.command_kind not in ("duty", "wheel_speed") or track.command_kind != model.drive:
+        return []
+    words = [wheel["words"] for wheel in model.wheels()]
+    told: list[bool] = (track.command[:, : len(words)] != 0).any(axis=0).tolist()
+    if len(words) == OMNI and track.command[:, OMNI:].any():
+        return [
+            InputFinding(
+                "a fourth wheel is commanded, and the model has three",
+                "the fourth column is not 0, as where left and right are told",
+                "give one column for each omni wheel, or another model",
+                False,
+                label,
+                track.robot_id,
+            )
+        ]
+    idle = [word for word, own in zip(words, told, strict=True) if not own]
+    if not idle or not any(told):
+        return []
+    those = " and ".join(filter(None, [", ".join(idle[:-1]), idle[-1]]))
+    return [
+        InputFinding(
+            f"no command drives {those}, which the model has among its {len(words)} driven wheels",
+            f"its commands are 0 throughout, and those of {counted(sum(told), 'wheel')} not",
+            "if the robot has two wheels, give the model half_wheelbase_m = 0 in [robot]; if each "
+            "motor drives a side, log its command for both wheels there",
+            False,
             label,
             track.robot_id,
         )

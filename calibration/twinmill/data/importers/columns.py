@@ -18,6 +18,7 @@ from tomlkit.exceptions import TOMLKitError
 from twinmill.arguments import option
 from twinmill.data.importers.ros_messages import STAND_IN
 from twinmill.data.importers.topics import APART, field_of, is_path, is_si
+from twinmill.data.importers.turning import unit_of_heading
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import LOST, TIMES, Table, is_number
 from twinmill.data.units import UNITS, plain_name, split_unit
@@ -245,6 +246,7 @@ OF_PLOTJUGGLER = "__time"  # in s, always
 OUR_DAYS_S = (1e9, 2.5e9)  # since 1970: the years 2001 to 2049
 QUATERNIONS = (("qw", "qx", "qy", "qz"), ("qx", "qy", "qz", "qw"))  # orders of q0 to q3
 NUMBERED = ("q0", "q1", "q2", "q3")
+HALF_TURN_DEG = 180.0  # no robot turns so far from row to row: then it is the way back of degrees
 LEVEL = 0.2  # x and y of the quaternion of a robot on a floor are smaller
 DIRECTION = re.compile(r"(^|_)dir(ection)?(_|$)")  # of a wheel, beside a duty without a sign
 COUNTERS = ("frame", "frame_id", "frame_number", "sample", "index")
@@ -300,6 +302,7 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
         larger, other = sorted(plane, key=lambda g: g.factor)
         why = f"in the unit of '{larger.column}', which {larger.why}"
         changed[other.column] = replace(other, factor=larger.factor, why=why)
+    changed |= _turning_as_the_path(table, guesses)
     changed |= _quaternion(table, known, named) | _beside_quaternion(table, guesses)
     told = {target for guess in guesses for target in guess.targets}
     for name, column in named.items():
@@ -311,6 +314,35 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
     if counter and not has_time and "t_s" in known:
         changed[counter] = Guess(counter, ("t_s",), math.nan, ", ".join(lacks("t_s")), False)
     return [changed.get(guess.column, guess) for guess in guesses]
+
+
+def _turning_as_the_path(table: Table, guesses: list[Guess]) -> dict[str, Guess]:
+    """The heading in the unit in which it turns as the path does, where its size alone misleads."""
+    of = {g.targets[0]: g for g in guesses if len(g.targets) == 1}
+    heading = of.get("theta_rad")
+    if not heading or heading.sure or not {"x_m", "y_m"} <= of.keys():
+        return {}
+    try:
+        x, y, theta = (
+            table.numbers(of[name].column, empty_is_nan=True)
+            for name in ("x_m", "y_m", "theta_rad")
+        )
+    except LogError:  # a cell is no number, which is told when it is read
+        return {}
+    robot = of.get("robot_id")
+    ids = np.array(table.cells(robot.column)) if robot else np.zeros(len(theta))
+    runs = [(ids == number) for number in np.unique(ids)]
+    unit = unit_of_heading([(np.column_stack([x, y])[own], theta[own]) for own in runs])
+    top = float(np.nanmax(np.abs(theta), initial=0.0))
+    if unit:
+        words = {"rad": "radians", "deg": "degrees"}[unit]
+        why = f"goes to {top:.4g} and turns as the path does in {words}, so it looks like {words}"
+        return {heading.column: replace(heading, factor=UNITS[unit][1], why=why)}
+    jumps = [np.abs(np.diff(theta[own])) > HALF_TURN_DEG for own in runs]
+    if heading.factor != 1 and not any(map(np.any, jumps)):
+        why = f"{heading.why}, or like radians that go on beyond a whole turn"
+        return {heading.column: replace(heading, why=why)}
+    return {}
 
 
 def _beside_quaternion(table: Table, guesses: list[Guess]) -> dict[str, Guess]:

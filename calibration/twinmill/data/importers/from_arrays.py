@@ -9,12 +9,16 @@ import numpy as np
 import tomlkit
 import turbopi
 
+from twinmill.data.importers.columns import by_name
 from twinmill.data.importers.log_writer import log_parts
-from twinmill.data.importers.plain import QUATERNION, STEERED, VALUES
+from twinmill.data.importers.plain import OF_COMMANDS, OF_POSES, QUATERNION, STEERED, VALUES
 from twinmill.data.importers.series import (
+    SIDES,
     CommandSeries,
     PoseSeries,
     is_no_turn,
+    of_both_axles,
+    of_its_wheels,
     quaternion_from_heading,
     unit_quaternions,
     velocities_of_steering,
@@ -22,13 +26,15 @@ from twinmill.data.importers.series import (
 from twinmill.data.log import Log, LogError, heading_rad, log_of
 
 Kind = Literal["twist", "duty", "wheel_speed", "steering"]
-# Columns that an array of commands may have, by its kind: the least and the most.
-WIDTHS: dict[Kind, tuple[int, int]] = {
+# Columns that an array of commands may have, by its kind.
+OF_WHEELS = (SIDES, 3, 4)  # left and right, three omni wheels, four
+WIDTHS: dict[Kind, tuple[int, ...]] = {
     "twist": (2, 3),
-    "duty": (1, 4),
-    "wheel_speed": (1, 4),
-    "steering": (2, 2),
+    "duty": OF_WHEELS,
+    "wheel_speed": OF_WHEELS,
+    "steering": (2,),
 }
+WORDS = {OF_WHEELS: "2 (left, right), 3 (omni wheels) or 4 (fl, fr, rl, rr)"}
 COLUMNS: dict[Kind, tuple[str, ...]] = {
     "twist": VALUES["twist"],
     "duty": VALUES["duty"],
@@ -73,8 +79,9 @@ def commands_of(
         robot_id: 0..99.
         t_s: (M,) as of poses.
         commands: (M, K) by kind. twist: vx_mps, vy_mps, omega_radps, or vx_mps, omega_radps; duty:
-            percent, wheel_speed: rad/s, of each driven wheel in the model's order; steering:
-            vx_mps, steering_rad.
+            percent, wheel_speed: rad/s, both of left and right (of every axle), or of three omni
+            wheels, or of front left, front right, rear left, rear right; steering: vx_mps,
+            steering_rad.
         kind: of the commands.
         wheelbase_m: distance of the axles, of a robot told steering angles.
 
@@ -93,6 +100,8 @@ def commands_of(
         values = velocities_of_steering("commands", values[:, 0], values[:, 1], wheelbase_m)
     elif kind == "twist" and values.shape[1] == 2:
         values = np.insert(values, 1, 0.0, axis=1)
+    elif kind in ("duty", "wheel_speed") and values.shape[1] == SIDES:
+        values = of_both_axles(values)
     count = len(values)
     return CommandSeries(
         robot_id=robot_id,
@@ -148,8 +157,8 @@ def log_of_frames(
 
     Args:
         poses: columns t_s and POSE, the last of them optional or by QUATERNION; optional robot_id
-            and valid.
-        commands: columns t_s and one group of COLUMNS; optional robot_id.
+            and valid; in another unit where their names say it.
+        commands: columns t_s and one group of COLUMNS, or of two sides; optional robot_id.
         kind: of the commands; None: by their columns.
         robot_id: of frames that do not say.
         wheelbase_m: see `commands_of`.
@@ -159,12 +168,14 @@ def log_of_frames(
     Raises:
         LogError: a column is missing, or the numbers make no run.
     """
-    kind = _kind_of(commands) if kind is None else kind
+    own, poses = commands, _under_our_names(poses, OF_POSES, "poses")
+    commands = _under_our_names(commands, OF_COMMANDS, "commands")
+    kind = _kind_of(commands, own) if kind is None else kind
     pose = _poses(poses)
     if "valid" in poses:
         pose[~np.asarray(poses["valid"], bool)] = np.nan
-    value = _columns(commands, COLUMNS.get(kind, ()), "commands")
-    pose_t_s, command_t_s = _times(poses, "poses"), _times(commands, "commands")
+    value = _columns(commands, _group_of(kind, commands), "commands")
+    pose_t_s, command_t_s = np.asarray(poses["t_s"]), np.asarray(commands["t_s"])
     return log_of_series(
         [
             poses_of(robot, pose_t_s[rows], pose[rows])
@@ -190,22 +201,54 @@ def _poses(frame: Any) -> np.ndarray:
     return _columns(frame, POSE if POSE[-1] in frame else POSE[:-1], "poses")
 
 
-def _kind_of(frame: Any) -> Kind:
-    found = [kind for kind, names in COLUMNS.items() if all(name in frame for name in names)]
-    if len(found) != 1:
-        known = "; ".join(", ".join(names) for names in COLUMNS.values())
-        has = f"those of {' and of '.join(found)}" if found else "none of them whole"
-        raise LogError(f"commands: must have one of these groups of columns: {known}; has {has}.")
-    return found[0]
+def _under_our_names(frame: Any, known: frozenset[str], what: str) -> dict[str, Any]:
+    """Our columns of a frame, also by names that say all with their unit, as `left_radps`.
 
-
-def _times(frame: Any, what: str) -> np.ndarray:
-    if "t_s" not in frame:
+    Raises:
+        LogError: two of such names hold one quantity, or there are no times.
+    """
+    names = list(getattr(frame, "columns", getattr(frame, "variables", frame)))
+    found = {name: frame[name] for name in names if name in known}
+    own, source = frozenset(found), dict[str, str]()
+    for name in names:
+        targets, factor = (isinstance(name, str) and by_name(name, known - {"robot_id"})) or ((), 1)
+        for target in targets if np.isfinite(factor) else ():
+            if target in own:
+                continue
+            if target in source:
+                raise LogError(f"{name}: holds what {source[target]} does; leave one of them out.")
+            source[target] = name
+            found[target] = factor * np.asarray(frame[name]) if factor != 1 else frame[name]
+    if "t_s" not in found:
         remedy = "; of times as pandas' index: frame.reset_index(names='t_s')"
         raise LogError(
             f"{what}: has no column t_s, times in s or dates{remedy * hasattr(frame, 'index')}."
         )
-    return np.asarray(frame["t_s"])
+    return found
+
+
+def _kind_of(frame: Any, own: Any) -> Kind:
+    """Kind of the commands, by whole groups of our own names, or else of names with units."""
+    found = _kinds(own) or _kinds(frame)
+    if len(found) != 1:
+        known = "; ".join(", ".join(names) for names in COLUMNS.values())
+        has = f"those of {' and of '.join(found)}; say the kind" if found else "none of them whole"
+        raise LogError(
+            f"commands: must have one of these groups of columns: {known}; of two wheels "
+            "left_radps, right_radps (or _rpm), or left_pct, right_pct (or _pwm, _unit); of rims "
+            f"in m/s divide by the wheel's radius; has {has}."
+        )
+    return found[0]
+
+
+def _kinds(frame: Any) -> list[Kind]:
+    return [kind for kind in COLUMNS if all(name in frame for name in _group_of(kind, frame))]
+
+
+def _group_of(kind: Kind, frame: Any) -> tuple[str, ...]:
+    """Columns of a kind; speeds of wheels without those that the robot has not."""
+    names = COLUMNS.get(kind, ())
+    return of_its_wheels(names, frame) if kind == "wheel_speed" else names
 
 
 def _columns(frame: Any, names: Iterable[str], what: str) -> np.ndarray:
@@ -259,15 +302,14 @@ def _stamps_us(name: str, t_s: Any) -> np.ndarray:
     return utime_us
 
 
-def _rows(name: str, values: Any, count: int, widths: tuple[int, int]) -> np.ndarray:
-    least, most = widths
+def _rows(name: str, values: Any, count: int, widths: tuple[int, ...]) -> np.ndarray:
     try:
         array = np.array(values, float)
     except (TypeError, ValueError) as error:
         raise LogError(f"{name}: is not all numbers ({error}).") from error
     array = array[:, None] if array.ndim == 1 else array
-    if array.ndim != 2 or len(array) != count or not least <= array.shape[1] <= most:
-        width = f"{least}" if least == most else f"{least} to {most}"
+    if array.ndim != 2 or len(array) != count or array.shape[1] not in widths:
+        width = WORDS[widths] if widths in WORDS else " or ".join(map(str, widths))
         raise LogError(
             f"{name}: has shape {array.shape}, and must have {count} rows, one for each time, and "
             f"{width} columns."

@@ -18,10 +18,13 @@ from twinmill.data.importers.columns import Mapping
 from twinmill.data.importers.mapped import read_mapped
 from twinmill.data.importers.samples import filled_in, samples_of
 from twinmill.data.importers.series import (
+    SIDES,
     CommandSeries,
     DetectionSeries,
     PoseSeries,
     is_no_turn,
+    of_both_axles,
+    of_its_wheels,
     quaternion_from_heading,
     unit_quaternions,
     velocities_of_steering,
@@ -175,6 +178,11 @@ def _commands(table: Table, columns: Columns) -> list[CommandSeries]:
             np.abs(inputs[:, k]) > limit, name, inputs[:, k], f"must lie in -{limit}..{limit}"
         )
     value = _values(table, kind, inputs, columns.wheelbase_m)
+    if kind == "wheel_speed" and len(_of_wheels(table)) == SIDES:
+        notes = [
+            *notes,
+            f"{table.name}: w1_radps is of the left wheels, w2_radps of the right ones.",
+        ]
     return [
         CommandSeries(
             robot_id=number,
@@ -313,6 +321,7 @@ def _input(table: Table, name: str) -> np.ndarray:
 
 def _kind(table: Table) -> CommandKind:
     groups = {kind: [columns] for kind, columns in VALUES.items()}
+    groups["wheel_speed"] = [_of_wheels(table)]
     groups["twist"] += [WORLD, STEERED]
     found = [(kind, columns) for kind in groups for columns in groups[kind] if table.has(*columns)]
     if len(found) > 1:
@@ -343,7 +352,13 @@ def _columns_of(table: Table, kind: CommandKind) -> tuple[str, ...]:
         return (*WORLD, *(["omega_radps"] if table.has("omega_radps") else []))
     if table.has(*STEERED) and not table.has(*VALUES[kind]):
         return STEERED
+    if kind == "wheel_speed":
+        return _of_wheels(table)
     return VALUES[kind] if table.has(*VALUES[kind]) else INPUTS
+
+
+def _of_wheels(table: Table) -> tuple[str, ...]:
+    return of_its_wheels(VALUES["wheel_speed"], table.header)
 
 
 def _complete(table: Table, kind: CommandKind) -> Table:
@@ -384,7 +399,7 @@ def _values(
             f"{option('rename')} "
             f"{columns[0]}={columns[0][:2]}_unit ..."
         )
-    return value
+    return of_both_axles(value[:, :SIDES]) if len(columns) == SIDES else value
 
 
 def _orientation(table: Table) -> np.ndarray:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Series that every reader of foreign measurements hands over: poses and commands of one robot."""
 
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from twinmill.arguments import option
 from twinmill.counted import counted
 from twinmill.data.log import CommandKind, LogError, heading_rad
 
+SIDES = 2  # left and right: the least that a robot is driven by
 TURNED_RAD = 0.02  # turns a velocity by 2 % of itself
 
 
@@ -66,6 +68,18 @@ class CommandSeries:
     world: bool = False
     called: str = ""
     mixed: bool = False
+
+
+def of_both_axles(sides: np.ndarray) -> np.ndarray:
+    """(rows, 4) commands of all wheels, from (rows, 2) of the left and the right ones."""
+    return np.tile(sides, 2)
+
+
+def of_its_wheels(names: tuple[str, ...], there: Container[str]) -> tuple[str, ...]:
+    """Names of four wheels' columns; the first two or three, where no others are there."""
+    count = next((k for k, name in enumerate(names) if name not in there), len(names))
+    no_more = not any(name in there for name in names[count:])
+    return names[:count] if count >= SIDES and no_more else names
 
 
 def stopped_when_silent(series: CommandSeries, timeout_s: float) -> CommandSeries:
