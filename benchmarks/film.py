@@ -160,7 +160,7 @@ def miss_of(shot: Shot, robot: RobotPath) -> dict:
 def judged(shot: Shot, folder: Path, seed: int) -> dict:
     """Answers to a case from motion capture and from film, side by side."""
     case = shot.case
-    base = tm.Model.load(base_of(folder, case.robot, case.plan.robot, seed, duration_s=BASE_S))
+    base = tm.Model.load(base_of(folder, case.robot, case.plan.robot, seed=seed, duration_s=BASE_S))
     capture, film = (folder / f"{case.number}_{what}.lcmlog" for what in ("capture", "film"))
     write_log(case.plan, shot.motion, capture)
     row = {"case": case.number, "hidden": case.hidden[0].name, "kind": case.kind}

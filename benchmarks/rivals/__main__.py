@@ -84,7 +84,9 @@ def main() -> int:
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         for case in progress.track(cases, description="cases"):
             robot = robots[case.robot]
-            base = base_of(asked.out, case.robot, robot, asked.seed, duration_s=asked.duration_s)
+            base = base_of(
+                asked.out, case.robot, robot, seed=asked.seed, duration_s=asked.duration_s
+            )
             results.append(_case(asked.out, base, case, asked.seed))
             if not console.is_terminal:
                 console.print(f"case {case.number + 1} of {asked.n}")

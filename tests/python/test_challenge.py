@@ -386,8 +386,8 @@ def living():
                 yield int(session)
 
 
-def test_no_base_model_is_kept_of_half_an_explanation(tmp_path, monkeypatch):
-    """A command that Ctrl-C stopped gives 130, and may have written what it had found."""
+def test_no_base_model_is_kept_of_a_fit_that_was_stopped(tmp_path, monkeypatch):
+    """A command that Ctrl-C stopped gives 130, and may have written its file."""
 
     def stopped(words):
         Path(words[words.index("-o") + 1]).write_text("half a model")
@@ -397,5 +397,5 @@ def test_no_base_model_is_kept_of_half_an_explanation(tmp_path, monkeypatch):
     monkeypatch.setattr(command, "write_log", lambda plan, played, path: path.write_text("a log"))
     monkeypatch.setattr(command, "run", stopped)
     with pytest.raises(KeyboardInterrupt):
-        command.base_of(tmp_path, 1, ROBOTS[1], SEED, duration_s=SECONDS)
+        command.base_of(tmp_path, 1, ROBOTS[1], seed=SEED, duration_s=SECONDS)
     assert [path.name for path in tmp_path.iterdir()] == ["sheet_1.toml"]

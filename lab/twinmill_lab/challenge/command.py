@@ -159,6 +159,7 @@ def base_of(folder: Path, number: int, robot: Robot, *, seed: int, duration_s: f
         code = run(["fit", str(log), "--model", str(sheet), "-o", str(base), "--json"])
     log.unlink()
     if code == STOPPED:
+        base.unlink(missing_ok=True)
         raise KeyboardInterrupt
     return base
 

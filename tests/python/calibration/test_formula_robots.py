@@ -151,7 +151,7 @@ def explained_case(seed: int, number: int, folder) -> tuple[Case, Explanation]:
     """A case of the exam, whose plant shares no code, and what `explain` makes of it."""
     robots = draw_robots(seed)
     case = draw(number, seed, robots, 90.0)
-    base = base_of(folder, case.robot, robots[case.robot], seed, duration_s=90.0)
+    base = base_of(folder, case.robot, robots[case.robot], seed=seed, duration_s=90.0)
     make_log(case, folder / "run.lcmlog")
     logs = load_measurements([folder / "run.lcmlog"])
     out = folder / "explained.toml"
