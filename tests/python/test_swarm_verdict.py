@@ -349,9 +349,9 @@ def test_all_stand_is_said_with_code_0_and_only_of_robots_that_have_signed_it(gi
 
 @given(st.lists(answers, min_size=1, max_size=4))
 def test_a_start_is_well_only_where_all_have_signed_it_and_drive(given):
-    """And have nothing to say of it, as that no wheel turns."""
+    """And have nothing to say of it, as that no wheel turns, or that two robots have its number."""
     verdict = of_start(begun(*given))
-    signed = [a.accepted and a.signed and not a.reason for a in given]
+    signed = [a.accepted and a.signed and not (a.reason or a.is_double) for a in given]
     drive = [
         is_so and a.mode in ("running", "script") for is_so, a in zip(signed, given, strict=True)
     ]
