@@ -8,12 +8,13 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from twinmill.defaults import URL
-from twinmill_cli.lazy import working
+from twinmill_cli.lazy import asks_for_help_alone, means_stop, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl
 from twinmill_cli.output import AsJson, decide, print_object, say, telling
 from twinmill_cli.swarm_door import (
@@ -65,15 +66,30 @@ if working():  # not for --help
     )
     from twinmill_cli.voice import Voice, refuse_deaf
 
+if TYPE_CHECKING:  # the base of what Typer exports
+    from typer._click.core import Context
+
 Behavior = Annotated[
     str | None,
     typer.Option("--behavior", "-b", metavar="BEHAVIOR", help="Select it first, as milling."),
 ]
 
 
+class SwarmGroup(TyperGroup):
+    """The commands to a swarm: a -h before `stop` is no request for help either."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **options: Any
+    ) -> Context:
+        """Typer's."""
+        self.add_help_option = asks_for_help_alone(args) or not means_stop(args)
+        return super().make_context(info_name, args, *rest, **options)
+
+
 def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
     swarm = typer.Typer(
+        cls=SwarmGroup,
         help="Start, stop and watch the robots on the network, or those of twin_run.",
         no_args_is_help=True,
         context_settings={"token_normalize_func": str.lower},  # STOP is a stop

@@ -15,7 +15,7 @@ from typer.core import TyperCommand
 
 from twinmill.defaults import URL
 from twinmill_cli import several
-from twinmill_cli.lazy import working
+from twinmill_cli.lazy import asks_for_help_alone, working
 from twinmill_cli.options import LcmUrl
 from twinmill_cli.output import AsJson, decide
 from twinmill_cli.swarm_door import (
@@ -93,6 +93,7 @@ class StopCommand(TyperCommand):
             typer.BadParameter: the bus cannot be read.
         """
         words = list(args)
+        self.add_help_option = asks_for_help_alone(words)
         try:
             return super().make_context(info_name, args, *rest, **options)
         except typer.TyperException as error:
