@@ -208,8 +208,7 @@ def test_who_drives_already_is_said_with_who_holds_it():
 def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb):
     """Twins had stopped, "All stand." was said, and a real robot of the same number drove."""
     twin, fleet, command = robot(1), fleet_of(), tell.make_command(VERBS_START)
-    twin.run = turbopi.run_t()
-    twin.run.source = "twin"
+    twin.runs = {"twin": {None}}
     bus = {"lcm_url": "udpm://239.255.76.67:7668?ttl=1", "channel_prefix": "TWIN_"}
     words = ["--robots", "1"] if verb != "status" else []
     words += ["milling"] if verb == "select" else []
@@ -233,7 +232,7 @@ def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb
         "Only robots with --lcm-url 'udpm://239.255.76.67:7668?ttl=1' --channel-prefix TWIN_ are"
     )
     assert told["sentence"].startswith(first) and "R01 is a twin, no robot." in told["sentence"]
-    twin.run.source = "robot"
+    twin.runs = {"robot": {None}}
     told = said([])
     assert "addressed" not in told and "Only robots" not in told["sentence"]
 

@@ -392,7 +392,9 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     """Prints the table once. Returns the exit code."""
     fleet.listen(1.0)
     known = fleet.robots
-    fleet.listen(RUN_PERIOD_S - 1, lambda: bool(known) and all(r.run for r in known.values()))
+    fleet.listen(
+        RUN_PERIOD_S - 1, lambda: bool(known) and all(r.is_source_known for r in known.values())
+    )
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")
