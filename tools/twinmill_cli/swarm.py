@@ -14,9 +14,10 @@ import typer
 from typer.core import TyperGroup
 
 from twinmill.defaults import URL
+from twinmill_cli import done
 from twinmill_cli.lazy import asks_for_help_alone, means_stop, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl
-from twinmill_cli.output import AsJson, decide, print_object, say, telling
+from twinmill_cli.output import AsJson, print_object, say, telling
 from twinmill_cli.swarm_door import (
     BusPrefix,
     KeyThere,
@@ -186,9 +187,9 @@ def _start(
                 )
                 code = verdict.code_after(asked_to_end)
             finally:
+                done.decide(code)
                 voice.end(code, asked_to_end)
-                decide(code)
-        voice.check()
+        voice.check(signals=asked_to_end)
         refuse_deleted(files)
         return code
 
@@ -232,8 +233,9 @@ def _drive(
         held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
         data["left_alone"] = sorted(started.untold if started.called_off else ())
-        voice.tell(
-            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json)
+        voice.tell_outcome(
+            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json),
+            placed(fleet, asked, begun).sentence,
         )
         if started.called_off or not held.robots:
             return begun
@@ -245,6 +247,7 @@ def _drive(
         ended = of_end(begun, held.states, None).more(heard).beside(driving(fleet, asked))
         ended = ended.more(times(fleet, asked))
     except BaseException as error:
+        done.became("")
         if held:
             held.settle()
         told = asked & fleet.addressed if time.monotonic() < instant_s else asked
@@ -265,12 +268,15 @@ def _drive(
         )
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
-            voice.tell(lambda: finish("start", given, ended, data, fleet=fleet, as_json=as_json))
+            voice.tell_outcome(
+                lambda: finish("start", given, ended, data, fleet=fleet, as_json=as_json),
+                placed(fleet, asked, ended).sentence,
+            )
         if not isinstance(error, KeyboardInterrupt):
-            voice.say(placed(fleet, asked, ended).sentence)
+            voice.say_outcome(placed(fleet, asked, ended).sentence)
             raise
     if begun is not None:
-        voice.say(placed(fleet, asked, ended).sentence)
+        voice.say_outcome(placed(fleet, asked, ended).sentence)
     return ended
 
 
@@ -317,7 +323,7 @@ def _arm(
         with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
             given = tell.arm(fleet, asked)
         verdict = of_arm(given).more(doubles(fleet, asked))
-        decide(verdict.code)
+        done.decide(verdict.code, verdict.sentence)
         return finish("arm", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
@@ -346,7 +352,7 @@ def _select(
         command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
         verdict = of_select(given, behavior).more(doubles(fleet, asked))
-        decide(verdict.code)
+        done.decide(verdict.code, verdict.sentence)
         return finish("select", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
