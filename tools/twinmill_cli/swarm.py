@@ -34,7 +34,14 @@ from twinmill_cli.swarm_door import (
     refuse_unheard,
     say_old_news,
 )
-from twinmill_cli.swarm_signals import commanding, ended_by_signals, told_of_signals, what_ends
+from twinmill_cli.swarm_signals import (
+    OVER_SSH,
+    commanding,
+    ended_by_signals,
+    is_over_ssh,
+    told_of_signals,
+    what_ends,
+)
 from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
 
 if working():  # not for --help
@@ -157,6 +164,8 @@ def _start(
         refuse_stopped(fleet, asked)
         if busy:
             say(of_taking_over(busy))
+        if timeout_ms and is_over_ssh():
+            say(OVER_SSH)
         if arm:
             tell.arm(fleet, asked)
         data = {

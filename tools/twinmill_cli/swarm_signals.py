@@ -50,6 +50,12 @@ BECAME = {
 
 STOPS = "stops them"
 BY_KEY = f"Ctrl-C {STOPS}"
+# Where the network between them breaks, sshd keeps a session for hours, or for ever.
+OVER_SSH = (
+    "This is run over ssh: if the network on the way breaks, this machine may not notice, and "
+    "holds the robots on. `ClientAliveInterval 2` in its sshd_config ends the session then; else "
+    "hold robots from a machine beside them."
+)
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
 
@@ -66,6 +72,11 @@ def key_reaches() -> bool:
             return is_set and os.tcgetpgrp(terminal) == os.getpgrp()
         except (OSError, termios.error):
             return False
+
+
+def is_over_ssh() -> bool:
+    """A session of ssh began this program, or what began it."""
+    return "SSH_CONNECTION" in os.environ
 
 
 def _has_terminal() -> bool:
