@@ -233,6 +233,28 @@ class Laboratory(Field):
         shell.type(CTRL_C)
         return self.told(shell, fault_s, shell.end())
 
+    def all_into_tee(self) -> dict:
+        """Nobody reads any more what it says: the terminal is still there."""
+        shell = self.script(f"{self.started()} 2>&1 | tee log.txt; echo went on")
+        fault_s = self.drive(shell)
+        shell.type(CTRL_C)
+        return self.told(shell, fault_s, shell.end())
+
+    def all_into_tee_and_a_robot_hangs(self) -> dict:
+        shell = self.script(f"{self.started()} 2>&1 | tee log.txt; echo code ${{PIPESTATUS[0]}}")
+        self.drive(shell)
+        gone = self.robots[2]
+        hung = [gone.process.pid, *gone.children()]
+        for pid in hung:
+            os.kill(pid, signal.SIGSTOP)
+        fault_s = time.monotonic()
+        shell.type(CTRL_C)
+        shell.end()
+        for pid in reversed(hung):
+            os.kill(pid, signal.SIGCONT)
+        row = self.told(shell, fault_s, 0, [1])
+        return row | {"code": int(re.search(r"code (\d+)", shell.plain)[1])}
+
     def nap(self) -> dict:
         """A laptop that sleeps for less than its robots wait: they drive on, and it holds them."""
         shell = self.script(f"exec {self.started()}")

@@ -54,6 +54,10 @@ CASES = {
     "timeout_in_a_script": Case((NO_KEY, "All stand."), 124),
     "nohup_and_the_terminal_closed": Case((BY_KEY, "All stand."), -1),
     "pipe_into_tee": Case((BY_KEY, "All stand."), BY_SIGINT),
+    "all_into_tee": Case((BY_KEY, "twinmill: All stand."), BY_SIGINT, is_brief=True),
+    "all_into_tee_and_a_robot_hangs": Case(
+        (BY_KEY, "waiting up to 10 s for R02", "twinmill: NOT ALL STAND: R02: no stop was"), 1
+    ),
     "nap": Case((BY_KEY, "All stand."), BY_SIGINT),
     "quota": Case(
         ("nothing was started: standard output (/", "log.txt): no file may become so large"),

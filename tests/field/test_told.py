@@ -295,6 +295,23 @@ FAULTS = {
         ("an empty list: must be numbers", "So all robots are told to stop.", "All stand."),
         2,
     ),
+    "stop_beside_a_request_for_help": Fault(
+        "`swarm stop -h robot03` (from its first packet)",
+        ("No such option: -h. So all robots are told to stop.", "All stand."),
+        2,
+        is_brief=True,
+    ),
+    "stop_where_python_has_handlers_of_its_own": Fault(
+        "`PYTHONFAULTHANDLER=1 twinmill swarm stop` (from its first packet)",
+        ("All stand. 2 robots were heard: R01, R02",),
+        0,
+    ),
+    "untethered_where_python_has_handlers_of_its_own": Fault(
+        "the same of `swarm start --untethered`; then `swarm stop` (from its first packet)",
+        ("Started at", "They drive on by themselves."),
+        0,
+        is_brief=True,
+    ),
     "stop_of_a_list_that_is_missing": Fault(
         "`swarm stop --robots --key FILE` (from its first packet)",
         (

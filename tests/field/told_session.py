@@ -54,6 +54,7 @@ AT_THE_INSTANT_S = 0.3  # before it: who falls silent then is not missed before 
 HALTED_S = 0.5  # in which the held table wants to be drawn twice
 FEW_FILES = 5  # below, Python itself does not begin
 BUS_PORT = f":{7667:04X} "  # as /proc/net/udp has it
+OTHER_HANDLERS = {**os.environ, "PYTHONFAULTHANDLER": "1"}
 START = ("start", "--arm", "--robots", "1,2")
 
 
@@ -983,6 +984,22 @@ class Field:
             self.operator = Operator(key, "stop", *words, terminal=False, **options)
             code = self.operator.end()
         operator.end()
+        return self.row(stops_s[0], code)
+
+    def stop_beside_a_request_for_help(self) -> dict:
+        """As of who writes -h for --host."""
+        return self._stopped_by("-h", "robot03")
+
+    def stop_where_python_has_handlers_of_its_own(self) -> dict:
+        """Which cannot be put back once the command has ended."""
+        return self._stopped_by(env=OTHER_HANDLERS)
+
+    def untethered_where_python_has_handlers_of_its_own(self) -> dict:
+        self.operator = operator = self.start("--untethered", terminal=False, env=OTHER_HANDLERS)
+        code = operator.end()
+        with self.hearing_stops() as stops_s:
+            stop = Operator(self.key_file, "stop", terminal=False)
+            assert stop.end() == 0, stop.plain
         return self.row(stops_s[0], code)
 
     def url_mistyped(self) -> dict:

@@ -12,6 +12,7 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import FRESH_US, TELEMETRY, Fleet
 from twinmill_cli import swarm_door
 from twinmill_cli.swarm_double import doubles
+from twinmill_cli.swarm_end import addressed
 from twinmill_cli.swarm_verdict import of_start, of_status
 
 KEY, SESSION = bytes(range(32)), 7
@@ -146,3 +147,68 @@ def test_no_outcome_with_two_robots_of_a_number_in_it_is_a_good_one():
         assert begun.ok != is_double
     assert "R01: two robots have this number" in begun.sentence
     assert alone.ok and not of_status([fleet.robots[1]]).ok
+
+
+@pytest.fixture
+def beside_a_twin():
+    """Fleet that hears the robot, and gives functions by which both say what they are."""
+    fleet = Fleet("", connect=lambda _: Bus(0.0), key=KEY)
+
+    def speak(sender, *numbers, source=""):
+        fleet.bus.sender = sender
+        for number in numbers:
+            said = turbopi.telemetry_t()
+            said.utime_us = time.time_ns() // 1000
+            fleet.bus._hear(f"R{number:02d}_TELEMETRY", said.encode())
+            if source:
+                run = turbopi.run_t()
+                run.source = source
+                fleet.bus._hear(f"R{number:02d}_RUN", run.encode())
+
+    return fleet, speak
+
+
+@pytest.mark.parametrize("order", [("robot", "twin"), ("twin", "robot")])
+def test_a_number_that_a_robot_and_a_twin_have_is_both_whoever_spoke_last(beside_a_twin, order):
+    """It was said that R01 is a twin, no robot, while the robot stood on the floor."""
+    fleet, speak = beside_a_twin
+    senders = {"robot": ROBOT, "twin": PLAYER}
+    for source in order * 2:
+        speak(senders[source], 1, source=source)
+    known = fleet.robots[1]
+    assert known.is_double and not known.is_twin and known.source == "robot, twin"
+    assert known.to_json()["source"] == "robot, twin" and addressed(fleet, {1}) == {}
+    said = doubles(fleet, {1})
+    assert said.startswith("A robot and a twin say that they are number 1 (")
+    assert f"{PLAYER[0]} says that it is a twin: end it, or give it" in said
+    assert "lcm_url of its own" in said and "flash" not in said
+
+
+def test_a_twin_is_no_robot_only_where_all_that_speak_as_it_said_so(beside_a_twin):
+    fleet, speak = beside_a_twin
+    speak(PLAYER, 0, source="twin")
+    assert fleet.robots[0].is_twin and addressed(fleet, {0}) == {"addressed": {"twins": [0]}}
+    speak(ROBOT, 0)  # a robot says what it is every 5 s, and has not done so yet
+    assert not fleet.robots[0].is_twin and addressed(fleet, {0}) == {}
+
+
+def test_a_twin_that_has_not_said_so_yet_is_known_by_speaking_as_several(beside_a_twin):
+    """A stop listens for a second, and each says only every 5 s what it is."""
+    fleet, speak = beside_a_twin
+    for _ in range(2):
+        speak(PLAYER, 0, 1, 2)
+        speak(ROBOT, 1)
+    said = doubles(fleet, {1})
+    assert f"one program on {PLAYER[0]} speaks as several robots" in said
+    assert "lcm_url of its own" in said and "flash" not in said
+
+
+def test_of_two_programs_of_which_nothing_is_known_both_remedies_are_told(beside_a_twin):
+    fleet, speak = beside_a_twin
+    for sender in (ROBOT, PLAYER) * 2:
+        speak(sender, 1)
+    said = doubles(fleet, {1})
+    assert "flash HOST=ID`; if one is a twin, end it, or give it" in said
+    for sender in (ROBOT, PLAYER):
+        speak(sender, 1, source="robot")
+    assert doubles(fleet, {1}).endswith("flash HOST=ID`.")

@@ -194,6 +194,25 @@ def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, key_file,
     assert fleet.bus.said == []
 
 
+@pytest.mark.parametrize("untethered", [[], ["--untethered"]])
+@pytest.mark.parametrize("is_over_ssh", [False, True])
+def test_a_hold_over_ssh_says_that_a_broken_network_does_not_end_it(
+    monkeypatch, key_file, twinmill, is_over_ssh, untethered
+):
+    """With ServerAliveInterval the client had ended, and robots drove on."""
+    fleet = fleet_of(robot(1))
+    fleet.robots[1].link_s += 60
+    monkeypatch.delenv("SSH_CONNECTION", raising=False)
+    if is_over_ssh:
+        monkeypatch.setenv("SSH_CONNECTION", "10.9.0.2 40000 10.9.0.1 22")  # as of ssh(1)
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    monkeypatch.setattr(tell, "start", lambda *_, **__: tell.Start(0, [], {}, called_off=True))
+    _, _, err = twinmill("swarm", "start", "--robots", "1", "--key", key_file, *untethered)
+    assert "to start at" in err and ("ClientAliveInterval" in err) == (
+        is_over_ssh and not untethered
+    )
+
+
 def test_who_drives_already_is_said_with_who_holds_it():
     held, alone, free = robot(1, DRIVING), robot(2, DRIVING), robot(3, DRIVING, 0)
     fleet = fleet_of(held, alone, free)
@@ -208,8 +227,7 @@ def test_who_drives_already_is_said_with_who_holds_it():
 def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb):
     """Twins had stopped, "All stand." was said, and a real robot of the same number drove."""
     twin, fleet, command = robot(1), fleet_of(), tell.make_command(VERBS_START)
-    twin.run = turbopi.run_t()
-    twin.run.source = "twin"
+    twin.runs = {"twin": {None}}
     bus = {"lcm_url": "udpm://239.255.76.67:7668?ttl=1", "channel_prefix": "TWIN_"}
     words = ["--robots", "1"] if verb != "status" else []
     words += ["milling"] if verb == "select" else []
@@ -233,7 +251,7 @@ def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb
         "Only robots with --lcm-url 'udpm://239.255.76.67:7668?ttl=1' --channel-prefix TWIN_ are"
     )
     assert told["sentence"].startswith(first) and "R01 is a twin, no robot." in told["sentence"]
-    twin.run.source = "robot"
+    twin.runs = {"robot": {None}}
     told = said([])
     assert "addressed" not in told and "Only robots" not in told["sentence"]
 

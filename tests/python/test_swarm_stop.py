@@ -20,6 +20,7 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.robots.key import load
 from twinmill_cli import swarm_door, swarm_stop
+from twinmill_cli.lazy import asks_for_help
 from twinmill_cli.main import main
 from twinmill_cli.swarm_door import key_fault
 from twinmill_cli.swarm_signals import saying_nothing
@@ -245,6 +246,56 @@ def test_a_stop_whose_bus_cannot_be_read_says_that_nothing_was_stopped(twinmill,
     """Nobody knows on which network those are who are meant."""
     code, _, err = twinmill("swarm", "stop", *words)
     assert code == 2 and "NOTHING WAS STOPPED" in err and len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["-h", "robot03"],
+        ["robot03", "--help"],
+        ["-H", "robot03"],
+        ["--json", "-h"],
+        ["-h", "-h"],
+        ["--host", "-h"],
+        ["stop"],
+    ],
+)
+def test_a_stop_with_other_words_than_a_request_for_help_stops(
+    monkeypatch, tmp_path, twinmill, words
+):
+    """`stop -h robot03` printed the help, and robots drove on; -h is near to --host."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told = []
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    code, out, err = twinmill("swarm", "stop", *words, "--lcm-url", "memq://")
+    assert told == [set()] and "Usage:" not in out and "NOTHING WAS STOPPED" not in out + err
+    assert code == (1 if words[0] == "--host" else 2)
+
+
+@pytest.mark.parametrize(
+    ("words", "is_help"),
+    [
+        ("swarm stop -h", True),
+        ("swarm STOP --HELP", True),
+        ("swarm stop -h robot03", False),
+        ("swarm -h robot03 stop", False),
+        ("swarm -h", True),
+        ("swarm start --robots 1 -h", True),
+    ],
+)
+def test_what_a_stop_needs_is_imported_unless_it_asks_for_help_alone(words, is_help):
+    assert asks_for_help(words.split()) == is_help
+
+
+def test_a_stop_behind_a_request_for_help_says_that_nothing_was_stopped(twinmill):
+    code, out, err = twinmill("swarm", "-h", "robot03", "stop")
+    assert code == 2 and "Usage:" not in out
+    assert "NOTHING WAS STOPPED: `twinmill swarm stop` stops robots." in err
+
+
+def test_a_stop_alone_shows_its_help(twinmill):
+    code, out, _ = twinmill("swarm", "stop", "--help")
+    assert code == 0 and "Usage:" in out
 
 
 def test_a_refused_value_is_named_once(twinmill):

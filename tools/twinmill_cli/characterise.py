@@ -16,6 +16,7 @@ import typer
 
 from twinmill.counted import counted
 from twinmill.defaults import DEFAULT_MODEL, URL
+from twinmill_cli.done import decide
 from twinmill_cli.lazy import working
 from twinmill_cli.options import (
     Arm,
@@ -27,7 +28,7 @@ from twinmill_cli.options import (
     ScriptForm,
     SshConfig,
 )
-from twinmill_cli.output import AsJson, decide, deliver, say
+from twinmill_cli.output import AsJson, deliver, say
 
 if working():  # not for --help
     import numpy as np

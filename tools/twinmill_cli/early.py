@@ -11,6 +11,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Any, NoReturn
 
+from twinmill_cli import done
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.own_path import PROGRAMS, is_program
 
@@ -19,7 +20,7 @@ MOVING = ("start", "arm", "select")  # below `swarm`: they begin only if nobody 
 ENDING = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
 
 
-def _verb() -> str:
+def verb() -> str:
     """The word behind `swarm`, if any."""
     return "".join(sys.argv[2:3]).lower() if sys.argv[1:2] == ["swarm"] else ""
 
@@ -31,11 +32,11 @@ def _name() -> str:
 
 def _leave(*_: Any) -> NoReturn:
     sentence = "Stopped before it began: nothing was done, and nothing was sent."
-    if _verb() in MOVING and "--json" in sys.argv:  # in the midst of imports there is no `json`
-        told = f'"verb": "{_verb()}", "ok": false, "sentence": "{sentence}", "robots": []'
+    if verb() in MOVING and "--json" in sys.argv:  # in the midst of imports there is no `json`
+        told = f'"verb": "{verb()}", "ok": false, "sentence": "{sentence}", "robots": []'
         os.write(1, f"{{{told}}}\n".encode())
     os.write(2, f"{_name()}: {sentence}\n".encode(errors="replace"))
-    if _verb():
+    if verb():
         exit_now(STOPPED)
     os._exit(STOPPED)
 
@@ -47,7 +48,7 @@ def begin() -> None:
     until now.
     """
     with suppress(ValueError):  # not in the main thread
-        if is_program() and _verb() in MOVING:
+        if is_program() and verb() in MOVING:
             for number in ENDING:
                 _signal.signal(number, _leave)
             _signal.pthread_sigmask(_signal.SIG_UNBLOCK, ENDING)
@@ -69,21 +70,26 @@ def why_not_begun(error: BaseException) -> str:
     while trace and trace.tb_next:
         trace = trace.tb_next
     where = f" in {trace.tb_frame.f_code.co_filename}" if trace else ""
-    became = {"": "", "stop": " NOTHING WAS STOPPED: switch off by hand what drives."}
     return (
         f"a part of this program cannot be imported ({type(error).__name__}{where}: {error}); if "
         "that is no file of yours, which another name would put out of the way, install Twinmill "
-        f"again.{became.get(_verb(), ' Nothing was said to any robot.')}"
-    )
+        f"again. {done.now().last_words(verb())}"
+    ).strip()
 
 
-def tell_failure(_: type, error: BaseException, __: TracebackType | None) -> None:
-    """An exception hook that tells of an import in one sentence, and with --json in an object."""
+def tell_failure(kind: type, error: BaseException, trace: TracebackType | None) -> None:
+    """An exception hook that tells of an import in one sentence, and with --json in an object.
+
+    Once a command has begun it is no import that failed: typer has kept this hook.
+    """
+    if done.now().has_begun:
+        sys.__excepthook__(kind, error, trace)
+        return
     sentence = why_not_begun(error)
     os.write(2, f"{_name()}: {sentence}\n".encode(errors="replace"))
     if "--json" in sys.argv:
         import json  # may itself be what fails
 
         told = {"verdict": "bad_input", "sentence": sentence, "input": []}
-        robots = {"verb": _verb(), "ok": False, "robots": []} if _verb() else {}
+        robots = {"verb": verb(), "ok": False, "robots": []} if verb() else {}
         os.write(1, f"{json.dumps({**robots, **told})}\n".encode())

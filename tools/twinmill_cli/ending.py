@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Any, NoReturn
@@ -17,15 +18,9 @@ import typer
 from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR, STDOUT, closed_at_first
+from twinmill_cli import done, early
 from twinmill_cli.exit_now import STOPPED, exit_now
-from twinmill_cli.output import (
-    begin_telling,
-    decided_or,
-    has_told,
-    is_decided,
-    print_object,
-    say,
-)
+from twinmill_cli.output import begin_telling, has_told, print_object, say
 
 WRONG_COMMAND_LINE = 2
 LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
@@ -74,12 +69,13 @@ def leave(
         code = result if isinstance(result, int) else 0
         _end_untouched()
     except KeyboardInterrupt:  # before the command, or after it
-        code = decided_or(STOPPED)
-    except (typer.TyperException, ImportError, OSError, ValueError) as error:
+        code = done.decided_or(STOPPED)
+    except Exception as error:
         code, sentence = _told(error)
         if sentence:
             sentence += _of_no_stop(words, verbs) if code == WRONG_COMMAND_LINE else ""
-            say(sentence, program)
+            sentence += _of_robots(error, sentence)
+            _say(sentence, program)
             _print_failure(sentence, error, words)
     if code == STOPPED and stopped:
         say(stopped, program)
@@ -88,6 +84,23 @@ def leave(
         # PYTHONINSPECT: an interpreter would take the end for an error, whatever the code is
         exit_now(code)
     sys.exit(code)
+
+
+def _say(sentence: str, program: str) -> None:
+    """Says it to whoever still reads; what was done, and the exit code, are the same for nobody."""
+    with suppress(OSError):
+        say(sentence, program)
+
+
+def _of_robots(error: Exception, sentence: str) -> str:
+    """What became of robots, to go on behind a failure where they were told something by then.
+
+    Behind one of this program itself in any case: nobody foresaw what it is about.
+    """
+    deeds = done.now()
+    is_open = deeds.has_said() and not deeds.is_told
+    words = deeds.last_words(early.verb()) if is_open or not _is_foreseen(error) else ""
+    return f" {words}" if words and words not in sentence else ""
 
 
 def _end_untouched() -> None:
@@ -118,7 +131,7 @@ def _written(program: str, code: int) -> int:
             os.close(nowhere)
             if code == 0:
                 code, sentence = _told(OSError(error.errno, error.strerror, "standard output"))
-                say(sentence, program)
+                _say(sentence, program)
     return code
 
 
@@ -141,7 +154,7 @@ def _of_no_stop(words: list[str], verbs: Collection[str]) -> str:
     """To whoever may have asked for a stop by words that are no command, as `swarm stop-all`."""
     asked = [word.lower() for word in words[:2] if not _is_stop(words)]
     is_no_verb = asked[:1] == ["swarm"] and not {*asked[1:]} & {*TO_ROBOTS, *verbs}
-    if not (is_no_verb or any(_means_stop(word) for word in asked)):
+    if done.now().has_said() or not (is_no_verb or any(_means_stop(word) for word in asked)):
         return ""
     return " NOTHING WAS STOPPED: `twinmill swarm stop` stops robots."
 
@@ -175,9 +188,9 @@ def _told(error: Exception) -> tuple[int, str]:
             " (--help lists what can be given)" if sentence and code == WRONG_COMMAND_LINE else ""
         )
         return code, _short(sentence + more)
+    if not _is_foreseen(error):
+        return _of_own(error)
     if isinstance(error, ModuleNotFoundError) and not isinstance(error, MissingExtra):
-        if error.name != LAB and (error.name or "twinmill").startswith("twinmill"):
-            raise error
         return 1, missing(error.name or "")
     if isinstance(error, OSError) and error.errno in NO_ROOM:
         return 1, _short(f"{error.filename or 'the output'}: {NO_ROOM[error.errno]}{_then()}.")
@@ -186,9 +199,29 @@ def _told(error: Exception) -> tuple[int, str]:
     return 1, _short(str(error))
 
 
+def _is_foreseen(error: Exception) -> bool:
+    """It is told in one sentence; any other is an error of this program itself."""
+    if isinstance(error, ModuleNotFoundError) and not isinstance(error, MissingExtra):
+        return error.name == LAB or not (error.name or "twinmill").startswith("twinmill")
+    return isinstance(error, (typer.TyperException, ImportError, OSError, ValueError))
+
+
+def _of_own(error: Exception) -> tuple[int, str]:
+    """Exit code and sentence of an error of this program; before it stands where that is.
+
+    What was told by then is so all the same, and keeps its exit code.
+    """
+    with suppress(OSError):
+        traceback.print_exception(error)
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{frame.filename}:{frame.lineno}"
+    words = f"an error of this program itself ({type(error).__name__} in {where}: {error})."
+    return done.decided_or(1) if done.now().is_told else 1, _short(words)
+
+
 def _then() -> str:
     """Words on what to do besides: nothing that robots have done already."""
-    if not is_decided():
+    if not done.is_decided():
         return ", then do it again"
     return ". What was done is done: only what was to be printed is lost"
 

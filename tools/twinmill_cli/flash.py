@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from twinmill.defaults import URL
+from twinmill_cli.done import decide
 from twinmill_cli.lazy import working
 from twinmill_cli.options import LcmUrl, SshConfig
-from twinmill_cli.output import AsJson, decide, deliver
+from twinmill_cli.output import AsJson, deliver
 
 if working():  # not for --help
     from concurrent.futures import Future, ThreadPoolExecutor

@@ -8,6 +8,7 @@ and its module imports that below `if working():`.
 import gc
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -29,8 +30,28 @@ def _options() -> list[str]:
     return words[: words.index("--")] if "--" in words else words
 
 
+def asks_for_help(words: Sequence[str]) -> bool:
+    """True if these words of a command line, up to `--`, have its help shown."""
+    if words[:1] == ["swarm"] and means_stop(words[1:]):
+        return asks_for_help_alone(words[2:])
+    return bool(HELP & {*words})
+
+
+def means_stop(words: Sequence[str]) -> bool:
+    """True if somebody who wrote these words behind `swarm` wants robots to stand."""
+    return "stop" in [word.lower() for word in words]
+
+
+def asks_for_help_alone(words: Sequence[str]) -> bool:
+    """True if these words are a request for help and nothing else.
+
+    In the command line of a stop another is none: -h is near to --host.
+    """
+    return len(words) == 1 and words[0].lower() in HELP
+
+
 # Once for the program: help and the shell's completion end it.
-_helps = "_TWINMILL_COMPLETE" in os.environ or bool(HELP & set(_options()))
+_helps = "_TWINMILL_COMPLETE" in os.environ or asks_for_help(_options())
 
 
 def working() -> bool:

@@ -42,7 +42,8 @@ def meant(
 def _of_stop(ctx: typer.Context, words: Sequence[str]) -> str:
     """A stop behind another verb to the swarm: whoever says it believes that robots stand."""
     group = ctx.parent.command_path if ctx.parent else ""
-    is_stop = group.endswith(" swarm") and "stop" in [word.lower() for word in words]
+    is_other = group.endswith(" swarm") and str(ctx.info_name).lower() != "stop"
+    is_stop = is_other and "stop" in [word.lower() for word in words]
     return f"NOTHING WAS STOPPED; was `{group} stop` meant?" if is_stop else ""
 
 

@@ -4,17 +4,22 @@
 from __future__ import annotations
 
 import json
+import os
+import select
 import signal
 import sys
+import termios
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR_NAME, STDOUT, STDOUT_NAME, naming, refuse_closed
+from twinmill_cli import done
+from twinmill_cli.handlers import put_back
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -33,36 +38,20 @@ def unstopped() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    before = {signal.SIGINT: signal.signal(signal.SIGINT, signal.SIG_IGN)}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        put_back(before)
 
 
 _told_on: list[TextIO] = []  # where an object was printed
-_decided: list[int] = []  # the exit code of what cannot be undone
 
 
 def begin_telling() -> None:
     """A command begins, and has printed no object."""
     _told_on.clear()
-    _decided.clear()
-
-
-def decide(code: int) -> None:
-    """Keeps the exit code of what became of robots, and was told, from any later Ctrl-C."""
-    _decided[:] = [code]
-
-
-def decided_or(code: int) -> int:
-    """The exit code that was decided; another where none was."""
-    return _decided[0] if _decided else code
-
-
-def is_decided() -> bool:
-    """Something was done that cannot be undone, and need not be done again."""
-    return bool(_decided)
+    done.begin()
 
 
 def has_told() -> bool:
@@ -81,9 +70,45 @@ def print_object(data: dict[str, Any]) -> None:
 
 
 def say(sentence: str, program: str = "twinmill") -> None:
-    """A sentence on stderr, in one line whatever it quotes."""
-    with naming(STDERR_NAME):
-        print(f"{program}: {plain_line(sentence, MESSAGE_MAX)}", file=sys.stderr, flush=True)
+    """A sentence on stderr, in one line whatever it quotes; where nobody reads that, see below."""
+    line = f"{program}: {plain_line(sentence, MESSAGE_MAX)}"
+    try:
+        with naming(STDERR_NAME):
+            print(line, file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        if not say_at_terminal(line):
+            raise
+
+
+def say_at_terminal(line: str) -> bool:
+    """A line at the terminal that this program belongs to, whatever its streams are; False: none.
+
+    As where Ctrl-C has ended its reader, too. A terminal that is halted (Ctrl-S) goes on.
+    """
+    try:
+        terminal = os.open("/dev/tty", os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    except OSError:  # there is none, or it is closed
+        return False
+    # One that wants no words of the background (`stty tostop`) would halt this program.
+    held_back = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTTOU})
+    try:
+        if not select.select([], [terminal], [], 0)[1]:
+            let_go_on(terminal)
+        os.write(terminal, f"{line}\n".encode(errors="replace"))
+    except OSError:
+        return False
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, held_back)
+        os.close(terminal)
+    return True
+
+
+def let_go_on(terminal: int) -> None:
+    """Undoes Ctrl-S, as Ctrl-C would: what is told last is seen, and its command ends."""
+    with suppress(termios.error):  # it is gone
+        # The kernel lets only those go on that a program has halted (Linux: n_tty_ioctl_helper)
+        termios.tcflow(terminal, termios.TCOOFF)
+        termios.tcflow(terminal, termios.TCOON)
 
 
 def deliver(data: dict[str, Any], text: RenderableType | None, as_json: bool) -> None:

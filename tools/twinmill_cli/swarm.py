@@ -8,14 +8,16 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from twinmill.defaults import URL
-from twinmill_cli.lazy import working
+from twinmill_cli import done
+from twinmill_cli.lazy import asks_for_help_alone, means_stop, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl
-from twinmill_cli.output import AsJson, decide, print_object, say, telling
+from twinmill_cli.output import AsJson, print_object, say, telling
 from twinmill_cli.swarm_door import (
     BusPrefix,
     KeyThere,
@@ -32,7 +34,14 @@ from twinmill_cli.swarm_door import (
     refuse_unheard,
     say_old_news,
 )
-from twinmill_cli.swarm_signals import commanding, ended_by_signals, told_of_signals, what_ends
+from twinmill_cli.swarm_signals import (
+    OVER_SSH,
+    commanding,
+    ended_by_signals,
+    is_over_ssh,
+    told_of_signals,
+    what_ends,
+)
 from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
 
 if working():  # not for --help
@@ -65,15 +74,30 @@ if working():  # not for --help
     )
     from twinmill_cli.voice import Voice, refuse_deaf
 
+if TYPE_CHECKING:  # the base of what Typer exports
+    from typer._click.core import Context
+
 Behavior = Annotated[
     str | None,
     typer.Option("--behavior", "-b", metavar="BEHAVIOR", help="Select it first, as milling."),
 ]
 
 
+class SwarmGroup(TyperGroup):
+    """The commands to a swarm: a -h before `stop` is no request for help either."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], *rest: Any, **options: Any
+    ) -> Context:
+        """Typer's."""
+        self.add_help_option = asks_for_help_alone(args) or not means_stop(args)
+        return super().make_context(info_name, args, *rest, **options)
+
+
 def register(app: typer.Typer) -> None:
     """Adds the commands to the application."""
     swarm = typer.Typer(
+        cls=SwarmGroup,
         help="Start, stop and watch the robots on the network, or those of twin_run.",
         no_args_is_help=True,
         context_settings={"token_normalize_func": str.lower},  # STOP is a stop
@@ -140,6 +164,8 @@ def _start(
         refuse_stopped(fleet, asked)
         if busy:
             say(of_taking_over(busy))
+        if timeout_ms and is_over_ssh():
+            say(OVER_SSH)
         if arm:
             tell.arm(fleet, asked)
         data = {
@@ -170,9 +196,9 @@ def _start(
                 )
                 code = verdict.code_after(asked_to_end)
             finally:
+                done.decide(code)
                 voice.end(code, asked_to_end)
-                decide(code)
-        voice.check()
+        voice.check(signals=asked_to_end)
         refuse_deleted(files)
         return code
 
@@ -216,8 +242,9 @@ def _drive(
         held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
         data["left_alone"] = sorted(started.untold if started.called_off else ())
-        voice.tell(
-            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json)
+        voice.tell_outcome(
+            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json),
+            placed(fleet, asked, begun).sentence,
         )
         if started.called_off or not held.robots:
             return begun
@@ -229,6 +256,7 @@ def _drive(
         ended = of_end(begun, held.states, None).more(heard).beside(driving(fleet, asked))
         ended = ended.more(times(fleet, asked))
     except BaseException as error:
+        done.became("")
         if held:
             held.settle()
         told = asked & fleet.addressed if time.monotonic() < instant_s else asked
@@ -249,12 +277,15 @@ def _drive(
         )
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
-            voice.tell(lambda: finish("start", given, ended, data, fleet=fleet, as_json=as_json))
+            voice.tell_outcome(
+                lambda: finish("start", given, ended, data, fleet=fleet, as_json=as_json),
+                placed(fleet, asked, ended).sentence,
+            )
         if not isinstance(error, KeyboardInterrupt):
-            voice.say(placed(fleet, asked, ended).sentence)
+            voice.say_outcome(placed(fleet, asked, ended).sentence)
             raise
     if begun is not None:
-        voice.say(placed(fleet, asked, ended).sentence)
+        voice.say_outcome(placed(fleet, asked, ended).sentence)
     return ended
 
 
@@ -301,7 +332,7 @@ def _arm(
         with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
             given = tell.arm(fleet, asked)
         verdict = of_arm(given).more(doubles(fleet, asked))
-        decide(verdict.code)
+        done.decide(verdict.code, verdict.sentence)
         return finish("arm", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
@@ -330,7 +361,7 @@ def _select(
         command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
         verdict = of_select(given, behavior).more(doubles(fleet, asked))
-        decide(verdict.code)
+        done.decide(verdict.code, verdict.sentence)
         return finish("select", given, verdict, {}, fleet=fleet, as_json=as_json)
 
 
@@ -376,7 +407,9 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
     """Prints the table once. Returns the exit code."""
     fleet.listen(1.0)
     known = fleet.robots
-    fleet.listen(RUN_PERIOD_S - 1, lambda: bool(known) and all(r.run for r in known.values()))
+    fleet.listen(
+        RUN_PERIOD_S - 1, lambda: bool(known) and all(r.is_source_known for r in known.values())
+    )
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
     if not robots and fleet.fault:
         say(f"this computer has no network ({fleet.fault}).")

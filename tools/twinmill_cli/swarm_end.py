@@ -9,6 +9,7 @@ from rich.console import Group
 
 from twinmill.robots.tell import OTHERS_S, ask_once
 from twinmill.streams import STDOUT, leads_nowhere
+from twinmill_cli import done
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_double import doubles
 from twinmill_cli.swarm_screen import answer_table
@@ -106,10 +107,13 @@ def finish(
         deliver(data, text, as_json)
     except BrokenPipeError as error:  # of which Typer says nothing
         say(verdict.sentence)
+        done.told(verdict.sentence)
         raise OSError(f"{error.filename}: nobody reads it any more.") from error
     except OSError:
         say(verdict.sentence)
+        done.told(verdict.sentence)
         raise
+    done.told(verdict.sentence)
     if not verdict.ok and leads_nowhere(STDOUT):
         say(verdict.sentence)
     return verdict.code

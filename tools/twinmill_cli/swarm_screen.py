@@ -66,7 +66,7 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
         silent_s = time.monotonic() - robot.heard_s
         table.add_row(
             f"R{robot.robot_id:02d}",
-            *map(Text, (run.source, run.version, run.behavior) if run else ("?", "?", "?")),
+            *map(Text, (robot.source, run.version, run.behavior) if run else ("?", "?", "?")),
             Text(robot.mode or "?", {"fault": "red", "running": "green"}.get(robot.mode, "")),
             _battery(robot.telemetry),
             Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING
 from twinmill.defaults import URL
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR, STDOUT, STDOUT_NAME, refuse_closed
+from twinmill_cli import done
 from twinmill_cli.exit_now import STOPPED
+from twinmill_cli.handlers import put_back
 from twinmill_cli.output import print_object
 
 if TYPE_CHECKING:
@@ -48,6 +50,12 @@ BECAME = {
 
 STOPS = "stops them"
 BY_KEY = f"Ctrl-C {STOPS}"
+# Where the network between them breaks, sshd keeps a session for hours, or for ever.
+OVER_SSH = (
+    "This is run over ssh: if the network on the way breaks, this machine may not notice, and "
+    "holds the robots on. `ClientAliveInterval 2` in its sshd_config ends the session then; else "
+    "hold robots from a machine beside them."
+)
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
 
@@ -64,6 +72,11 @@ def key_reaches() -> bool:
             return is_set and os.tcgetpgrp(terminal) == os.getpgrp()
         except (OSError, termios.error):
             return False
+
+
+def is_over_ssh() -> bool:
+    """A session of ssh began this program, or what began it."""
+    return "SSH_CONNECTION" in os.environ
 
 
 def _has_terminal() -> bool:
@@ -139,8 +152,7 @@ def counting_signals(numbers: Sequence[int] = ENDING) -> Iterator[list[int]]:
     finally:
         asked += _sent_as_faults()
         signal.pthread_sigmask(signal.SIG_SETMASK, held_back)
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        put_back(before)
 
 
 def _sent_as_faults() -> list[int]:
@@ -205,10 +217,13 @@ def commanding(
             if as_json:
                 refuse_closed(STDOUT, STDOUT_NAME)
             fleet = make()
+            done.speaks(lambda: bool(fleet.addressed))
             with watched(fleet, asked):
                 yield fleet
         except KeyboardInterrupt:
-            became = BECAME[verb] if fleet and fleet.said else "nothing was said to any robot"
+            if done.is_decided():
+                raise  # and told
+            became = BECAME[verb] if fleet and fleet.addressed else "nothing was said to any robot"
             sentence = f"Ended by a signal: {became}."
             _tell_end(verb, sentence, asked, as_json=as_json)
             raise
@@ -224,9 +239,9 @@ def _tell_end(verb: str, sentence: str, signals: Sequence[int], *, as_json: bool
     voice, data = Voice(as_json=as_json), {"verb": verb, "ok": False, "sentence": sentence}
     if as_json:
         voice.tell(lambda: print_object({**data, "robots": []}))
-    voice.say(sentence)
+    voice.say_outcome(sentence)
     voice.end(STOPPED, signals)
-    voice.check()
+    voice.check(signals=signals)
 
 
 @contextmanager

@@ -14,10 +14,10 @@ import typer
 from typer.core import TyperCommand
 
 from twinmill.defaults import URL
-from twinmill_cli import several
-from twinmill_cli.lazy import working
+from twinmill_cli import done, several
+from twinmill_cli.lazy import asks_for_help_alone, working
 from twinmill_cli.options import LcmUrl
-from twinmill_cli.output import AsJson, decide
+from twinmill_cli.output import AsJson
 from twinmill_cli.swarm_door import (
     BusPrefix,
     KeyThere,
@@ -93,6 +93,7 @@ class StopCommand(TyperCommand):
             typer.BadParameter: the bus cannot be read.
         """
         words = list(args)
+        self.add_help_option = asks_for_help_alone(words)
         try:
             return super().make_context(info_name, args, *rest, **options)
         except typer.TyperException as error:
@@ -192,8 +193,11 @@ def stop(
         code = WRONG_COMMAND_LINE if misread else verdict.code
         if misread:
             verdict = Verdict(False, f"{misread} {verdict.sentence}")
-        voice.tell(lambda: finish("stop", given, verdict, {}, fleet=fleet, as_json=as_json))
-        decide(code)
+        done.decide(code)
+        voice.tell_outcome(
+            lambda: finish("stop", given, verdict, {}, fleet=fleet, as_json=as_json),
+            verdict.sentence,
+        )
         voice.end(code, signals)
     voice.check()
     return code
@@ -210,6 +214,7 @@ def _say_first(lcm_url: str, prefix: str, asked: set[int]) -> Fleet:
         fleet = Fleet(lcm_url, prefix, connect)
     except ValueError as error:
         raise ValueError(f"{error} NOTHING WAS STOPPED.") from error
+    done.speaks(lambda: bool(fleet.said))
     tell.say_stop(fleet, asked)
     return fleet
 

@@ -10,9 +10,10 @@ from typing import Annotated, Any
 
 import typer
 
+from twinmill_cli.done import decide
 from twinmill_cli.lazy import working
 from twinmill_cli.options import SshConfig
-from twinmill_cli.output import AsJson, busy, decide, deliver
+from twinmill_cli.output import AsJson, busy, deliver
 
 if working():  # not for --help
     import twinmill_native as native

@@ -10,11 +10,9 @@ from __future__ import annotations
 import errno
 import os
 import select
-import termios
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from queue import Queue
 from typing import TYPE_CHECKING
 
@@ -24,7 +22,9 @@ from rich.text import Text
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR, STDOUT, closed_at_first, leads_nowhere
 from twinmill.terminal import PlainConsole
+from twinmill_cli import done
 from twinmill_cli.exit_now import exit_now
+from twinmill_cli.output import let_go_on, say_at_terminal
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -45,11 +45,15 @@ def can_be_heard() -> bool:
     Both have lost him, as when a connection by ssh breaks that had no terminal: no signal comes.
     Or neither ever had one (`>&- 2>&-`).
     """
+    return len(_broken() | closed_at_first & {*STREAMS}) < len(STREAMS)
+
+
+def _broken() -> set[int]:
+    """Streams that had somebody at their other end, and have nobody."""
     poll = select.poll()
     for stream in STREAMS:
         poll.register(stream, 0)  # that nobody is there is told unasked
-    gone = {stream for stream, what in poll.poll(0) if what & (select.POLLERR | select.POLLHUP)}
-    return len(gone | closed_at_first & {*STREAMS}) < len(STREAMS)
+    return {stream for stream, what in poll.poll(0) if what & (select.POLLERR | select.POLLHUP)}
 
 
 def refuse_deaf() -> None:
@@ -64,12 +68,13 @@ def all_take_words() -> bool:
 
 
 def let_terminals_go_on() -> None:
-    """Undoes Ctrl-S, as Ctrl-C would: what is told last is seen, and its command ends."""
+    """Undoes Ctrl-S at those that are streams of this program."""
     for stream in filter(os.isatty, STREAMS):
-        with suppress(termios.error):  # it is gone
-            # The kernel lets only those go on that a program has halted (Linux: n_tty_ioctl_helper)
-            termios.tcflow(stream, termios.TCOOFF)
-            termios.tcflow(stream, termios.TCOON)
+        let_go_on(stream)
+
+
+def _line(sentence: str) -> str:
+    return f"twinmill: {plain_line(sentence, MESSAGE_MAX)}"
 
 
 class Voice:
@@ -88,7 +93,10 @@ class Voice:
     def __init__(self, *, as_json: bool = False) -> None:
         self.failure: Exception | None = None
         self._waiting: Queue[Callable[[], object] | None] = Queue()
-        self._console = PlainConsole(stderr=as_json or not leads_nowhere(STDERR))
+        is_stderr = as_json or not leads_nowhere(STDERR)
+        self._console = PlainConsole(stderr=is_stderr)
+        self._stream = STDERR if is_stderr else STDOUT
+        self._last, self._heard_on = "", {*STREAMS}
         self._live: Live | None = None
         self._newest: RenderableType = ""
         self._shown_s = 0.0
@@ -101,8 +109,33 @@ class Voice:
 
     def say(self, sentence: str) -> None:
         """A sentence, above what is shown there."""
-        words = Text(f"twinmill: {plain_line(sentence, MESSAGE_MAX)}")
-        self.tell(lambda: self._console.print(words, soft_wrap=True))
+        self.tell(lambda: self._print(sentence))
+
+    def _print(self, sentence: str) -> None:
+        """On its stream; at the terminal, if there is one, where nobody reads that any more."""
+        try:
+            self._console.print(Text(_line(sentence)), soft_wrap=True)
+        except BrokenPipeError:
+            if not say_at_terminal(_line(sentence)):
+                raise
+            self._last = "" if sentence == self._last else self._last
+
+    def say_outcome(self, sentence: str) -> None:
+        """What became of robots, which has to be heard: see `end`."""
+
+        def say() -> None:
+            self._print(sentence)
+            done.told(sentence)
+
+        done.became(sentence)
+        self._last, self._heard_on = sentence, {self._stream}
+        self.tell(say)
+
+    def tell_outcome(self, write: Callable[[], object], sentence: str) -> None:
+        """What became of robots, by a function that writes it on stdout, or else on stderr."""
+        done.became(sentence)
+        self._last, self._heard_on = sentence, {*STREAMS}
+        self.tell(write)
 
     def show(self, make: Callable[[], RenderableType]) -> None:
         """Draws at the end of a terminal, in the place of what was drawn before; nowhere else.
@@ -158,12 +191,19 @@ class Voice:
         """All is written."""
         return self._waiting.unfinished_tasks == 0
 
-    def check(self) -> None:
-        """Raises OSError or ValueError if anything could not be written."""
+    def check(self, *, signals: Sequence[int] = ()) -> None:
+        """Raises OSError or ValueError if anything could not be written.
+
+        Args:
+            signals: by which the command was ended. Who reads its words may have been ended with
+                it, and the exit code tells all the same what became of robots.
+        """
+        if signals and isinstance(self.failure, BrokenPipeError):
+            return
         if isinstance(self.failure, OSError):
             raise self.failure
         if self.failure:
-            raise ValueError(f"what is to be told cannot be: {self.failure}") from self.failure
+            raise ValueError(f"what is to be told cannot be: {self.failure}.") from self.failure
 
     def check_listener(self) -> None:
         """Raises as check() does, and as refuse_deaf() does."""
@@ -182,6 +222,9 @@ class Voice:
     def end(self, code: int, signals: Sequence[int] = ()) -> None:
         """Waits as wait() does. Who does not want to wait any more (Ctrl-C) need not.
 
+        The outcome is said at the terminal where nobody has come to read what it was written to, as
+        where Ctrl-C ended `tee`, too.
+
         Args:
             code: with which the program then ends at once.
             signals: one more that stands there asks for that.
@@ -194,6 +237,8 @@ class Voice:
         except KeyboardInterrupt:
             pass
         self._thread.join(LAST_WORD_S)
+        if self._last and _broken() >= self._heard_on and say_at_terminal(_line(self._last)):
+            done.told(self._last)
         if self._thread.is_alive():
             exit_now(code)  # it may hold what the interpreter would wait for
 

@@ -122,6 +122,11 @@ class Senders:
         return sorted({sender[0] for _, sender in self._recent})
 
     @property
+    def programs(self) -> set[Address]:
+        """Those that speak on the channel, by the address that each sends from."""
+        return {sender for _, sender in self._recent}
+
+    @property
     def are_double(self) -> bool:
         """One program spoke, then another, and then the one again.
 

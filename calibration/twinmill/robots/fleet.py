@@ -154,6 +154,7 @@ class Robot:
 
     Attributes:
         telemetry, run: its newest messages.
+        runs: programs that said what they are, by what that was: "robot" or "twin".
         first_s, heard_s: when it said anything first and last, by time.monotonic().
         recent: telemetry of the last WINDOW_S.
         senders: of its telemetry.
@@ -170,6 +171,7 @@ class Robot:
     robot_id: int
     telemetry: Any = None
     run: Any = None
+    runs: dict[str, set[Any]] = field(default_factory=dict)
     first_s: float = field(default_factory=time.monotonic)
     heard_s: float = 0.0
     recent: deque[Step] = field(default_factory=deque)
@@ -199,9 +201,25 @@ class Robot:
         return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
     @property
+    def source(self) -> str:
+        """What it says that it is, "robot" or "twin"; both of one number that both have."""
+        return ", ".join(sorted(self.runs))
+
+    @property
     def is_twin(self) -> bool:
-        """It says that it is no robot."""
-        return bool(self.run) and self.run.source == "twin"
+        """All that speak as it have said that they are no robot."""
+        return self.source == "twin" and self.senders.programs <= self.runs["twin"]
+
+    @property
+    def twins(self) -> list[str]:
+        """Addresses of the machines on which a twin speaks as it, in order."""
+        return sorted({program[0] for program in self.runs.get("twin", ()) if program})
+
+    @property
+    def is_source_known(self) -> bool:
+        """All that speak as it have said what they are."""
+        said = set().union(*self.runs.values())
+        return bool(said) and self.senders.programs <= said
 
     @property
     def is_here(self) -> bool:
@@ -481,7 +499,7 @@ class Robot:
         t, run = self.telemetry, self.run
         return {
             "robot_id": self.robot_id,
-            "source": run.source if run else None,
+            "source": self.source or None,
             "version": run.version if run else None,
             "behavior": run.behavior if run else None,
             "mode": self.mode or None,
@@ -601,16 +619,17 @@ class Fleet:
                 setattr(message, text, plain_line(getattr(message, text), most))
         robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
         now_s = robot.heard_s = time.monotonic()
+        sender = getattr(self.bus, "sender", None)
         if kind in ("LINK", "SIGNED_ACK"):
             self._on_signed(robot, kind, message, data)
         elif kind == "ACK":
             robot.acks[message.seq] = message
         elif kind == "RUN":
             robot.run = message
+            robot.runs.setdefault(message.source, set()).add(sender)
         else:
             robot.telemetry = message
             waited_s = max(0.0, now_s - self._empty_s)
-            sender = getattr(self.bus, "sender", None)
             host = sender[0] if sender else ""
             robot.recent.append(Step(now_s, time.time(), message, waited_s, host))
             robot.senders.add(sender)
