@@ -70,7 +70,7 @@ def fail(*_, **__):
 
 
 def one_object(out: str) -> dict:
-    """What is printed with --json; fails where that is two objects, or none."""
+    """Object that is printed with --json; fails where that is two objects, or none."""
     (line,) = out.splitlines()
     return json.loads(line)
 

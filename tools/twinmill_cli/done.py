@@ -26,7 +26,7 @@ STAYS_TRUE = "What was told of robots before stays true."
 
 
 class Deeds:
-    """What one command did.
+    """Record of one command.
 
     Attributes:
         has_begun: all that every command needs is imported.

@@ -93,7 +93,7 @@ def _say(sentence: str, program: str) -> None:
 
 
 def _of_robots(error: Exception, sentence: str) -> str:
-    """What became of robots, to go on behind a failure where they were told something by then.
+    """Words on what became of robots, behind a failure where they were told something by then.
 
     Behind one of this program itself in any case: nobody foresaw what it is about.
     """

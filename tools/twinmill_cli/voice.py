@@ -121,7 +121,7 @@ class Voice:
             self._last = "" if sentence == self._last else self._last
 
     def say_outcome(self, sentence: str) -> None:
-        """What became of robots, which has to be heard: see `end`."""
+        """A sentence on what became of robots, which has to be heard: see `end`."""
 
         def say() -> None:
             self._print(sentence)
@@ -132,7 +132,7 @@ class Voice:
         self.tell(say)
 
     def tell_outcome(self, write: Callable[[], object], sentence: str) -> None:
-        """What became of robots, by a function that writes it on stdout, or else on stderr."""
+        """Has a function write what became of robots on stdout, or else on stderr."""
         done.became(sentence)
         self._last, self._heard_on = sentence, {*STREAMS}
         self.tell(write)

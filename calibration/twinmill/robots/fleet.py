@@ -202,7 +202,7 @@ class Robot:
 
     @property
     def source(self) -> str:
-        """What it says that it is, "robot" or "twin"; both of one number that both have."""
+        """Its kind by its own word, "robot" or "twin"; both of one number that both have."""
         return ", ".join(sorted(self.runs))
 
     @property
