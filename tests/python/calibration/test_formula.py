@@ -75,7 +75,7 @@ def diagnosed(words: list[str]) -> dict:
 
 
 def test_way_that_reversals_store_is_found_with_its_reach(found):
-    """What one reversal stores is the formula's number times its reach."""
+    """The formula stores its number times its reach at each reversal."""
     proven = found["rest"]["proven"]
     assert found["verdict"] == "outside_catalogue" and found["rest"]["depends_on"] == ["past"]
     assert proven["equation"]["adds_to"] == "omega_radps" and proven["probability"] > 0.9
