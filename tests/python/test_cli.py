@@ -21,8 +21,8 @@ from twinmill.extras import missing
 from twinmill.files import plain
 from twinmill.report.tables import number
 from twinmill.terminal import PlainConsole
+from twinmill_cli import done
 from twinmill_cli import main as cli
-from twinmill_cli import output
 from twinmill_cli.ending import _told
 from twinmill_cli.lazy import LazyCommand
 
@@ -387,11 +387,11 @@ def test_a_stream_that_takes_no_more_is_named(cause, why, stream):
 @pytest.mark.parametrize("is_done", [False, True])
 def test_what_robots_have_done_is_not_to_be_done_again(is_done):
     """Whoever read it behind "All stand." said a stop again, and looked for what was wrong."""
-    output.begin_telling()
+    done.begin()
     if is_done:
-        output.decide(0)
+        done.decide(0)
     _, sentence = _told(OSError(errno.ENOSPC, "No space left on device", "standard output"))
-    output.begin_telling()
+    done.begin()
     assert "make room" in sentence and ("do it again" in sentence) != is_done
 
 
@@ -572,7 +572,6 @@ def test_a_command_works_after_its_help_was_shown(twinmill):
 @pytest.mark.parametrize(("line", "code", "says"), [
     ("effects --json -- --help", 1, "effect '--help': not in the catalogue"),
     ("add coasting run.lcmlog -o --help", 2, "--help is the value of an option here"),
-    ("swarm stop --robots --help", 2, "--help is the value of an option here"),
 ])  # fmt: skip
 def test_help_may_be_a_value_and_is_said_to_be_one(line, code, says):
     program = [sys.executable, "-c", "from twinmill_cli.main import main; main()"]

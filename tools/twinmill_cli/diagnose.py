@@ -279,7 +279,8 @@ def _explain(
     """Diagnose, add the effects found, and write the new model.
 
     If an error remains that no effect explains, and a formula for it holds, the
-    formula is added, too. Of several robots and tables each step is cross-validated.
+    formula is added, too. Of several robots and tables each step is
+    cross-validated.
 
     Example: twinmill explain run.lcmlog --model fitted.toml -o explained.toml
 

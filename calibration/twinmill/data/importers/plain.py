@@ -399,7 +399,8 @@ def _values(
             f"{option('rename')} "
             f"{columns[0]}={columns[0][:2]}_unit ..."
         )
-    return of_both_axles(value[:, :SIDES]) if len(columns) == SIDES else value
+    sides = kind != "twist" and len(columns) == SIDES
+    return of_both_axles(value[:, :SIDES]) if sides else value
 
 
 def _orientation(table: Table) -> np.ndarray:
