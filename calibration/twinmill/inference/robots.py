@@ -125,7 +125,7 @@ class _Robot:
 
     def beside(self, sets: Sequence[Things], p: np.ndarray) -> dict[str, float]:
         """Probability of each thing that this robot lacks beside what all do, likeliest first."""
-        found = []
+        found: list[tuple[float, Things]] = []
         for common, chance in zip(sets, p, strict=True):
             weights = self.given(common)
             weights *= chance / max(weights.sum(), np.exp(-BEYOND))
