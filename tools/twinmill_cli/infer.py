@@ -24,8 +24,15 @@ if working():  # not for --help
     from twinmill.inference.answer import Answer
     from twinmill.inference.infer import Inference, infer_robots
     from twinmill.inference.kept import as_table, with_kept
+    from twinmill.inference.robots import shared
     from twinmill.listing import listed
-    from twinmill.report.inference import next_run, section, sentence, terminal_of_robots
+    from twinmill.report.inference import (
+        next_run,
+        section,
+        sentence,
+        shared_words,
+        terminal_of_robots,
+    )
     from twinmill_cli.frame import (
         Given,
         command_line,
@@ -170,7 +177,11 @@ def inferred(
     if written:
         written.file.write(force)
     each = [{"sentence": sentence(result.answer), **result.to_json()} for result in results]
-    data: dict[str, Any] = each[0] if len(each) == 1 else {"robots": each}
+    data: dict[str, Any] = each[0]
+    if len(each) > 1:
+        together = shared([result.table for result in results])
+        words = " ".join(shared_words(results))
+        data = {"sentence": words, "shared": together.to_json(), "robots": each}
     answer = results[0].answer if len(results) == 1 else None
     writes = with_own("explain" if verb == "diagnose" else verb, own)
     mending = _mending(results[0], writes, given) if answer and not written else []

@@ -8,6 +8,7 @@ model that is linear about the fit.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
@@ -36,17 +37,36 @@ def log_odds(
     mean, cov = h.posterior(linear)
     own = h.cov[np.ix_(at, at)]
     inverse = np.linalg.inv(cov[np.ix_(at, at)])
-    precision, push = inverse - np.linalg.inv(own), inverse @ (mean - h.mean)[at]
+    seen = _Seen(
+        inverse - np.linalg.inv(own),
+        inverse @ (mean - h.mean)[at],
+        np.where(h.one_sided, h.low - h.mean, -np.inf)[at],
+    )
     usual = norms[at] / size
     card = 1 / np.diag(own)  # is as wide as the prior may be: of what the log does not show
-    each = [_log_evidence(precision, push, np.diag(1 / (card + (usual / s) ** 2))) for s in SIZES]
-    z = ((mean - h.low) / np.sqrt(np.diag(cov)))[at]
-    signs = float(np.sum((np.log(2) + log_ndtr(z))[h.one_sided[at]]))
-    of_form = float(logsumexp(np.array(each) + np.log(OF_FORM)))
-    return of_form - _log_evidence(precision, push, own) - signs
+    each = [seen.log_evidence(np.diag(1 / (card + (usual / s) ** 2))) for s in SIZES]
+    return float(logsumexp(np.array(each) + np.log(OF_FORM))) - seen.log_evidence(own)
 
 
-def _log_evidence(precision: np.ndarray, push: np.ndarray, prior: np.ndarray) -> float:
-    """Log evidence under N(0, prior), of a likelihood with this precision and push at zero."""
-    grown = np.eye(len(push)) + prior @ precision
-    return 0.5 * float(push @ np.linalg.solve(grown, prior @ push) - np.linalg.slogdet(grown)[1])
+@dataclass(frozen=True)
+class _Seen:
+    """Likelihood of an effect's numbers about what is usual.
+
+    Attributes:
+        precision, push: (P, P), (P,) of it, where all is usual.
+        low: (P,) bounds of what a card lets be positive alone, -inf of others. An error that looks
+            like such an effect has its sign: the opposite does not look like it.
+    """
+
+    precision: np.ndarray
+    push: np.ndarray
+    low: np.ndarray
+
+    def log_evidence(self, prior: np.ndarray) -> float:
+        """Log evidence under N(0, prior), of which one-sided numbers have the half."""
+        grown = np.eye(len(self.push)) + prior @ self.precision
+        mean = np.linalg.solve(grown, prior @ self.push)
+        std = np.sqrt(np.diag(np.linalg.solve(grown, prior)))
+        found = 0.5 * float(self.push @ mean - np.linalg.slogdet(grown)[1])
+        sided = np.isfinite(self.low)
+        return found + float(np.sum((np.log(2) + log_ndtr((mean - self.low) / std))[sided]))

@@ -321,6 +321,12 @@ class Fitter:
         )
         return self.fit(less, rounds=3, kept=less.slopes)
 
+    def is_better(self, h: Hypothesis, value: np.ndarray) -> bool:
+        """True if a hypothesis is likelier at other numbers (N,) than at its own."""
+        precision = np.linalg.inv(h.cov)
+        cost, there = (self._cost(h, v, precision)[1] for v in (h.value, value))
+        return there < cost - SETTLED
+
     def _cost(self, h: Guess, value: np.ndarray, precision: np.ndarray) -> tuple[np.ndarray, float]:
         """Errors (W, 3) at some numbers, and the negative log posterior."""
         names = np.array(h.labels)[h.named].tolist()

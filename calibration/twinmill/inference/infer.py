@@ -2,7 +2,7 @@
 """One model, and each robot by itself: what is missing, with probabilities."""
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from twinmill.arguments import option
@@ -24,7 +24,7 @@ from twinmill.inference.prior import Always
 from twinmill.inference.search import Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.sheet import chance_of_stale, fitted_to, is_sheet
-from twinmill.inference.table import Numbers, table_of
+from twinmill.inference.table import Numbers, Table, table_of
 from twinmill.inference.unnamed import Unnamed, likeliest, unnamed
 from twinmill.model.late import Late
 from twinmill.model.model_file import ModelFile
@@ -60,6 +60,7 @@ class Inference:
         strangers: sentences on own logs that are not the model's.
         late: how late the motion is in the likeliest model.
         told_here: the base was fitted to one of these logs, so that all it misses there is told.
+        table: evidence of all hypotheses.
     """
 
     answer: Answer
@@ -75,6 +76,7 @@ class Inference:
     strangers: tuple[str, ...]
     late: Late
     told_here: bool
+    table: Table = field(repr=False)
 
     @property
     def finds(self) -> bool:
@@ -161,7 +163,8 @@ def infer(
     told = _told(runs, model_file, own, progress)
     problem = problem_of(runs, told.base, told.always, sheet=told.here, without=without)
     search = Search(problem, progress).run()
-    found = answer(table_of(search))
+    table = table_of(search)
+    found = answer(table)
     if told.base is not model_file:
         found = found.with_stale(chance_of_stale(problem, model_file))
     own_set, formula = likeliest(search, found), None
@@ -173,7 +176,8 @@ def infer(
             formula = formula_of(search, own_set, problem.motion, sure)
     progress("scores")
     late = lateness(found.numbers, problem.same_clock)
-    return _scored(found, runs, model_file, told=told, left=left, formula=formula, late=late)
+    judged = _Judged(table, found, left, formula, late)
+    return _scored(judged, runs, model_file, told)
 
 
 @dataclass(frozen=True)
@@ -211,16 +215,21 @@ def _told(
     return _Told(model_file, None if here else kept(model_file), here, ())
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """Answer before any score: evidence, what has no name, its formula, and lateness."""
+
+    table: Table
+    answer: Answer
+    left: tuple[Unnamed, ...]
+    formula: Formula | None
+    late: Late
+
+
 def _scored(
-    found: Answer,
-    runs: Sequence[Measurement],
-    model_file: ModelFile,
-    *,
-    told: _Told,
-    left: tuple[Unnamed, ...],
-    formula: Formula | None,
-    late: Late,
+    judged: _Judged, runs: Sequence[Measurement], model_file: ModelFile, told: _Told
 ) -> Inference:
+    found, formula = judged.answer, judged.formula
     given = open_measurements(runs, model_file)
     there = told.always.effects if told.always else ()
 
@@ -236,7 +245,7 @@ def _scored(
     after = under(found.numbers, (*there, *found.added), holds) if found.added or holds else base
     return Inference(
         found,
-        left,
+        judged.left,
         formula,
         runs,
         told.always,
@@ -246,8 +255,9 @@ def _scored(
         opened=base,
         not_shown=not_shown(given),
         strangers=told.strangers,
-        late=late,
+        late=judged.late,
         told_here=told.here,
+        table=judged.table,
     )
 
 

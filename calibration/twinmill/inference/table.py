@@ -148,41 +148,61 @@ def table_of(search: Search) -> Table:
     for h, beside in ((fitted[order[0]], _likeliest_columns(best_set, p)), (fitted[()], None)):
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
-    entries: list[Entry] = []
-    first: list[Entry] = []  # under the first noise, as are the excess ...
-    takes: dict[tuple[str, ...], np.ndarray] = {}  # ... and this
-    best: dict[tuple[str, ...], tuple[float, _Comparison]] = {}
-    for names in kept:
+    compared: dict[tuple[str, ...], _Compared] = {}
+    for names, h in fitted.items():
         search.progress("comparing hypotheses")
-        h = fitted[names]
-        changes = _changes(p, h)
-        forms = [p.forms(change) for change in changes]
-        within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
-        for view in views:
-            each = (view.fitter.whiten(changes) ** 2).sum(axis=1)
-            takes.setdefault(names, each)
-            squares = np.array([each[index].sum() for index in within])
-            own = _Comparison(p, search.words, h, changes, forms, squares, view)
-            of_noise = own.entries(names in whole)
-            entries += of_noise
-            if view is views[0]:
-                first += of_noise
-            likely = max(entry.log_evidence for entry in of_noise)
-            if likely > best.get(names, (-np.inf,))[0]:
-                best[names] = likely, own
-    falls = {key: entry.fall for key, entry in _likeliest_of_each(first).items()}
+        own = _Compared.of(search, h, views, names in whole)
+        if (start := own.best.better_start) is not None:
+            h = views[0].fitter.fit(replace(h, value=start))
+            own = _Compared.of(search, h, views, names in whole)
+        compared[names] = own
+    entries = _likeliest_of_each([e for own in compared.values() for e in own.entries])
+    first = _likeliest_of_each([e for own in compared.values() for e in own.first])
+    falls = {key: entry.fall for key, entry in first.items()}
     rows = len(p.steps) * int(p.steps.observed.sum())
     return Table(
-        [replace(e, fall=falls.get(k, e.fall)) for k, e in _likeliest_of_each(entries).items()],
-        {names: own.numbers() for names, (_, own) in best.items()},
-        takes,
+        [replace(e, fall=falls.get(k, e.fall)) for k, e in entries.items()],
+        {names: own.best.numbers() for names, own in compared.items()},
+        {names: own.takes for names, own in compared.items()},
         max(fitted[()].linear(views[0].fitter).left - rows, 1e-9),
         tuple(p.names),
         search.words,
-        {names: own.no_news() for names, (_, own) in best.items()},
-        {names: kind for names, h in fitted.items() if (kind := _swells(h, p.kinds))},
+        {names: own.best.no_news() for names, own in compared.items()},
+        {n: kind for n, own in compared.items() if (kind := _swells(own.best.h, p.kinds))},
         p.kinds,
     )
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """A set of effects under each noise.
+
+    Attributes:
+        entries: under all.
+        first: those under the first noise, as are the excess of a table and ...
+        takes: ... squares of what each effect changes.
+        best: the comparison under the noise that suits it best.
+    """
+
+    entries: list[Entry]
+    first: list[Entry]
+    takes: np.ndarray
+    best: "_Comparison"
+
+    @classmethod
+    def of(cls, search: Search, h: Hypothesis, views: Sequence[View], whole: bool) -> "_Compared":
+        """Evidence of a fitted set; if `whole`, also of a stale base, and with two dependences."""
+        p, changes = search.problem, _changes(search.problem, h)
+        forms = [p.forms(change) for change in changes]
+        within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
+        each = [(view.fitter.whiten(changes) ** 2).sum(axis=1) for view in views]
+        owns = []
+        for view, takes in zip(views, each, strict=True):
+            squares = np.array([takes[index].sum() for index in within])
+            own = _Comparison(p, search.words, h, changes, forms, squares, view)
+            owns.append((own.entries(whole), own))
+        best = max(owns, key=lambda o: max(entry.log_evidence for entry in o[0]))[1]
+        return cls([e for own, _ in owns for e in own], owns[0][0], each[0], best)
 
 
 _Case = tuple[tuple[str, ...], bool, frozenset[str]]  # effects, stale base, dependences
@@ -340,7 +360,7 @@ class _Comparison:
     def no_news(self) -> list[NoNews]:
         """Effects that the base always lacked, or that an error of the others' formulas may be."""
         found, sized = [], self.problem.kinds.sized
-        for always, h, linear, log_odds in self._always():
+        for always, h, linear, log_odds in self._always:
             found.append(NoNews(always, (), (), log_odds))
             for names in subsets(tuple(n for n in self.h.effects if n not in always)):
                 kin = {n: self._kin(n, names) for n in names if catalogue_name(n) in sized}
@@ -379,7 +399,20 @@ class _Comparison:
         ]
         return [(n, words, float(np.linalg.norm(whiten(change)))) for n, words, change in parts]
 
-    def _always(self) -> Iterator[tuple[tuple[str, ...], Hypothesis, Linear, float]]:
+    @property
+    def better_start(self) -> np.ndarray | None:
+        """(N,) numbers at which new effects are likelier, too; None where their fit is the best.
+
+        A fit may end beside the optimum, and another prior's lead to it.
+        """
+        starts = (told.value for names, told, _, _ in self._always if names)
+        return next((v for v in starts if self.view.fitter.is_better(self.h, v)), None)
+
+    @cached_property
+    def _always(self) -> list[tuple[tuple[str, ...], Hypothesis, Linear, float]]:
+        return [*self._of_always()]
+
+    def _of_always(self) -> Iterator[tuple[tuple[str, ...], Hypothesis, Linear, float]]:
         """Each of `subsets`, and none: with these always there, and log odds against new ones.
 
         What may decide is fitted anew: numbers that the base's own log tells can be far from

@@ -15,6 +15,7 @@ from twinmill.arguments import option
 from twinmill.fitting.compare import Comparison
 from twinmill.inference.answer import Answer, Named, units_of
 from twinmill.inference.infer import Inference
+from twinmill.inference.robots import shared
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
 from twinmill.model.parameters import catalogue, with_role
@@ -32,6 +33,7 @@ ONE_BY_ONE = (
     "Robots of one model differ by an amount that infer does not know: a small effect of one robot "
     "alone may be its own gains. For all results of one robot, give its logs alone."
 )
+LIKELY = 0.5  # probability of what is said in the sentences on several robots
 SHOWN = 0.01  # probability of an effect that is listed; --json has all
 SHARES = (
     "Shares are of the squared error that the refitted base leaves above the noise: an effect's is "
@@ -84,7 +86,8 @@ def terminal_of_robots(
         written: the new model of one robot.
     """
     if len(results) > 1:
-        return Group(show.table(_robots(results)), Text(ONE_BY_ONE))
+        told = map(Text, shared_words(results))
+        return Group(*told, Text(), show.table(_robots(results)), Text(ONE_BY_ONE))
     new = [Text(), Text(_new(written))] if written else []
     return Group(terminal(results[0]), *new, *show.typed_next(commands))
 
@@ -147,7 +150,29 @@ def _fall(scores: list[tuple[str, float]]) -> Figure:
 def _verdicts(results: Sequence[Inference]) -> list[str]:
     if len(results) == 1:
         return [sentence(results[0].answer)]
-    return [f"{_label(result)}: {sentence(result.answer)}" for result in results]
+    return shared_words(results)
+
+
+def shared_words(results: Sequence[Inference]) -> list[str]:
+    """Sentences on what several robots lack together, and what each lacks beside that."""
+    found = shared([result.table for result in results])
+    of_all = _likely(found.things, found.words)
+    none = f"Nothing is missing of all {len(results)} robots ({percent(found.nothing)})."
+    words = [f"All {len(results)} robots lack {listed(of_all)}." if of_all else none]
+    for result, own in zip(results, found.own, strict=True):
+        if likely := _likely(own, found.words):
+            words.append(f"{_label(result)} lacks {listed(likely)}{' besides' if of_all else ''}.")
+    return words
+
+
+def _likely(things: dict[str, float], dependences: frozenset[str]) -> list[str]:
+    """Words on the things that are likelier than not."""
+    told = []
+    for name, p in things.items():
+        if p > LIKELY:
+            what = f"something that depends on {name}" if name in dependences else name
+            told.append(f"{what} ({percent(p)}{'' if p >= PRIORS.sure else ', not sure'})")
+    return told
 
 
 def _label(result: Inference) -> str:

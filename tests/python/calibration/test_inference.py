@@ -23,6 +23,7 @@ from twinmill.inference.better import better
 from twinmill.inference.infer import infer, infer_robots, strangers
 from twinmill.inference.kept import as_table, kept, with_kept
 from twinmill.inference.planar import problem_of
+from twinmill.inference.robots import shared
 from twinmill.inference.screening import nearby, screened
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile
@@ -484,3 +485,21 @@ def test_a_disturbance_that_is_larger_than_in_its_own_log_depends_on_time(
         assert next(iter(found.depends_on)) == "time"
     else:
         assert found.verdict in ("model_adequate", "refit_enough", "cannot_tell")
+
+
+def test_what_all_robots_lack_is_told_from_what_one_does(measure, tanh_robot, one_clock_base):
+    """Three robots roll on, and the third turns by a tenth more to the left than to the right."""
+
+    class Uneven(tanh_robot):
+        def hindered(self, motion):
+            return motion * np.column_stack(
+                [np.ones((len(motion), 2)), 1 + 0.05 * np.sign(motion[:, 2])]
+            )
+
+    robots = [tanh_robot(coast_mps2=0.7), tanh_robot(coast_mps2=0.7), Uneven(coast_mps2=0.7)]
+    tables = [infer([measure(r, 20 + k, 45.0)], one_clock_base).table for k, r in enumerate(robots)]
+    found = shared(tables)
+    assert found.things["coasting"] > SURE
+    assert found.own[2]["turn_asymmetry"] > SURE
+    effects = (p for own in found.own[:2] for name, p in own.items() if name not in found.words)
+    assert max(effects, default=0.0) < 0.5

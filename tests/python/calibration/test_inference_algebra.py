@@ -30,7 +30,9 @@ from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise, Usual, fit_noise, usual_after
 from twinmill.inference.planar import planar_kinds
 from twinmill.inference.posterior import beliefs
+from twinmill.inference.robots import _Robot
 from twinmill.inference.screening import _products, _products_of_whiles, gains_of_pairs
+from twinmill.inference.search import log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 from twinmill.inference.table import Entry, NoNews, Table, swells_once
@@ -465,3 +467,16 @@ def test_all_pairs_of_words_share_one_prior_of_something_outside():
     found = beliefs(table(entries))
     q = PRIORS.outside / 2
     assert found[1].probability / found[0].probability == pytest.approx(q**2 / (1 - PRIORS.outside))
+
+
+def test_what_two_robots_show_weakly_counts_twice_for_what_both_lack():
+    """Bayes' rule by hand, for an effect of prior odds q and Bayes factor b in each log.
+
+    Each robot by itself has it or not: (1 + b q)^2; both have it: q b^2.
+    """
+    words, candidates, b = frozenset({"time", "place"}), 10, 4.0
+    none, slip = frozenset(), frozenset({"slip"})
+    q = float(np.exp(log_prior_of_effects(1, candidates)))
+    one = _Robot([none, slip], np.array([1, b * q]) / (1 + b * q), words, candidates)
+    both = one.log_prior(slip) - one.log_prior(none) + 2 * one.log_given(slip)
+    assert both - 2 * one.log_given(none) == pytest.approx(np.log(q * b**2 / (1 + b * q) ** 2))
