@@ -8,9 +8,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.linalg import block_diag, toeplitz
 from scipy.special import logsumexp
-from scipy.stats import expon, multivariate_normal
+from scipy.stats import expon, multivariate_normal, norm
 
 from twinmill.inference import formal, hidden, moments
 from twinmill.inference.candidate import Candidate
@@ -372,6 +373,34 @@ def test_an_error_of_formulas_has_the_evidence_of_its_own_prior():
     expected = logsumexp(each, b=OF_FORM) - log_density(prior)
     found = formal.log_odds(h, linear, {"lateral_slip": size}, norms=np.linalg.norm(x, axis=1))
     assert found == pytest.approx(expected, abs=1e-8)
+
+
+def test_an_error_that_looks_like_a_one_sided_effect_has_its_sign():
+    """Half normal priors, integrated by SciPy; the data ask for the other sign."""
+    random = np.random.default_rng(6)
+    x, size = random.normal(size=(2, 40)), 2.0
+    y = x.T @ [0.4, -0.5] + random.normal(size=40)
+    prior = np.array([0.5, 0.7])
+    h = SimpleNamespace(
+        labels=("base.forward_gain", "stiction.a"),
+        mean=np.zeros(2), low=np.array([-np.inf, 0.0]), one_sided=np.array([False, True]),
+        cov=np.diag(prior**2), instance=lambda name: name,
+    )  # fmt: skip
+    linear = Linear.of(y, prior[:, None] * x)
+    h.posterior = lambda own: (prior * own.mean, prior[:, None] * own.covariance * prior)
+    base = multivariate_normal(np.zeros(40), np.eye(40) + prior[0] ** 2 * np.outer(x[0], x[0]))
+
+    def log_evidence(std):
+        def density(value):
+            return 2 * norm(0, std).pdf(value) * np.exp(base.logpdf(y - value * x[1]) + 60)
+
+        return np.log(quad(density, 0, 8 * std, epsabs=0, epsrel=1e-10, limit=200)[0])
+
+    usual = np.linalg.norm(x[1])
+    each = [log_evidence((prior[1] ** -2 + (usual / (s * size)) ** 2) ** -0.5) for s in SIZES]
+    expected = logsumexp(each, b=OF_FORM) - log_evidence(prior[1])
+    found = formal.log_odds(h, linear, {"stiction": size}, norms=np.linalg.norm(x, axis=1))
+    assert found == pytest.approx(expected, abs=1e-6)
 
 
 def test_an_effect_that_an_error_of_formulas_may_be_is_less_probable():
