@@ -169,7 +169,7 @@ def test_a_robot_with_another_key_is_heard_and_not_believed(held, monkeypatch):
     robots, robot, words = held
     monkeypatch.setattr(hold, "SILENT_S", -1.0)
     robot.heard_s = time.monotonic()
-    assert "signs nothing with this operator's key" in words(TABLE) and not robots.is_over
+    assert "is not heard to sign with this operator's key" in words(TABLE) and not robots.is_over
 
 
 def test_a_camera_that_stutters_is_no_flood_of_words(held, monkeypatch):

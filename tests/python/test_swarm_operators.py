@@ -190,7 +190,7 @@ def test_robots_of_another_key_are_left_to_their_operator(monkeypatch, key_file,
     fleet = fleet_of(strange)
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
     code, _, err = twinmill("swarm", "start", "--robots", "1", "--key", key_file)
-    assert code == 1 and "nothing was started: R01 signs nothing with this operator's key" in err
+    assert code == 1 and "nothing was started: R01 is not heard to sign" in err
     assert fleet.bus.said == []
 
 

@@ -449,9 +449,9 @@ def test_a_stop_says_that_a_robot_has_another_key():
     """It may well stand, and this operator cannot know."""
     told = of_stop([STANDS, replace(UNSIGNED, reason=NO_SIGNATURE)])
     assert not told.ok and "R04: no stop was confirmed" in told.sentence
-    assert "R04: signs nothing with this operator's key" in told.sentence
+    assert "R04: is not heard to sign with this operator's key" in told.sentence
     assert "R04: by its word, which nobody can check, it stands." in told.sentence
-    assert "R02: signs" not in told.sentence
+    assert "R02: is not heard to sign" not in told.sentence
 
 
 @pytest.mark.parametrize(

@@ -64,8 +64,8 @@ OLD_NEWS = State(
     "had been told by old news alone for a while",
 )
 UNSIGNED = State(
-    "signs nothing with this operator's key any more: nobody knows whether it stands",
-    "had signed nothing with this operator's key for a while",
+    "is not heard to sign with this operator's key any more: nobody knows whether it stands",
+    "was not heard to sign with this operator's key for a while",
 )
 DOUBLE = State(
     "is two robots of one number, or hears another: nobody knows which does what",

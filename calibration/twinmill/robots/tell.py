@@ -54,9 +54,8 @@ OLD_ANSWER = "no answer, and what is heard of it is old news"
 UNSEALED = "answered, and its signed answer has not come"
 NO_KEY = "cannot be checked without the operator's key"
 NO_SIGNATURE = (
-    "signs nothing with this operator's key: `twinmill robot flash` brings robots theirs; has it "
-    "another "
-    "key?"
+    "is not heard to sign with this operator's key, for lost packets or another key: "
+    "`twinmill robot flash` brings robots theirs"
 )
 
 
