@@ -70,7 +70,7 @@ class Shared:
 
 
 def shared(tables: Sequence[Table]) -> Shared:
-    """What robots lack together, from a table of evidence of each, two at least."""
+    """Posterior of what robots lack together, from a table of evidence of each, two at least."""
     each = [_Robot.of(table) for table in tables]
     sets = _possible(each)
     logs = np.array([[robot.log_given(things) for things in sets] for robot in each])
