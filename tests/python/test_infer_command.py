@@ -34,6 +34,7 @@ def test_a_model_is_offered_that_has_what_lasts(said, new):
     given = Given([Path("run.lcmlog")], "base.toml", None, None)
     scores = {"refitted": SimpleNamespace(score=2.0), "after": SimpleNamespace(score=1.0)}
     found = SimpleNamespace(answer=said, formula=None, **scores)
+    found.lasting = Inference.lasting.fget(found)
     found.added = Inference.added.fget(found)
     typed = [c for _, c in _mending(found, "lab infer", given)]
     assert typed == ([f"twinmill lab infer run.lcmlog --model base.toml -o {new}"] if new else [])

@@ -84,15 +84,18 @@ class Inference:
         return bool(self.answer.added) or bool(self.formula and self.formula.holds)
 
     @property
-    def added(self) -> tuple[str, ...]:
-        """Effects that a better model gets: the likeliest set without what is of a moment.
+    def lasting(self) -> tuple[str, ...]:
+        """The likeliest set of missing effects, without what is of a moment."""
+        return tuple(name for name in self.answer.added if not with_role(name, "moment"))
 
-        None if none of them is sure, and predictions are no better with them.
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Effects that a better model gets: those that last.
+
+        None if none of the findings is sure, and predictions are no better with them.
         """
         sure = any(f.certainty == "sure" for f in self.answer.findings)
-        if not (sure or self.after.score < self.refitted.score):
-            return ()
-        return tuple(name for name in self.answer.added if not with_role(name, "moment"))
+        return self.lasting if sure or self.after.score < self.refitted.score else ()
 
     def steps(self) -> list[dict[str, Any]]:
         """Scores of the model as given, of its base, and with what was found.

@@ -18,7 +18,7 @@ from twinmill.inference.infer import Inference
 from twinmill.inference.robots import shared
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
-from twinmill.model.parameters import catalogue, with_role
+from twinmill.model.parameters import catalogue
 from twinmill.report import Figure, Section, comparisons, show, unnamed
 from twinmill.report.canvas import FLOOR, PREDICTED, draw
 from twinmill.report.charted import charts
@@ -294,7 +294,7 @@ def _formula(result: Inference) -> list[str]:
 
 def _left_out(result: Inference) -> list[str]:
     """A sentence on effects that `explain` does not add; none where it adds what lasts."""
-    lasting = [n for n in result.answer.added if not with_role(n, "moment")]
+    lasting = result.lasting
     if result.added or not lasting:
         return []
     what, it = f"{lasting[0]} is not sure", "it"
