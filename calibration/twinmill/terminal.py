@@ -73,10 +73,13 @@ class Fitting:
             Where that is too wide, columns that stand left wrap. Its caption goes over the whole
             width.
         listed: columns of lists with commas; where it is too wide, each entry has a line.
+        plainer: what is shown in its place where it is too wide, as without bars.
     """
 
-    def __init__(self, made: Table, listed: Sequence[int] = ()) -> None:
-        self.made, self.listed = made, listed
+    def __init__(
+        self, made: Table, listed: Sequence[int] = (), plainer: "Fitting | None" = None
+    ) -> None:
+        self.made, self.listed, self.plainer = made, listed, plainer
         self.caption, made.caption = made.caption, None
         self._set_least()
 
@@ -120,6 +123,9 @@ class Fitting:
             column.width = width
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        if self.plainer and not self._fits(console, options):
+            yield self.plainer
+            return
         if self.listed and self._measured(console, options).maximum > options.max_width:
             self._one_a_line()
         if not self._fits(console, options):

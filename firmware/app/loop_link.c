@@ -141,5 +141,6 @@ void loop_link_report(const struct loop *loop, struct link_report *report)
                             (untethered ? LINK_STATUS_UNTETHERED : 0) |
                             (state->latch.is_lost ? LINK_STATUS_LATCH_LOST : 0) |
                             (loop->devices.dry_run ? LINK_STATUS_DRY_RUN : 0) |
+                            (loop->plan.waits ? LINK_STATUS_AWAITS_START : 0) |
                             (loop->filter.latched ? LINK_STATUS_LATCHED : 0);
 }

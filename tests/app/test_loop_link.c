@@ -274,6 +274,22 @@ static void test_select_before_a_start_is_answered_with_what_that_plays(void)
     TEST_ASSERT_EQUAL_STRING("diffusing_v2", robot.report.behavior);
 }
 
+// Whoever looks on has not heard the start: its operator may be gone since.
+static void test_robot_that_waits_for_a_start_says_so(void)
+{
+    robot_steps(1);
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_AWAITS_START, robot.report.status_flags);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, ""));
+    TEST_ASSERT_TRUE(robot_stands());
+    TEST_ASSERT_BITS_HIGH(LINK_STATUS_AWAITS_START, robot.report.status_flags);
+    robot_steps(60);
+    ASSERT_DUTIES(left_pct);
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_AWAITS_START, robot.report.status_flags);
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_START, robot_unix_us() + 700000, ""));
+    TEST_ASSERT_TRUE(robot_tell(FW_VERB_STOP, 0, ""));
+    TEST_ASSERT_BITS_LOW(LINK_STATUS_AWAITS_START, robot.report.status_flags);
+}
+
 int main(void)
 {
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
@@ -294,6 +310,7 @@ int main(void)
     RUN_TEST(test_start_without_a_word_on_it_has_the_configured_time_out);
     RUN_TEST(test_answer_to_a_stop_says_if_the_board_took_it);
     RUN_TEST(test_select_before_a_start_is_answered_with_what_that_plays);
+    RUN_TEST(test_robot_that_waits_for_a_start_says_so);
     const int failures = UNITY_END();
     char path[128];
     snprintf(path, sizeof path, "%s/not_stopped", folder);

@@ -52,6 +52,11 @@ class Machine:
         self.run(f"ip link set {name} up")
         self.run(f"ip route add 224.0.0.0/4 dev {name} metric {number}")
 
+    def deafen(self, name: str, number: int) -> None:
+        """It speaks on that network, and takes nothing from there: by rp_filter of ip-sysctl."""
+        self.run(f"sysctl -qw net.ipv4.conf.{name}.rp_filter=1")
+        self.run(f"ip route del 10.0.{number}.0/24 dev {name}")
+
     def cut(self, name: str) -> None:
         run(f"ip link del op-{name}")
 

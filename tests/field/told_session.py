@@ -43,8 +43,10 @@ CLOCK = (
 # All that others say comes late.
 LATE = "import late_network; late_network.begin({0}); "
 LATE_S = 0.2
-CTRL_C, CTRL_S, CTRL_Z = b"\x03", b"\x13", b"\x1a"
+CTRL_C, CTRL_S, CTRL_V, CTRL_Z = b"\x03", b"\x13", b"\x16", b"\x1a"
+PASTE = 5000 * b"\n"  # a terminal has room for 4096 bytes
 LINK_TIMEOUT_S = 2.0
+FRAME_TIMEOUT_S = 10  # the most that a robot can have
 TRIES = 3  # to start
 SCRIPT_S = 2.0
 STAYS_S = 0.5  # a robot that was stopped
@@ -149,7 +151,8 @@ class Field:
         (self.folder / name).mkdir()
         words = ["--lcm-url", URL, *robot_options(self.folder, robot_id), *settings]
         # Frames are not missed for ten seconds: it is the fault alone that stops the wheels.
-        words += ["--set", "restart_ms=100", "--set", "frame_timeout_ms=10000"]
+        words += ["--set", "restart_ms=100"]
+        words += ["--set", f"frame_timeout_ms={1000 * FRAME_TIMEOUT_S}"]
         # Its own file has no say in how long it drives on without its operator.
         words += ["--set", "link_timeout_ms=0"]
         program = [*(machine.enter if machine else []), *shlex.split(os.environ["TURBOPI"])]
@@ -210,6 +213,19 @@ class Field:
 
     def ctrl_c(self) -> dict:
         operator = self.held()
+        fault_s = time.monotonic()
+        operator.type(CTRL_C)
+        return self.row(fault_s, operator.end())
+
+    def ctrl_v_and_ctrl_c(self) -> dict:
+        return self._typed_before(CTRL_V)
+
+    def paste_and_ctrl_c(self) -> dict:
+        return self._typed_before(PASTE)
+
+    def _typed_before(self, keys: bytes) -> dict:
+        operator = self.held()
+        operator.type(keys)
         fault_s = time.monotonic()
         operator.type(CTRL_C)
         return self.row(fault_s, operator.end())
@@ -700,6 +716,31 @@ class Field:
         time.sleep(1)
         return row
 
+    def untethered_and_one_is_deaf(self) -> dict:
+        """R03 has accepted, hears no stop, and begins by itself while its answer is waited for."""
+        machine = Machine()
+        self.stack.callback(machine.end)
+        machine.cable("wlan0", 1)
+        robot = self.robots[3] = self.robot(3, "3 deaf", machine)
+        begin_s, fleet = time.monotonic(), Fleet(URL, key=self.key)
+        fleet.listen(1.5)
+        words = ("start", "--arm", "--robots", "1,3", "--untethered", "--in-s", "5")
+        self.operator = operator = Operator(self.key_file, *words, terminal=False)
+        known = fleet.robots
+        fleet.listen(20, lambda: 3 in known and known[3].awaits_start)
+        machine.deafen("wlan0", 1)
+        operator.process.send_signal(signal.SIGINT)
+        wait_until(lambda: "R03 drives" in operator.plain, 20)
+        drove, code = self.moved(3, begin_s), operator.end()
+        others_moved = self.moved(1, begin_s)
+        stop_s = time.monotonic()
+        robot.process.terminate()
+        row = self.row(stop_s, code, [3]) | {"drove": drove, "other_stood": not others_moved}
+        self.robots.pop(3)
+        machine.cut("wlan0")
+        time.sleep(1)
+        return row
+
     def taken_over(self) -> dict:
         """By another operator, who starts R01 while the first holds both; the first then ends."""
         first = self.held(terminal=False)
@@ -742,6 +783,32 @@ class Field:
         fault_s = time.monotonic()
         operator.process.send_signal(signal.SIGINT)
         return self.row(fault_s, operator.end())
+
+    def stopped_and_armed_by_another(self) -> dict:
+        """One that was armed has forgotten the stop, and no button was pressed."""
+        operator, fleet = self.held(terminal=False), Fleet(URL, key=self.key)
+        tell.stop(fleet, {1})
+        wait_until(lambda: "stopped by another command" in operator.plain, 10)
+        tell.arm(fleet, {1})
+        time.sleep(1)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        return self.row(fault_s, operator.end(), [2])
+
+    def key_changed_while_held(self) -> dict:
+        """R02 answers the stop, and nobody here can check that."""
+        operator, file = self.held(terminal=False), self.folder / "run2" / "key"
+        own = file.read_text()
+        file.write_text(f"{bytes(32).hex()}\n")
+        self.robots[2].process.send_signal(signal.SIGHUP)
+        wait_until(lambda: "R02 is not heard to sign" in operator.plain, 10)
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end(30), [1])
+        file.write_text(own)
+        self.robots[2].process.send_signal(signal.SIGHUP)
+        time.sleep(1)
+        return row
 
     def other_operator_of_another_key(self) -> dict:
         """His start stops nobody: the robots drive on until Ctrl-C of their own operator."""
@@ -811,6 +878,23 @@ class Field:
         time.sleep(1)
         return row
 
+    def one_refuses_partial(self) -> dict:
+        """R02 is not armed."""
+        begin_s, fleet = time.monotonic(), Fleet(URL, key=self.key)
+        fleet.listen(1.5)
+        tell.stop(fleet, {2})
+        tell.arm(fleet, {1})
+        words = ("start", "--robots", "1,2", "--partial", "--json")
+        self.operator = operator = Operator(self.key_file, *words, terminal=False)
+        wait_until(lambda: HELD in operator.plain, 20)
+        objects = [line for line in operator.plain.splitlines() if line.startswith("{")]
+        refused = json.loads(objects[0])["robots"][1]
+        fault_s = time.monotonic()
+        operator.process.send_signal(signal.SIGINT)
+        row = self.row(fault_s, operator.end(), [1])
+        stood = self._unmoved(begin_s, 0, [2])["after_s"] is None
+        return row | {"other_stood": stood, "refused": refused}
+
     def camera_lost_before(self) -> dict:
         """It accepts the start, and would drive whenever its camera came back."""
         self.robots[2].camera.unplug()
@@ -822,6 +906,34 @@ class Field:
         moves_s = [t for t, duties in self.robots[1].rows() if t > begin_s and duties != ZERO]
         unmoved = self._unmoved(begin_s, code, [2])["after_s"] is None
         return self.row(moves_s[0], code, [1]) | {"other_stood": unmoved}
+
+    @contextmanager
+    def _frozen(self):
+        """R02's camera is there, and no picture comes, as it says by now."""
+        camera = self.robots[2].camera
+        view, camera.view = camera.view, b""
+        time.sleep(FRAME_TIMEOUT_S + 1)
+        yield
+        camera.view = view
+        time.sleep(1)
+
+    def camera_frozen_before(self) -> dict:
+        with self._frozen():
+            begin_s, self.operator = time.monotonic(), self._counting()
+            code = self.operator.end(40)
+            moves_s = [t for t, duties in self.robots[1].rows() if t > begin_s and duties != ZERO]
+            unmoved = self._unmoved(begin_s, code, [2])["after_s"] is None
+        return self.row(moves_s[0], code, [1]) | {"other_stood": unmoved}
+
+    def camera_frozen_before_partial(self) -> dict:
+        with self._frozen():
+            begin_s, self.operator = time.monotonic(), self._counting("--partial")
+            wait_until(lambda: HELD in self.operator.plain, 20)
+            fault_s = time.monotonic()
+            self.operator.process.send_signal(signal.SIGINT)
+            code = self.operator.end(40)
+            unmoved = self._unmoved(begin_s, code, [2])["after_s"] is None
+        return self.row(fault_s, code, [1]) | {"other_stood": unmoved}
 
     def gone_at_the_instant(self) -> dict:
         """Too late to call the start off before it: the others drive for a moment, and stand."""

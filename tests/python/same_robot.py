@@ -11,6 +11,7 @@ from twinmill_lab.challenge.physics import STEP_S, Hidden, catalogue_forms
 from twinmill_lab.challenge.robots import draw_robot
 from twinmill_lab.challenge.run import Plan, play, write_log
 
+DAYS = {"first": 10, "whole": 11, "weak": 12, "later": 13, "always": 14}  # seed of each
 DRIVEN_S, MOMENT_S = 40.0, 20.0
 WEAKER, MUCH_WEAKER = 0.06, 0.15
 # A quiet robot, so that forty seconds tell a percent.
@@ -31,11 +32,20 @@ def _weak_from(rim, v, _):
     return rim * (1 - v["loss"] * np.outer(late, np.arange(rim.shape[1]) == 0))
 
 
+def mounting(name: str) -> tuple[float, float, float]:
+    """Where the marker sits in that run: m ahead, m to the left, rad turned to the left."""
+    random = np.random.default_rng(DAYS[name])
+    catalogue_forms(ROBOT, random)  # drawn before it
+    return tuple(float(v) for v in random.normal(0, [0.01, 0.01, 0.03]))
+
+
 def make_days(folder: Path) -> dict[str, Path]:
     """Logs by what the robot was like, each with its own mounting of the marker, and its charge."""
     (folder / "model.toml").write_text(ROBOT.sheet(np.random.default_rng(2)))
     weak = {"first": (), "whole": (), "weak": (0.0, WEAKER), "later": (MOMENT_S, MUCH_WEAKER)}
-    for seed, (name, loss) in enumerate(weak.items(), 10):
+    weak["always"] = weak["weak"]
+    for name, loss in weak.items():
+        seed = DAYS[name]
         random = np.random.default_rng(seed)
         forms = {h.name: h for h in catalogue_forms(ROBOT, random) if h.kind == "plain"}
         x_m, y_m, turned_rad = (float(v) for v in random.normal(0, [0.01, 0.01, 0.03]))

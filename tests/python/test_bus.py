@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bus of the tools on this machine alone: waiting ends in time whatever else is said on it."""
 
+import json
 import os
 import resource
 import socket
@@ -19,6 +20,7 @@ from twinmill.data.bus import (
     open_bus,
     too_many_files,
 )
+from twinmill.robots.fleet import Fleet
 
 WAIT_MS = 200
 SLACK_S = 0.3  # the machine may be busy with other tests
@@ -115,9 +117,37 @@ def test_a_malformed_url_is_told_apart_from_a_network_that_is_not_there(url):
         check_url(url)
 
 
+@pytest.fixture
+def port_of_another():
+    """A UDP port that another socket has for itself, as the kernel gives it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("", 0))
+        yield other.getsockname()[1]
+
+
+def test_a_port_that_another_program_has_is_no_missing_network(port_of_another):
+    url = f"udpm://239.255.76.67:{port_of_another}?ttl=0"
+    for join in (open_bus, Fleet):
+        with pytest.raises((RuntimeError, ValueError), match="another program has UDP") as told:
+            join(url)
+        assert f"sport = :{port_of_another}" in str(told.value) and "route" not in str(told.value)
+
+
+def test_a_stop_that_cannot_be_heard_tells_who_has_the_port(
+    monkeypatch, tmp_path, twinmill, port_of_another
+):
+    """It had been told to look for the network's multicast; robots hear that stop."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    url = f"udpm://239.255.76.67:{port_of_another}?ttl=0"
+    code, out, _ = twinmill("swarm", "stop", "--lcm-url", url, "--timeout-s", "0.5", "--json")
+    told = json.loads(out)["sentence"]
+    assert code == 1 and "No robot can be heard: another program has UDP port" in told
+    assert "multicast" not in told and "BY HAND" in told
+
+
 def test_a_stop_can_wait_for_a_network(monkeypatch):
     monkeypatch.setattr(UdpBus, "_member", lambda *_: False)
-    with pytest.raises(RuntimeError, match="no network"):
+    with pytest.raises(RuntimeError, match=r"no network.*a route for multicast"):
         open_bus("udpm://239.255.76.67:7998?ttl=0")
     waits = open_bus("udpm://239.255.76.67:7998?ttl=0", needs_network=False)
     with pytest.raises(OSError, match="no network"):

@@ -136,11 +136,17 @@ def test_what_was_signed_before_the_start_speaks_against_nothing(accepted):
     assert not dropouts(fleet)
 
 
-@pytest.mark.parametrize("silent", ["heard_s", "link_s"])
-def test_who_is_not_heard_any_more_drops_out(accepted, silent):
+@pytest.mark.parametrize(
+    ("silent", "says"),
+    [
+        ("heard_s", "not heard any more"),
+        ("link_s", "not heard to sign with this operator's key any more"),
+    ],
+)
+def test_who_is_not_heard_any_more_drops_out(accepted, silent, says):
     fleet, robot = accepted
     setattr(robot, silent, time.monotonic() - GONE_S - 1.5)
-    assert "not heard any more" in dropouts(fleet).words[1]
+    assert dropouts(fleet).words[1] == says
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from twinmill.robots import hold
 from twinmill.robots.fleet import TELEMETRY, Fleet, Heard, Robot
-from twinmill.robots.hold import Held
+from twinmill.robots.hold import DOUBLE, Held
 from twinmill.robots.tell import SIGNED_VERBS, VERBS, Answer, Start, answers
 from twinmill_cli.swarm_screen import answer_table
 
@@ -38,6 +38,7 @@ def held(monkeypatch):
         link.counter = counter
         link.mode, link.stands, link.session, link.status_flags = mode, stands, session, flags
         link.utime_us = time.time_ns() // 1000
+        telemetry.status_flags = flags & TELEMETRY.STATUS_DOUBLE
         telemetry.mode = mode if said_mode is None else said_mode
         robot.link, robot.telemetry, robot.link_s = link, telemetry, time.monotonic()
 
@@ -110,7 +111,7 @@ def test_nothing_is_over_while_anything_contradicts_it(held, says):
 
 def test_a_start_that_was_accepted_and_has_not_begun_is_held(held):
     robots, _, words = held
-    assert "has not driven yet" in words(STOPPED) and not robots.is_over
+    assert "is not heard to drive yet" in words(STOPPED) and not robots.is_over
 
 
 def test_a_fault_has_its_alarm(held):
@@ -208,6 +209,54 @@ def test_what_became_of_a_robot_that_was_taken_over_is_not_laid_to_the_first(hel
     assert "taken over" in said and reason in said and robots.is_over
 
 
+@pytest.mark.parametrize("verb", [VERBS.VERB_SELECT, SIGNED_VERBS.VERB_ARM])
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_an_arm_lets_a_robot_forget_a_stop_and_is_no_press_of_its_button(held, verb, is_heard):
+    """link_t signs neither the stop nor a button any more (firmware/core/command.c)."""
+    robots, robot, words = held
+    words(TABLE, stands=False)
+    if is_heard:
+        hear(robot, verb, "arm at 12:00:01")
+    said = words(STOPPED, counter=OWN + 1)
+    heard = "another operator said arm at 12:00:01"
+    unheard = "it obeyed another operator whose words were not heard here"
+    assert (heard if is_heard else unheard) in said and "button" not in said
+    assert robots.is_over
+
+
+def test_an_arm_changes_nothing_of_why_a_robot_was_told_to_stand(held):
+    robots, robot, words = held
+    words(TABLE, stands=False)
+    words(STOPPED, flags=TELEMETRY.STATUS_LATCHED)
+    hear(robot, SIGNED_VERBS.VERB_ARM, "arm at 12:00:01")
+    assert words(STOPPED, counter=OWN + 1) == "" and robots.ends()["R03"] is hold.BY_COMMAND
+
+
+def test_nor_of_one_that_another_operator_had_taken_over(held):
+    robots, robot, words = held
+    hear(robot, VERBS.VERB_START, "start at 12:00:01")
+    words(TABLE, stands=False, counter=OWN + 1)
+    stopped = words(STOPPED, counter=OWN + 1, flags=TELEMETRY.STATUS_LATCHED)
+    hear(robot, SIGNED_VERBS.VERB_ARM, "arm at 12:00:09", counter=OWN + 2)
+    assert "then stopped by another command" in stopped
+    assert words(STOPPED, counter=OWN + 2) == "" and robots.is_over
+
+
+@pytest.mark.parametrize("before", [{"flags": TELEMETRY.STATUS_LATCHED}, {"session": SESSION + 1}])
+def test_who_waits_for_another_operators_start_is_not_over(held, before):
+    """A start counts down: nobody pressed a button, and the robot does not stand for good."""
+    robots, robot, words = held
+    words(TABLE, stands=False)
+    words(STOPPED, **before)
+    session = before.get("session", SESSION)
+    hear(robot, VERBS.VERB_START, "start at 12:00:01", session=session)
+    said = words(STOPPED, counter=OWN + 1, session=session)
+    assert "was taken over by another operator (start at 12:00:01), and is not held" in said
+    assert not robots.is_over
+    assert words(TABLE, stands=False, counter=OWN + 1, session=session) == ""
+    assert "then its button was pressed" in words(STOPPED, counter=OWN + 1, session=session)
+
+
 def test_one_in_a_fault_is_told_to_be_anothers_as_soon_as_it_is(held):
     """It stood without its camera, and was named at the end alone."""
     robots, robot, words = held
@@ -236,6 +285,29 @@ def test_a_command_that_a_robot_has_not_obeyed_takes_nothing_over(held):
     _, robot, words = held
     hear(robot, VERBS.VERB_START, "start at 12:00:01")
     assert words(TABLE, stands=False) == ""
+
+
+def test_who_waits_for_another_start_does_not_stand(held):
+    """It was armed, and told so by somebody who was not heard: it begins by itself."""
+    robots, _, words = held
+    words(TABLE, stands=False)
+    waits = {"flags": TELEMETRY.STATUS_AWAITS_START, "counter": OWN + 2}
+    assert "waits for another start, unheard here" in words(STOPPED, **waits)
+    assert not robots.is_over
+
+
+def test_of_two_robots_of_one_number_nothing_is_told_that_one_of_them_did(held):
+    """The other's session made a program of it that was started anew, and stood before."""
+    robots, robot, words = held
+    words(TABLE, stands=False)
+    double = {"flags": TELEMETRY.STATUS_DOUBLE, "session": SESSION + 1}
+    assert "two robots of one number" in words(STOPPED, **double)
+    robots.settle()
+    assert robots.ends() == {}
+    robot.telemetry.status_flags = 0  # one was switched off: the other is all that is known
+    assert robots.ends() == {"R03": DOUBLE}
+    assert "anew" not in words(STOPPED, session=SESSION + 1)
+    assert "anew" not in words(TABLE, stands=False, session=SESSION + 1)
 
 
 def test_a_command_that_was_not_heard_shows_in_what_the_robot_has_obeyed(held):

@@ -19,7 +19,7 @@ from twinmill.robots.hold import Held
 from twinmill_cli import swarm, swarm_door
 from twinmill_cli.swarm_door import check_clocks
 from twinmill_cli.swarm_end import clocks, times
-from twinmill_cli.swarm_verdict import Verdict, of_end, of_status, of_stop
+from twinmill_cli.swarm_verdict import Verdict, of_end, of_start, of_status, of_stop
 
 KEY, SESSION, STEP_S = bytes(range(32)), 7, 0.03
 STOPPED, DRIVES = turbopi.telemetry_t.MODE_STOPPED, turbopi.telemetry_t.MODE_TABLE
@@ -66,7 +66,7 @@ class Air:
             while self.next_s <= time.monotonic():
                 telemetry, link = turbopi.telemetry_t(), turbopi.link_t()
                 telemetry.mode = link.mode = self.mode
-                link.stands, link.link_timeout_ms = self.mode == STOPPED, 2000
+                link.stands, link.armed, link.link_timeout_ms = self.mode == STOPPED, True, 2000
                 self._say("R01_TELEMETRY", telemetry, self.next_s)
                 self._say("R01_LINK", link, self.next_s)
                 self.next_s += STEP_S
@@ -255,3 +255,180 @@ def test_who_held_a_robot_is_told_that_old_news_alone_is_heard_of_it(monkeypatch
     assert not ended.ok and ended.sentence.startswith("NOT ALL STAND: R01")
     assert "no answer, and what is heard of it is old news" in ended.sentence
     assert clocks(fleet, {1}) == "" and times(fleet, {1}).startswith("NOBODY KNOWS WHAT R01 DOES")
+
+
+class Obedient(Air):
+    """A robot that does what it is told once that has come to it, and says so.
+
+    Args:
+        delay_s: each way.
+        signs_after_s: signed packets are lost for so long, as behind others in a full queue.
+    """
+
+    def __init__(self, delay_s: float, *, mode: int = DRIVES, signs_after_s: float = 0.0):
+        super().__init__(delay_s, 0.0, mode=mode)
+        self.signs_from_s = time.monotonic() + signs_after_s
+        self.stood_s = self.instant_s = float("inf")
+        self.on_its_way_there: deque = deque()
+
+    def _say(self, channel: str, message, at_s: float) -> None:
+        if not hasattr(message, "session") or time.monotonic() >= self.signs_from_s:
+            super()._say(channel, message, at_s)
+
+    def publish(self, channel, data):
+        is_plain = channel == "SWARM_COMMAND"
+        packet = data if is_plain else turbopi.signed_command_t.decode(data).command
+        command = turbopi.swarm_command_t.decode(packet)
+        if command.verb != turbopi.signed_command_t.VERB_HOLD:
+            self.on_its_way_there.append((time.monotonic() + self.delay_s, command))
+
+    def handle_timeout(self, timeout_ms):
+        now_s = time.monotonic()
+        while self.on_its_way_there and self.on_its_way_there[0][0] <= now_s:
+            self._obey(self.on_its_way_there.popleft()[1], now_s)
+        if now_s >= self.instant_s:
+            self.mode = DRIVES
+        return super().handle_timeout(min(timeout_ms, 10))
+
+    def _obey(self, command, now_s: float) -> None:
+        is_stop = command.verb == turbopi.swarm_command_t.VERB_STOP
+        if is_stop:
+            self.mode, self.instant_s = STOPPED, float("inf")
+        elif command.verb == turbopi.swarm_command_t.VERB_START:
+            self.instant_s = command.start_utime_us / 1e6 - time.time() + time.monotonic()
+        plain, signed = turbopi.ack_t(), turbopi.signed_ack_t()
+        plain.seq = signed.seq = command.seq
+        plain.accepted, signed.accepted, signed.stands = True, True, is_stop
+        signed.verb, signed.command_utime_us = command.verb, command.utime_us
+        self._say("R01_ACK", plain, now_s)
+        self._say("R01_SIGNED_ACK", signed, now_s)
+
+
+def fleet_with(robot: Obedient, key: bytes | None = KEY) -> Fleet:
+    fleet = Fleet("", connect=lambda _: robot, key=key)
+    fleet.listen(robot.delay_s + 0.2)
+    return fleet
+
+
+def test_who_signed_in_answer_to_a_stop_that_it_stands_is_no_old_news():
+    """Its words come too late to tell of now, and "All stand." stood beside "NOBODY KNOWS"."""
+    fleet = fleet_with(Obedient(delay_s=1.2))
+    given = tell.stop(fleet, {1})
+    (told,), verdict = given, of_stop(given)
+    assert fleet.robots[1].is_old_news
+    assert verdict.ok and verdict.sentence.startswith("All stand. That was signed by R01 up to ")
+    assert verdict.sentence.endswith(" s ago: packets are late or lost, or it was halted.")
+    assert "NOBODY KNOWS" not in times(fleet, {1}, verdict.standing)
+    assert (told.mode, told.stands, told.is_old_news, told.alarms) == ("stopped", True, False, [])
+    assert 1.2 <= told.stood_ago_s < 2 * 1.2 + NEAR_S + STEP_S
+
+
+@pytest.mark.parametrize("robots", [set(), {1}])
+@pytest.mark.parametrize("signs_after_s", [3.0, 60.0])
+def test_a_stop_is_said_until_a_signature_comes_or_its_time_is_over(robots, signs_after_s):
+    """A full queue takes a robot's unsigned answer, and loses the signed one right behind it."""
+    fleet, begin_s = fleet_with(Obedient(0.0, signs_after_s=signs_after_s)), time.monotonic()
+    given = tell.stop(fleet, robots, 4.0)
+    passed_s, verdict = time.monotonic() - begin_s, of_stop(given)
+    comes = signs_after_s < 4.0
+    assert verdict.ok == comes and (2.5 < passed_s < 4.0 if comes else passed_s >= 4.0)
+    says = "All stand." if comes else "NOT ALL STAND: R01: no stop was confirmed."
+    assert verdict.sentence.startswith(says)
+    assert ("by its word, which nobody can check, it stands" in verdict.sentence) != comes
+
+
+class SwitchedOn(Obedient):
+    """One whose battery is switched on after a while: it heard nothing before, and said nothing."""
+
+    def __init__(self, after_s: float):
+        super().__init__(0.0, mode=STOPPED)
+        self.next_s += after_s
+
+    def publish(self, channel, data):
+        if time.monotonic() > self.next_s - STEP_S:
+            super().publish(channel, data)
+
+
+def test_a_robot_that_is_switched_on_while_a_stop_waits_for_it_is_not_late():
+    """It had confirmed in half a second, and its packets were said to be late."""
+    fleet = Fleet("", connect=lambda _: SwitchedOn(3.0), key=KEY)
+    (told,) = given = tell.stop(fleet, {1}, 10.0)
+    assert of_stop(given).sentence == "All stand."
+    assert told.stood_ago_s < 0.5 and told.signs_standing
+
+
+class Rekeyed(Obedient):
+    """One that gets another operator's key after it was heard to sign."""
+
+    def __init__(self, delay_s: float):
+        super().__init__(delay_s)
+        self.key = KEY
+
+    def _say(self, channel: str, message, at_s: float) -> None:
+        data = self._stamps(message, at_s).encode()
+        is_signed = hasattr(message, "session")
+        signed = keys.sign(keys.of_robot(self.key, 1), data) if is_signed else data
+        self.on_its_way.append((at_s + self.delay_s, channel, signed))
+
+
+def test_a_robot_of_a_new_key_is_told_to_sign_no_more_and_its_new_words_are_no_old_news(
+    monkeypatch,
+):
+    """A recording, a late network and a clock that is behind were told, and none was so."""
+    monkeypatch.setattr(hold, "SETTLE_S", 0.0)
+    fleet = fleet_with(Rekeyed(delay_s=0.0))
+    given = tell.answers(fleet, tell.make_command(tell.VERBS.VERB_START), {1})
+    held = Held(fleet, tell.Start(0, given, {1: SESSION}))
+    fleet.bus.key = bytes(32)
+    fleet.listen(SIGNED_S + 0.2)
+    said, why = (
+        [*held.news(), *held.news()],
+        "is not heard to sign with this operator's key any more",
+    )
+    assert said == [f"R01 {why}: nobody knows whether it stands."]
+    (told,) = given = tell.stop(fleet, {1}, 0.4)
+    verdict = of_stop(given)
+    ended = of_end(Verdict(True, ""), held.ends(), verdict).more(times(fleet, {1}))
+    assert not ended.ok and f"R01: {why}, for lost packets or another key" in ended.sentence
+    assert f"NOBODY KNOWS WHAT R01 DOES NOW: R01 {why}." in ended.sentence
+    for untrue in ("recording", "network is late", "clock", "old news", "has not come"):
+        assert untrue not in ended.sentence
+    assert told.signs_no_more and not told.is_old_news and told.is_silent and told.mode == ""
+    assert told.alarms == [f"SIGNS NO MORE: {why}"]
+
+
+def test_a_start_is_called_off_with_why_a_robot_of_a_new_key_drops_out():
+    fleet = fleet_with(Rekeyed(delay_s=0.0))
+    command = tell.make_command(tell.VERBS.VERB_START)
+    tell.tell(fleet, command, {1}, until_s=time.monotonic() + 1.0)
+    fleet.bus.key = bytes(32)
+    fleet.listen(SIGNED_S + 0.2)
+    words = tell.find_dropouts(fleet, {1}, command.seq, only_stopped=False).words
+    assert words == {1: "not heard to sign with this operator's key any more"}
+
+
+def test_a_stop_where_no_signature_can_be_checked_asks_for_none():
+    fleet, begin_s = fleet_with(Obedient(0.0), key=None), time.monotonic()
+    verdict = of_stop(tell.stop(fleet, {1}, 10.0))
+    assert not verdict.ok and time.monotonic() - begin_s < 5.0
+
+
+@pytest.mark.parametrize("partial", [True, False])
+def test_what_was_said_before_an_instant_tells_nothing_of_who_began_at_it(partial):
+    """For a while after it a late network brings how robots stood before, and they drive."""
+    listened_s = tell.BEGUN_S + tell.OTHERS_S  # from the instant on
+    delay_s = (listened_s + SIGNED_S / 2) / 2  # later, and an answer is not yet old news
+    robot = Obedient(delay_s, mode=STOPPED)
+    fleet = fleet_with(robot)
+    begun = tell.start(fleet, {1}, "", ahead_s=3.0, partial=partial)
+    (told,), verdict = begun.answers, of_start(begun)
+    assert told.accepted and begun.called_off == (not partial)
+    if partial:
+        assert robot.mode == DRIVES and not told.stands and not told.signs_standing
+        assert told.mode == "" and told.is_old_news
+        assert verdict.sentence.startswith("NOBODY WAS HEARD TO DRIVE")
+    else:
+        assert robot.mode == STOPPED and told.stands and told.mode == "stopped"
+        assert "R01 was not heard since the instant of the start" in verdict.sentence
+        assert "All were told to stop: All stand." in verdict.sentence
+        assert times(fleet, {1}, verdict.standing).count("NOBODY KNOWS") == 0

@@ -75,7 +75,7 @@ def one_object(out: str) -> dict:
     return json.loads(line)
 
 
-@pytest.mark.parametrize("where", ["tell.stop", "driving", "of_stop", "doubles", "finish"])
+@pytest.mark.parametrize("where", ["tell.stop", "driving", "of_stop", "beside_all", "finish"])
 @pytest.mark.parametrize("json_words", [[], ["--json"]], ids=["text", "json"])
 def test_a_stop_that_fails_after_it_was_said_never_says_that_nothing_was_stopped(
     monkeypatch, fleet, key_file, twinmill, where, json_words

@@ -12,8 +12,8 @@ from twinmill.robots import tell
 from twinmill.robots.fleet import FRESH_US, TELEMETRY, Fleet
 from twinmill_cli import swarm_door
 from twinmill_cli.swarm_double import doubles
-from twinmill_cli.swarm_end import addressed
-from twinmill_cli.swarm_verdict import of_start, of_status
+from twinmill_cli.swarm_end import addressed, beside_all, driving
+from twinmill_cli.swarm_verdict import of_start, of_status, of_stop
 
 KEY, SESSION = bytes(range(32)), 7
 ROBOT, PLAYER = ("198.51.100.1", 7667), ("198.51.100.2", 7667)  # RFC 5737: nobody has these
@@ -147,6 +147,66 @@ def test_no_outcome_with_two_robots_of_a_number_in_it_is_a_good_one():
         assert begun.ok != is_double
     assert "R01: two robots have this number" in begun.sentence
     assert alone.ok and not of_status([fleet.robots[1]]).ok
+
+
+def test_a_good_outcome_beside_two_robots_of_a_number_is_none_whoever_was_asked():
+    """A stop of another robot named them, with ok true and exit code 0."""
+    fleet = fleet_beside(SLOWEST_S)
+    stands = tell.Answer(3, True, True, "", "stopped", True, False, [])
+    stopped = of_stop([stands], is_of_some=True)
+    assert beside_all(fleet, stopped) == stopped and stopped.ok
+    fleet.listen(1.0, lambda: fleet.robots[1].is_double)
+    told = beside_all(fleet, stopped)
+    assert told.code == 1 and not told.ends_well
+    assert told.sentence.startswith("R03 stands. Two robots say that they are number 1")
+
+
+def step(fleet, sender, mode=TELEMETRY.MODE_STOPPED, ago_s=0.0) -> None:
+    said = turbopi.telemetry_t()
+    said.mode, said.utime_us = mode, round(1e6 * (time.time() - ago_s))
+    fleet.bus.sender = sender
+    fleet.bus._hear("R01_TELEMETRY", said.encode())
+
+
+@pytest.mark.parametrize(("ago_s", "drives"), [(0.0, ["R01"]), (RECORDED_S, [])])
+@pytest.mark.parametrize("last", [ROBOT, PLAYER])
+def test_of_two_robots_of_a_number_it_is_said_that_one_drives_whichever_spoke_last(
+    last, ago_s, drives
+):
+    """The other one stands, and what it says is as new; a recording says nothing of now."""
+    fleet = Fleet("", connect=lambda _: Bus(60.0), key=KEY)
+    for sender in (last, *(ROBOT, PLAYER) * 2, last):
+        if sender == PLAYER:
+            step(fleet, sender, TELEMETRY.MODE_TABLE, ago_s)
+        else:
+            step(fleet, sender)
+    assert fleet.robots[1].is_double and driving(fleet, {3}) == drives
+
+
+def test_a_recording_that_begins_anew_is_a_robots_double_as_soon_as_its_end_is_over():
+    """Each round is older than the end of the one before, and comes from a socket of its own."""
+    fleet, round_s = Fleet("", connect=lambda _: Bus(60.0), key=KEY), 5.0
+    step(fleet, (PLAYER[0], 40000), ago_s=RECORDED_S)
+    begin_s = time.monotonic()
+    while not fleet.robots[1].is_double:
+        step(fleet, ROBOT)
+        step(fleet, (PLAYER[0], 40001), ago_s=RECORDED_S + round_s)
+        time.sleep(SLOWEST_S)
+    assert time.monotonic() - begin_s < tell.FIND_S  # all are listened to for so long
+
+
+@pytest.mark.parametrize("machine", [ROBOT[0], PLAYER[0]])
+def test_what_waited_in_a_queue_is_no_second_robot(machine):
+    """A program's words of before it was started anew, beside those of the one after it."""
+    fleet = Fleet("", connect=lambda _: Bus(60.0), key=KEY)
+    for _ in range(3):
+        step(fleet, (machine, 40000), ago_s=25.0)
+        step(fleet, ROBOT)
+    assert fleet.robots[1].is_double == (machine != ROBOT[0])
+    for _ in range(3):
+        step(fleet, (ROBOT[0], 40001))
+        step(fleet, ROBOT)
+    assert fleet.robots[1].is_double  # both are new: two programs of one machine
 
 
 @pytest.fixture

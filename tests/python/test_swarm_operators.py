@@ -12,12 +12,13 @@ import turbopi
 
 from twinmill.robots import key as keys
 from twinmill.robots import tell
+from twinmill.robots.countdown import Dropouts
 from twinmill.robots.fleet import GONE_S, MODES, TELEMETRY, Fleet, Robot, Step
 from twinmill.terminal import PlainConsole
 from twinmill_cli import characterise, swarm, swarm_door, swarm_stop
 from twinmill_cli.swarm_end import driving
 from twinmill_cli.swarm_screen import status_table
-from twinmill_cli.swarm_verdict import of_busy, of_countdown, of_start
+from twinmill_cli.swarm_verdict import of_busy, of_countdown, of_start, of_stop
 from twinmill_cli.voice import Voice
 
 KEY, SESSION, DRIVING = bytes(range(32)), 7, TELEMETRY.MODE_TABLE
@@ -109,6 +110,19 @@ def test_a_start_says_what_the_robot_has_signed_since_and_not_what_it_said_befor
     (since,) = tell.answers(fleet, command, {1})
     assert (before.link_timeout_s, before.untethered) == (None, None)
     assert (since.link_timeout_s, since.untethered) == (2.0, False)
+
+
+@pytest.mark.parametrize("accepted", [False, True])
+def test_what_a_robot_said_before_the_instant_holds_behind_it_if_it_refused(accepted):
+    """One that accepted may have begun since; it was told of both that nobody knows."""
+    fleet, command = fleet_of(known := robot(1)), tell.make_command(VERBS_START)
+    known.link.stands, known.heard_s = 1, time.monotonic()
+    command.start_utime_us = known.telemetry.utime_us + 1
+    ack = turbopi.signed_ack_t()
+    ack.session, ack.accepted, ack.verb = SESSION, accepted, VERBS_START
+    ack.command_utime_us, known.signed_acks[command.seq] = command.utime_us, ack
+    (told,) = tell.answers(fleet, command, {1})
+    assert (told.mode, told.stands) == (("", False) if accepted else ("stopped", True))
 
 
 def test_a_robot_that_fell_silent_in_the_countdown_is_not_told_to_stand(monkeypatch):
@@ -223,6 +237,35 @@ def test_who_drives_already_is_said_with_who_holds_it():
     assert "R03 drives already, untethered" in said
 
 
+@pytest.mark.parametrize(
+    ("flags", "says"),
+    [
+        (TELEMETRY.STATUS_FRAME_STALE, ["no new picture from the camera"]),
+        (TELEMETRY.STATUS_CAMERA_LOST | TELEMETRY.STATUS_FRAME_STALE, ["camera lost"]),
+        (0, ["a part does not answer"]),  # by firmware/README.md the mode alone tells that
+    ],
+)
+def test_whoever_is_in_a_fault_says_why(flags, says):
+    """A start was called off, and a partial one went on, without a word on the camera."""
+    known = robot(1, TELEMETRY.MODE_FAULT)
+    known.telemetry.status_flags = flags
+    assert known.alarms == says and known.to_json()["alarms"] == says
+
+
+@pytest.mark.parametrize("begins", [False, True])
+def test_who_drives_while_stop_is_said_is_named_at_once_and_at_the_end(begins):
+    """One that is deaf began by itself while its answer was waited for, and was not named."""
+    fleet, told = fleet_of(robot(1) if begins else robot(1, DRIVING), robot(2)), []
+
+    def begin(_):
+        fleet.robots[1] = robot(1, DRIVING)
+
+    given = tell.stop(fleet, {1, 2}, 1.0, waiting=begin, driving=told.append)
+    assert told == [{1}]
+    said = of_stop(given).sentence
+    assert "R01 drives." in said and "R02 drives" not in said
+
+
 @pytest.mark.parametrize("verb", ["status", "arm", "select"])
 def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb):
     """Twins had stopped, "All stand." was said, and a real robot of the same number drove."""
@@ -303,7 +346,13 @@ def test_both_ends_of_a_start_name_a_clock_that_is_off(monkeypatch):
     monkeypatch.setattr(swarm, "_hold", _interrupted)
     monkeypatch.setattr(swarm, "finish", lambda *given, **_: said.append(given[2].sentence))
     voice = Voice()
-    kept = {"data": {"drove_before": []}, "as_json": True, "heard": "", "ends": str, "signals": []}
+    kept = {
+        "data": {"drove_before": []},
+        "as_json": True,
+        "heard": lambda _: "",
+        "ends": str,
+        "signals": [],
+    }
     options = {"ahead_s": 0.1, "partial": False, "link_timeout_ms": 2000}
     fleet = fleet_of(ahead)
     fleet.addressed = {1}
@@ -334,7 +383,13 @@ def test_how_to_call_a_start_off_is_said_while_that_can_be_done(monkeypatch, cap
     def ends(becomes: str = "stops them") -> str:
         return f"`kill 77` {becomes}"
 
-    kept = {"data": {"drove_before": []}, "as_json": True, "heard": "", "ends": ends, "signals": []}
+    kept = {
+        "data": {"drove_before": []},
+        "as_json": True,
+        "heard": lambda _: "",
+        "ends": ends,
+        "signals": [],
+    }
     options = {"ahead_s": 5.0, "partial": False, "link_timeout_ms": 2000}
     swarm._drive(fleet_of(robot(1)), {1}, "", voice, **kept, **options)
     voice.end(1, [])
@@ -384,11 +439,21 @@ def test_who_drives_by_a_word_that_nobody_can_check_is_told_first(
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
     monkeypatch.setattr(swarm.tell, "arm", lambda *_: [])
     monkeypatch.setattr(swarm.tell, "tell", lambda *_, **__: [])
-    more = {"arm": [], "select": ["milling"], "start": ["--partial", "--json"]}[verb]
-    _, out, err = twinmill("swarm", verb, *more, "--robots", "1,2", "--key", key_file)
+    more = {"arm": [], "select": ["milling"], "start": ["--partial"]}[verb]
+    _, out, err = twinmill("swarm", verb, *more, "--robots", "1,2", "--json", "--key", key_file)
     assert "R02 drives already, by its word, which nobody can check" in err
     assert "takes over" not in err and "may not play" not in err
-    assert verb != "start" or json.loads(out)["drove_before"] == [2]
+    assert json.loads(out)["drove_before"] == [2]
+    assert verb != "start" or "twinmill: R01: to start at" in err
+
+
+def test_who_refuses_all_of_another_key_ends_its_sentence_before_it_says_who_drives(
+    monkeypatch, key_file, twinmill
+):
+    fleet = fleet_of(drives_by_its_word(1), drives_by_its_word(2))
+    monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
+    _, _, err = twinmill("swarm", "start", "--robots", "1,2", "--key", key_file)
+    assert "brings robots theirs. R01, R02 drive already, by their word, which nobody" in err
 
 
 def test_a_start_is_not_said_to_have_moved_who_was_told_nothing():
@@ -420,7 +485,7 @@ def test_a_countdown_that_is_ended_leaves_another_labs_robot_alone(monkeypatch, 
     monkeypatch.setattr(swarm, "finish", lambda *given, **_: told.append(given))
     data, voice = {"drove_before": [2]}, Voice()
     options = {"ahead_s": 0.1, "partial": True, "link_timeout_ms": 2000}
-    kept = {"data": data, "as_json": True, "heard": "", "ends": str, "signals": []}
+    kept = {"data": data, "as_json": True, "heard": lambda _: "", "ends": str, "signals": []}
     ended = swarm._drive(fleet, {1, 2}, "", voice, **kept, **options)
     voice.end(1, [])
     assert stopped == [{1, 2} if past_instant else {1}]
@@ -436,6 +501,28 @@ def test_a_start_that_is_called_off_tells_nobody_to_stop_who_was_told_nothing(mo
     begun = tell.start(fleet, {1, 2}, "", ahead_s=0.4, partial=False)
     assert begun.called_off and stopped == [{1}] and begun.untold == {2}
     assert "R02 was told nothing by this start and is left alone" in of_start(begun).sentence
+
+
+@pytest.mark.parametrize(("taken", "untold"), [({1}, set()), (set(), {2}), ({1}, {2})])
+def test_whom_a_called_off_start_leaves_alone_stands_in_its_object(monkeypatch, taken, untold):
+    """Its sentence left them to another operator, and `left_alone` was empty."""
+    fleet, told = fleet_of(robot(1), robot(2)), []
+    given = tell.answers(fleet, tell.make_command(VERBS_START), {1, 2})
+    out = Dropouts(dict.fromkeys(taken, "taken over"), frozenset(taken))
+    begun = tell.Start(0, given, {}, called_off=True, dropouts=out, untold=frozenset(untold))
+    monkeypatch.setattr(tell, "start", lambda *_, **__: begun)
+    monkeypatch.setattr(swarm, "finish", lambda *given, **_: told.append(given))
+    data, voice = {"drove_before": []}, Voice()
+    options = {"ahead_s": 0.1, "partial": True, "link_timeout_ms": 2000}
+    kept = {"data": data, "as_json": True, "heard": lambda _: "", "ends": str, "signals": []}
+    ended = swarm._drive(fleet, {1, 2}, "", voice, **kept, **options)
+    voice.end(1, [])
+    assert data["left_alone"] == sorted(taken | untold)
+    assert ("R01: left to that operator." in ended.sentence) == bool(taken)
+    assert ("R02 was told nothing by this start and is left alone" in ended.sentence) == bool(
+        untold
+    )
+    assert replace(begun, called_off=False).left_alone == set()
 
 
 def telemetry(mode: int) -> bytes:
@@ -514,6 +601,86 @@ def test_a_robot_whose_fault_keeps_it_standing_is_not_said_to_drive():
     said = of_busy([held])
     assert "R01 stands still in a fault" in said and "held by another operator" in said
     assert "drives already" not in said
+
+
+@pytest.mark.parametrize("verb", ["status", "arm", "select"])
+@pytest.mark.parametrize(
+    ("timeout_ms", "is_held", "who"),
+    [
+        (0, False, "untethered"),
+        (2000, True, "held by another operator"),
+        (2000, False, "and no operator is heard who holds them"),
+    ],
+)
+def test_who_waits_for_a_start_is_named_to_whoever_asks(
+    monkeypatch, key_file, twinmill, verb, timeout_ms, is_held, who
+):
+    """Its operator was killed in the count: "All are armed.", and wheels turned 5 s later."""
+    fleet = fleet_of()
+
+    def look(*_, **__):
+        fleet.robots = {i: waits(i, timeout_ms) for i in (1, 2)}
+        for known in fleet.robots.values() if is_held else ():
+            known.hold_s = known.other_hold_s = time.monotonic() + 60
+        return fleet
+
+    def obeyed(*_, **__):
+        look()
+        answer = tell.Answer(1, True, True, "", "stopped", False, False, [])
+        return [answer, replace(answer, robot_id=2)]
+
+    for module in (swarm, swarm_door):
+        monkeypatch.setattr(module, "Fleet", look)
+    monkeypatch.setattr(swarm.tell, "tell", obeyed)
+    monkeypatch.setattr(swarm.tell, "arm", obeyed)
+    monkeypatch.setattr(swarm, "RUN_PERIOD_S", 1.0)
+    words = {"status": ["--once"], "arm": [], "select": ["diffusing"]}[verb]
+    says = f"R01, R02 stand still, wait for a start and begin by themselves, {who}."
+    for more in ([], ["--json"]):
+        _, out, _ = twinmill("swarm", verb, *words, "--key", key_file, *more)
+        assert says in (json.loads(out)["sentence"] if more else " ".join(out.split()))
+    told = look().robots[1].to_json()
+    assert (told["awaits_start"], told["stands"], told["tethered"]) == (True, False, timeout_ms > 0)
+    assert told["alarms"] == ["waits for a start and begins by itself"]
+
+
+def waits(robot_id: int, link_timeout_ms: int) -> Robot:
+    """One that has obeyed a start whose instant is to come."""
+    known = robot(robot_id, link_timeout_ms=link_timeout_ms)
+    known.link.stands, known.link.status_flags = 1, TELEMETRY.STATUS_AWAITS_START
+    return known
+
+
+def test_who_waits_for_another_start_has_confirmed_no_stop():
+    """It had, and was armed and told to start again before the stop had ended."""
+    known, command = waits(1, 0), tell.make_command(tell.VERBS.VERB_STOP)
+    ack = turbopi.signed_ack_t()
+    ack.session, ack.session_us, ack.accepted, ack.stands = SESSION, 500, True, True
+    known.signed_acks[command.seq], known.link.session_us = ack, 600
+    assert not known.confirms(command.seq)
+    known.link.status_flags = 0
+    assert known.confirms(command.seq)
+
+
+def test_who_drives_until_its_next_start_is_told_to_drive():
+    """Until its instant a start changes nothing."""
+    known = waits(1, 0)
+    known.link.mode = known.telemetry.mode = DRIVING
+    assert of_busy([known]) == "R01 drives already, untethered" and not known.alarms
+
+
+@pytest.mark.parametrize(
+    ("armed", "counter", "may"), [(True, 5, True), (False, 5, False), (True, 0, False)]
+)
+def test_one_that_was_stopped_or_started_anew_and_told_nothing_since_awaits_no_start(
+    armed, counter, may
+):
+    """Its operator held it and counted nothing."""
+    held = robot(1)
+    held.link.armed, held.link.counter = armed, counter
+    hold(fleet_of(held), 1)
+    counting = " who may be counting down to a start" if may else ""
+    assert of_busy([held]) == f"R01 stands still, held by another operator{counting}"
 
 
 @pytest.mark.parametrize(

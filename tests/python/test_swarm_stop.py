@@ -213,6 +213,7 @@ def test_a_stop_is_said_before_a_file_is_read(monkeypatch, twinmill):
         ["swarm", "stop-all"],
         ["swarm", "pause"],
         ["swarm", "--robots", "1"],
+        ["swarm", "--behavior", "stop"],
         ["stop_robots"],
         ["halt"],
     ],
@@ -279,6 +280,8 @@ def test_a_stop_with_other_words_than_a_request_for_help_stops(
         ("swarm STOP --HELP", True),
         ("swarm stop -h robot03", False),
         ("swarm -h robot03 stop", False),
+        ("swarm -h stop", True),
+        ("swarm --json stop -h", False),
         ("swarm -h", True),
         ("swarm start --robots 1 -h", True),
     ],
@@ -287,15 +290,34 @@ def test_what_a_stop_needs_is_imported_unless_it_asks_for_help_alone(words, is_h
     assert asks_for_help(words.split()) == is_help
 
 
-def test_a_stop_behind_a_request_for_help_says_that_nothing_was_stopped(twinmill):
-    code, out, err = twinmill("swarm", "-h", "robot03", "stop")
-    assert code == 2 and "Usage:" not in out
-    assert "NOTHING WAS STOPPED: `twinmill swarm stop` stops robots." in err
+@pytest.mark.parametrize("words", [["swarm", "stop", "--help"], ["swarm", "-h", "stop"]])
+def test_a_stop_alone_shows_its_help(twinmill, words):
+    code, out, _ = twinmill(*words)
+    assert code == 0 and "Usage: twinmill swarm stop" in " ".join(out.split())
 
 
-def test_a_stop_alone_shows_its_help(twinmill):
-    code, out, _ = twinmill("swarm", "stop", "--help")
-    assert code == 0 and "Usage:" in out
+@pytest.mark.parametrize(
+    ("words", "code", "asked"),
+    [
+        ("swarm --robots 1 stop", 1, {1}),
+        ("swarm --robots=1 STOP", 1, {1}),
+        ("swarm --json stop --robots 1", 1, {1}),
+        ("--robots 1 swarm stop", 1, {1}),
+        ("swarm --json -- stop", 1, set()),
+        ("swarm --channel-prefix start stop --robots 2", 1, {2}),
+        ("swarm --robots 1;2 stop", 2, set()),
+        ("swarm --all stop", 2, set()),
+        ("swarm -r 1 stop", 2, set()),
+        ("swarm -h robot03 stop", 2, set()),
+    ],
+)
+def test_a_stop_behind_its_options_stops(monkeypatch, tmp_path, twinmill, words, code, asked):
+    """An operator in a hurry had been told that there is no such option, and robots drove on."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    told = []
+    monkeypatch.setattr(swarm_stop.tell, "stop", lambda _, asked, *a, **k: told.append(asked) or [])
+    found, out, err = twinmill(*words.split(), "--lcm-url", "memq://")
+    assert (found, told) == (code, [asked]) and "NOTHING WAS STOPPED" not in out + err
 
 
 def test_a_refused_value_is_named_once(twinmill):

@@ -21,6 +21,7 @@ from twinmill.robots.hold import (
     LINK_LOST,
     RESTARTED,
     SILENT,
+    State,
     of_taken,
 )
 from twinmill.robots.tell import NEVER_HEARD, NO_SIGNATURE, Answer, Start
@@ -59,6 +60,7 @@ def answer(robot_id: int, **fields) -> Answer:
 
 GOOD, STANDS = answer(1), answer(2, mode="stopped", stands=True)
 REFUSED = answer(3, accepted=False, reason="no behaviour 'dance'", mode="stopped", stands=True)
+HESITANT = answer(3, accepted=False, reason="battery low", mode="")
 UNSIGNED = answer(4, signed=False, mode="stopped", stands=True)
 UNHEARD = answer(5, accepted=None, signed=False, reason=NEVER_HEARD, mode="", last_heard_s=None)
 FAULTY = answer(6, mode="fault", alarms=["camera lost"])
@@ -102,6 +104,11 @@ SENTENCES = [
     ),
     (of_stop([], Saying(unheard=["robot9"])), "No robot was heard in 10 s", 1),
     (of_stop([STANDS], is_of_some=True).beside(["R01"]), "R02 stands. R01 drives, and was", 0),
+    (
+        of_stop([STANDS], is_of_some=True).beside(["R01", "R03"]),
+        "R02 stands. R01, R03 drive, and were not asked.",
+        0,
+    ),
     (of_stop([]), "No robot was heard in 10 s", 1),
     (of_stop([STANDS, GOOD]), "NOT ALL STAND: R01: no stop was confirmed.", 1),
     (of_stop([UNSIGNED, STANDS]), "NOT ALL STAND: R04: no stop was confirmed.", 1),
@@ -182,8 +189,8 @@ SENTENCES = [
     ),
     (
         of_stop([STANDS, GOOD], Saying(2.5, 2.5, is_cut_short=True)),
-        "NOT ALL STAND: R01: no stop was confirmed. SWITCH OFF BY HAND what still drives. Ended by "
-        "a signal after 2.5 s. R02 confirmed it.",
+        "NOT ALL STAND: R01: no stop was confirmed. SWITCH OFF BY HAND what still drives. R01 "
+        "drives. Ended by a signal after 2.5 s. R02 confirmed it.",
         1,
     ),
     (
@@ -452,6 +459,8 @@ def test_a_stop_says_that_a_robot_has_another_key():
     assert "R04: is not heard to sign with this operator's key" in told.sentence
     assert "R04: by its word, which nobody can check, it stands." in told.sentence
     assert "R02: is not heard to sign" not in told.sentence
+    silent = replace(UNSIGNED, reason=NO_SIGNATURE, last_heard_s=9.0)
+    assert "it stands" not in of_stop([STANDS, silent]).sentence
 
 
 @pytest.mark.parametrize(
@@ -503,6 +512,15 @@ def test_a_stop_that_is_not_confirmed_by_robots_that_stand_says_both():
     assert of_stop([lost, silent]).sentence.startswith("NOT ALL STAND: R01, R02: no stop was")
 
 
+@pytest.mark.parametrize("stopped", [WELL, ILL])
+def test_a_fault_is_told_whatever_became_of_the_stop_of_others(stopped):
+    """It was left out where another robot had not confirmed its stop."""
+    fault = State("has a fault: camera lost", "had a fault: camera lost")
+    ended = of_end(WELL, {"R01": LINK_LOST, "R02": fault, "R03": SILENT}, stopped)
+    for words in ("R01 stood before: it had lost", "R02 had a fault: camera", "R03 had not been"):
+        assert words in ended.sentence
+
+
 def test_who_stood_and_is_not_heard_any_more_is_told_with_both():
     """Its own words, while the hold went on, were that it stood."""
     silent = answer(1, accepted=None, signed=False, reason="no answer", mode="", last_heard_s=9.0)
@@ -520,3 +538,15 @@ def test_who_stood_and_is_not_heard_any_more_is_told_with_both():
 )
 def test_old_news_is_not_counted_as_heard(old, words):
     assert of_heard([1], old).startswith(words)
+
+
+def test_who_refused_a_start_is_said_to_stand_only_as_it_has_signed():
+    for refused, words in (
+        ([REFUSED], "but not all: R03 refused it (no behaviour 'dance'), and stands. "),
+        (
+            [REFUSED, replace(REFUSED, robot_id=4)],
+            "R03, R04 refused it (no behaviour 'dance'), and stand. ",
+        ),
+        ([HESITANT], "but not all: R03 refused it (battery low). "),
+    ):
+        assert words in of_start(begun(*refused, GOOD)).sentence

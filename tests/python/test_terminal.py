@@ -11,6 +11,9 @@ from PIL import Image
 from rich.console import Console
 from rich.table import Table
 
+from twinmill.report import show
+from twinmill.report.tables import Cell
+from twinmill.report.tables import Table as Shown
 from twinmill.robots.fleet import Robot
 from twinmill.terminal import Fitting, progress_bar, progress_words
 from twinmill_cli import main as cli
@@ -113,3 +116,12 @@ def test_limits_of_colour_are_told_with_the_names_of_the_pictures(
     (row,) = json.loads(capsys.readouterr().out)["pictures"]
     for word in (path.name, str(row["ball_blob_px"]), str(row["false_px_before"])):
         assert word in told
+
+
+@pytest.mark.parametrize(("columns", "has_bar"), [(60, True), (56, False)])
+def test_a_bar_goes_before_a_row_of_numbers_becomes_running_text(columns, has_bar):
+    """With the bar 58 characters, without it 53."""
+    row = [Cell("acceleration_limit"), Cell("99.9 %", bar=1.0), Cell("1.00 ± 0.057"), Cell("s2/m")]
+    made = show.table(Shown("Missing", ["effect", "probability", "value ± std", "unit"], [row]))
+    (line,) = [own for own in printed(made, columns).splitlines() if "acceleration" in own]
+    assert all(cell.text in line for cell in row) and ("█" in line) == has_bar

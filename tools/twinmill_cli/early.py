@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 from twinmill_cli import done
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.own_path import PROGRAMS, is_program
+from twinmill_cli.word_order import GROUP, in_order
 
 MOVING = ("start", "arm", "select")  # below `swarm`: they begin only if nobody has asked for an end
 # As a background job of a script has SIGINT, and `nohup` SIGHUP, these are ignored at first.
@@ -22,7 +23,8 @@ ENDING = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
 
 def verb() -> str:
     """The word behind `swarm`, if any."""
-    return "".join(sys.argv[2:3]).lower() if sys.argv[1:2] == ["swarm"] else ""
+    words = in_order(sys.argv[1:])
+    return "".join(words[1:2]).lower() if words[:1] == [GROUP] else ""
 
 
 def _name() -> str:

@@ -21,11 +21,11 @@ from twinmill.streams import STDERR, STDOUT, closed_at_first
 from twinmill_cli import done, early
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.output import begin_telling, has_told, print_object, say
+from twinmill_cli.word_order import TO_ROBOTS, in_order
 
 WRONG_COMMAND_LINE = 2
 LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
 QUOTED = 80  # letters of what a sentence quotes
-TO_ROBOTS = ("start", "stop", "arm", "select", "status")  # below `swarm`
 HALTS = ("halt", "abort", "kill", "off")  # other words for it
 NO_ROOM = {  # why a file takes no more, and what to do
     errno.ENOSPC: "no space is left there; make room",
@@ -61,7 +61,7 @@ def leave(
             stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
     _take_standard_files()
     begin_telling()
-    words = sys.argv[1:] or ["--help"]
+    words = (in_order(sys.argv[1:]) if verbs else sys.argv[1:]) or ["--help"]
     try:
         if not _is_stop(words):
             _check_encoding(words)

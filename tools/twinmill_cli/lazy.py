@@ -17,6 +17,7 @@ from typer.core import TyperCommand, TyperGroup
 
 import twinmill_cli.typer_options  # noqa: F401 changes Typer's options
 from twinmill_cli import early
+from twinmill_cli.word_order import GROUP, in_order
 
 if TYPE_CHECKING:  # the bases of what Typer exports
     from typer._click.core import Command, Context
@@ -26,13 +27,14 @@ HELP = {"-h", "--help"}
 
 def _options() -> list[str]:
     """Words of this program's command line up to `--`, behind which none is an option."""
-    words = sys.argv[1:]
+    words = in_order(sys.argv[1:])
     return words[: words.index("--")] if "--" in words else words
 
 
 def asks_for_help(words: Sequence[str]) -> bool:
     """True if these words of a command line, up to `--`, have its help shown."""
-    if words[:1] == ["swarm"] and means_stop(words[1:]):
+    words = in_order(words)
+    if words[:1] == [GROUP] and means_stop(words[1:]):
         return asks_for_help_alone(words[2:])
     return bool(HELP & {*words})
 

@@ -10,7 +10,8 @@ from itertools import pairwise
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperOption
 
-LIKE_OPTION = 0.8  # difflib's ratio of behaviour and behavior is 0.94, of in and in-s 0.67
+from twinmill_cli.word_order import LIKE_OPTION
+
 # Words that can be told from others though nothing stands before them, by what help calls them.
 FORMS = {"IDS": r"[0-9]{1,2}(,[0-9]{1,2})*", "BEHAVIOR": r"[^\W\d][\w-]*"}
 

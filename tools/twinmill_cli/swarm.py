@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from twinmill.defaults import URL
 from twinmill_cli import done
+from twinmill_cli.ctrl_c import kept_free
 from twinmill_cli.lazy import asks_for_help_alone, means_stop, working
 from twinmill_cli.options import Arm, KeyFile, LcmUrl
 from twinmill_cli.output import AsJson, print_object, say, telling
@@ -48,12 +49,21 @@ if working():  # not for --help
     from rich.live import Live
 
     from twinmill.robots import tell
-    from twinmill.robots.fleet import LINK_TIMEOUT_MS, RUN_PERIOD_S, Fleet
+    from twinmill.robots.fleet import LINK_TIMEOUT_MS, RUN_PERIOD_S, Fleet, Robot
     from twinmill.robots.hold import Held
     from twinmill.terminal import PlainConsole
     from twinmill_cli.room import refuse_deleted, refuse_full
     from twinmill_cli.swarm_double import doubles
-    from twinmill_cli.swarm_end import addressed, clocks, driving, finish, placed, times
+    from twinmill_cli.swarm_end import (
+        addressed,
+        awaiting,
+        beside_all,
+        clocks,
+        driving,
+        finish,
+        placed,
+        times,
+    )
     from twinmill_cli.swarm_screen import countdown, status_table
     from twinmill_cli.swarm_verdict import (
         LEFT_ALONE,
@@ -169,31 +179,35 @@ def _start(
         if arm:
             tell.arm(fleet, asked)
         data = {
-            "drove_before": [robot.robot_id for robot in busy if robot.drives_by_any_word],
+            **_drove(busy),
             "left_alone": [],
             "link_timeout_s": timeout_ms / 1e3,
         }
         code, voice = 1, Voice(as_json=as_json)
-        old = {i for i in asked if (r := fleet.robots.get(i)) and r.is_old_news}
-        heard = "" if is_named else of_heard(sorted(asked - old), sorted(old))
+        old = {i for i in asked if (r := fleet.robots.get(i)) and r.signs_only_old_news}
+
+        def heard(told: Verdict) -> str:
+            by_old_news = {i for i in old if f"R{i:02d}" not in told.standing}
+            return "" if is_named else of_heard(sorted(asked - by_old_news), sorted(by_old_news))
 
         def ends(*becomes: str) -> str:
             return what_ends(lcm_url, channel_prefix, *becomes)
 
         with ended_by_signals(fleet, voice.check_listener) as asked_to_end:
             try:
-                verdict = _drive(
-                    fleet,
-                    asked,
-                    behavior,
-                    voice,
-                    data=data,
-                    as_json=as_json,
-                    heard=heard,
-                    ends=ends,
-                    signals=asked_to_end,
-                    **options,
-                )
+                with kept_free(fleet):
+                    verdict = _drive(
+                        fleet,
+                        asked,
+                        behavior,
+                        voice,
+                        data=data,
+                        as_json=as_json,
+                        heard=heard,
+                        ends=ends,
+                        signals=asked_to_end,
+                        **options,
+                    )
                 code = verdict.code_after(asked_to_end)
             finally:
                 done.decide(code)
@@ -211,7 +225,7 @@ def _drive(
     *,
     data: dict[str, Any],
     as_json: bool,
-    heard: str,
+    heard: Callable[[Verdict], str],
     ends: Callable[..., str],
     signals: Sequence[int],
     **options: Any,
@@ -225,36 +239,38 @@ def _drive(
         voice: what tells it.
         data: printed besides.
         as_json: how it is printed.
-        heard: words on who is there, where nobody said who is meant.
+        heard: gives words on who is there, where nobody said who is meant; given the outcome.
         ends: gives words on what stops robots that are held; given "calls that off", on that.
         signals: that came, and come.
         options: of tell.start().
     """
     begun, held, halt = None, None, LastStop(voice, signals)
     instant_s = time.monotonic() + options["ahead_s"]
-    ahead = countdown(asked, options["ahead_s"], ends("calls that off"))
+    ahead = countdown(_may_start(fleet, asked), options["ahead_s"], ends("calls that off"))
     voice.show_or_say(ahead)
     try:
         started = tell.start(fleet, asked, behavior, stopping=halt, **options)
         voice.clear()
-        odd = times(fleet, asked)
-        begun = of_start(started, ends(), drove_before=data["drove_before"]).more(heard).more(odd)
+        begun = of_start(started, ends(), drove_before=data["drove_before"])
+        said = begun.more(heard(begun)).more(times(fleet, asked, begun.standing))
+        said = beside_all(fleet, said)
         held = Held(fleet, started)
         data |= {"start_utime_us": started.begun_utime_us, "called_off": started.called_off}
-        data["left_alone"] = sorted(started.untold if started.called_off else ())
+        data["left_alone"] = sorted(started.left_alone)
         voice.tell_outcome(
-            lambda: finish("start", started.answers, begun, data, fleet=fleet, as_json=as_json),
-            placed(fleet, asked, begun).sentence,
+            lambda: finish("start", started.answers, said, data, fleet=fleet, as_json=as_json),
+            placed(fleet, asked, said).sentence,
         )
         if started.called_off or not held.robots:
-            return begun
+            return said
         if options["link_timeout_ms"] == 0:
             voice.wait(fleet.listen)
             fleet.watch()  # the last that ends it, while robots drive on
-            return begun
+            return said
         _hold(fleet, held, voice)
-        ended = of_end(begun, held.states, None).more(heard).beside(driving(fleet, asked))
-        ended = ended.more(times(fleet, asked))
+        ended = of_end(begun, held.states, None)
+        ended = ended.more(heard(ended)).beside(driving(fleet, asked))
+        ended = beside_all(fleet, ended.more(times(fleet, asked, ended.standing)))
     except BaseException as error:
         done.became("")
         if held:
@@ -271,10 +287,11 @@ def _drive(
         ended = (
             ended.more(told_of_signals(signals))
             .more(of_remarks(given) if stopped.ok else "")
-            .more(heard)
+            .more(heard(ended))
             .beside(driving(fleet, asked))
-            .more(times(fleet, asked))
+            .more(times(fleet, asked, ended.standing))
         )
+        ended = beside_all(fleet, ended)
         if begun is None:
             data |= {"start_utime_us": None, "called_off": False}
             voice.tell_outcome(
@@ -287,6 +304,16 @@ def _drive(
     if begun is not None:
         voice.say_outcome(placed(fleet, asked, ended).sentence)
     return ended
+
+
+def _may_start(fleet: Fleet, asked: set[int]) -> set[int]:
+    """Those of some robots that are not heard to sign nothing, as with another key."""
+    return {i for i in asked if not ((r := fleet.robots.get(i)) and r.recent and not r.link)}
+
+
+def _drove(busy: list[Robot]) -> dict[str, list[int]]:
+    """Object on the robots that drove before anything was said from here."""
+    return {"drove_before": [robot.robot_id for robot in busy if robot.drives_by_any_word]}
 
 
 def _who_drives(fleet: Fleet, left: list[int]) -> str:
@@ -331,9 +358,9 @@ def _arm(
             say(f"{of_busy(busy)}.")
         with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):
             given = tell.arm(fleet, asked)
-        verdict = of_arm(given).more(doubles(fleet, asked))
+        verdict = beside_all(fleet, of_arm(given))
         done.decide(verdict.code, verdict.sentence)
-        return finish("arm", given, verdict, {}, fleet=fleet, as_json=as_json)
+        return finish("arm", given, verdict, _drove(busy), fleet=fleet, as_json=as_json)
 
 
 def _select(
@@ -360,9 +387,9 @@ def _select(
             say(" ".join(filter(None, [of_countdown(busy, behavior), f"{of_busy(busy)}."])))
         command = tell.make_command(tell.VERBS.VERB_SELECT, behavior)
         given = tell.tell(fleet, command, asked, until_s=time.monotonic() + 5)
-        verdict = of_select(given, behavior).more(doubles(fleet, asked))
+        verdict = beside_all(fleet, of_select(given, behavior))
         done.decide(verdict.code, verdict.sentence)
-        return finish("select", given, verdict, {}, fleet=fleet, as_json=as_json)
+        return finish("select", given, verdict, _drove(busy), fleet=fleet, as_json=as_json)
 
 
 def _status(
@@ -415,7 +442,7 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         say(f"this computer has no network ({fleet.fault}).")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
-    odd = " ".join(filter(None, [doubles(fleet, fleet.robots), odd]))
+    odd = " ".join(filter(None, [awaiting(fleet), doubles(fleet, fleet.robots), odd]))
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
         data |= addressed(fleet, fleet.robots)

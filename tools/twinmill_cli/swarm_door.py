@@ -175,7 +175,7 @@ def refuse_unheard(fleet: Fleet, robots: set[int]) -> None:
         why = several.of(strange, tell.NO_SIGNATURE)
         driving = [fleet.robots[i] for i in sorted(strange) if fleet.robots[i].says_that_it_drives]
         more = f" {of_busy(driving)}." if driving else ""
-        raise ValueError(f"nothing was started: {names(strange)} {why}{more}")
+        raise ValueError(f"nothing was started: {names(strange)} {why}.{more}")
 
 
 def names(robots: Iterable[int]) -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
@@ -13,10 +14,10 @@ from twinmill_cli import done
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_double import doubles
 from twinmill_cli.swarm_screen import answer_table
-from twinmill_cli.swarm_verdict import of_addressed, of_clocks_now, of_late, of_old_news
+from twinmill_cli.swarm_verdict import of_addressed, of_busy, of_clocks_now, of_late, of_old_news
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable
 
     from twinmill.robots.fleet import Fleet
     from twinmill.robots.tell import Answer
@@ -53,19 +54,34 @@ def clocks(fleet: Fleet, robots: Iterable[int]) -> str:
     return " ".join(filter(None, [odd, of_late(known)]))
 
 
-def old_news(fleet: Fleet, robots: Iterable[int]) -> str:
-    """Sentence on some robots that are told by old news alone; empty if none is."""
-    return of_old_news(r for i in sorted(robots) if (r := fleet.robots.get(i)))
-
-
-def times(fleet: Fleet, robots: Iterable[int]) -> str:
+def times(fleet: Fleet, robots: Iterable[int], standing: Collection[str] = ()) -> str:
     """Sentences on what is old news of some robots, and on clocks and network of the others.
 
-    Before them, which are two of one number, as a recording that is played makes them.
+    Args:
+        fleet: where they are.
+        robots: the robots.
+        standing: names of those that are said to stand, as they have signed: what comes of them
+            late makes that no old news.
     """
     robots = set(robots)
-    told = [doubles(fleet, robots), old_news(fleet, robots), clocks(fleet, robots)]
-    return " ".join(filter(None, told))
+    open_robots = [i for i in sorted(robots) if f"R{i:02d}" not in standing]
+    old = of_old_news(r for i in open_robots if (r := fleet.robots.get(i)))
+    return " ".join(filter(None, [old, clocks(fleet, robots)]))
+
+
+def awaiting(fleet: Fleet) -> str:
+    """Sentence on robots that wait for a start, whoever was asked; empty if none does."""
+    known = [r for _, r in sorted(fleet.robots.items()) if r.awaits_start]
+    return f"{of_busy(known)}." if known else ""
+
+
+def beside_all(fleet: Fleet, verdict: Verdict) -> Verdict:
+    """An outcome with a word on all robots, asked or not, of which that must be known.
+
+    They wait for a start and begin by themselves; or they are two of one number: then it is wrong.
+    """
+    verdict, told = verdict.more(awaiting(fleet)), doubles(fleet, fleet.robots)
+    return replace(verdict.more(told), ok=False, ends_well=False) if told else verdict
 
 
 def addressed(fleet: Fleet, robots: Iterable[int]) -> dict[str, Any]:

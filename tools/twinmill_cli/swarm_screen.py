@@ -16,10 +16,17 @@ from twinmill.terminal import Fitting
 
 
 def countdown(robots: set[int], ahead_s: float, ends: str) -> str:
-    """Line of a start that is ahead: who, when by this computer's clock, and what ends it."""
+    """Line of a start that is ahead: who, when by this computer's clock, and what ends it.
+
+    Args:
+        robots: that may obey it; none where all that are heard have another key.
+        ahead_s: from now to the start.
+        ends: words on what does.
+    """
     names = ", ".join(f"R{i:02d}" for i in sorted(robots))
+    who = f"{names}: to" if robots else "No robot that is heard obeys the"
     at = time.strftime("%H:%M:%S", time.localtime(time.time() + ahead_s))
-    return f"{names}: to start at {at}. {ends}."
+    return f"{who} start at {at}. {ends}."
 
 
 def answer_table(given: list[Answer]) -> Fitting:
@@ -39,9 +46,9 @@ def answer_table(given: list[Answer]) -> Fitting:
 
 
 def _kept(answer: Answer) -> Text:
-    """For how long it drives on without its operator, as it has signed."""
+    """For how long it drives on without its operator, as it has signed; of one that stands none."""
     if answer.link_timeout_s is None:
-        return Text("?")
+        return Text("" if answer.stands else "?")
     return Text("untethered" if answer.untethered else f"{answer.link_timeout_s:g} s")
 
 
@@ -97,7 +104,7 @@ def _link(robot: Robot) -> Text:
     if not robot.link:
         return Text("not signed", "red")
     if robot.is_old_news:
-        return Text("old news", "red")
+        return Text("signs no more" if robot.signs_no_more else "old news", "red")
     if not robot.is_armed:
         return Text("stopped: arm it", "yellow")
     if robot.is_held is False:

@@ -7,7 +7,6 @@ import os
 import select
 import shlex
 import signal
-import termios
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
@@ -16,6 +15,7 @@ from twinmill.defaults import URL
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
 from twinmill.streams import STDERR, STDOUT, STDOUT_NAME, refuse_closed
 from twinmill_cli import done
+from twinmill_cli.ctrl_c import has_terminal, key_reaches
 from twinmill_cli.exit_now import STOPPED
 from twinmill_cli.handlers import put_back
 from twinmill_cli.output import print_object
@@ -57,48 +57,11 @@ OVER_SSH = (
     "hold robots from a machine beside them."
 )
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
-INTERRUPT_KEY = b"\x03"  # Ctrl-C, unless `stty intr` chose another
-
-
-def key_reaches() -> bool:
-    """Ctrl-C comes to this program: it is in the foreground of its terminal, where that key ends.
-
-    Not so behind `&`, under cron, over ssh without `-t`, or below `timeout` in a script.
-    """
-    with _terminal() as terminal:
-        try:
-            *_, local, _, _, keys = termios.tcgetattr(terminal)
-            is_set = bool(local & termios.ISIG) and keys[termios.VINTR] == INTERRUPT_KEY
-            return is_set and os.tcgetpgrp(terminal) == os.getpgrp()
-        except (OSError, termios.error):
-            return False
 
 
 def is_over_ssh() -> bool:
     """A session of ssh began this program, or what began it."""
     return "SSH_CONNECTION" in os.environ
-
-
-def _has_terminal() -> bool:
-    """A terminal that is closed sends this program SIGHUP."""
-    with suppress(OSError):
-        os.close(os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY))
-        return True
-    return False
-
-
-@contextmanager
-def _terminal() -> Iterator[int]:
-    """A handle of this program's terminal, or a standard file, which may be none."""
-    try:
-        terminal = os.open("/dev/tty", os.O_RDONLY | os.O_NOCTTY)
-    except OSError:  # there is none, or too many files are open
-        yield next((handle for handle in (0, STDOUT, STDERR) if os.isatty(handle)), STDERR)
-        return
-    try:
-        yield terminal
-    finally:
-        os.close(terminal)
 
 
 def what_ends(lcm_url: str, channel_prefix: str | None, becomes: str = STOPS) -> str:
@@ -115,7 +78,7 @@ def what_ends(lcm_url: str, channel_prefix: str | None, becomes: str = STOPS) ->
     bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
     stop = shlex.join(["twinmill", "swarm", "stop", *bus])
     how = f"`{stop}`, or here `kill {os.getpid()}`"
-    how += ", or closing this terminal, nohup or not" if _has_terminal() else ""
+    how += ", or closing this terminal, nohup or not" if has_terminal() else ""
     return f"No Ctrl-C reaches this command: {how}, {becomes}"
 
 

@@ -34,8 +34,7 @@ if working():  # not for --help
     from twinmill.data.bus import open_bus
     from twinmill.robots import tell
     from twinmill.robots.fleet import Fleet
-    from twinmill_cli.swarm_double import doubles
-    from twinmill_cli.swarm_end import driving, finish
+    from twinmill_cli.swarm_end import beside_all, driving, finish
     from twinmill_cli.swarm_verdict import Saying, Verdict, of_dry_run, of_stop
     from twinmill_cli.voice import Voice
 
@@ -170,6 +169,7 @@ def stop(
                 timeout_s,
                 hosts=hosts,
                 waiting=lambda left: say(waiting_words(fleet, left, hosts, timeout_s)),
+                driving=lambda robots: say(driving_words(robots)),
                 enough=lambda: _ends_a_stop(signals),
             )
             passed_s = time.monotonic() - begin_s
@@ -186,10 +186,11 @@ def stop(
             is_cut_short=is_cut_short,
             reach=fleet.reach,
             to_all=not asked,
+            is_deaf=bool(deaf),
             key_fault=deaf or (f"No robot's signature could be checked: {fault}" if fault else ""),
         )
         verdict = of_stop(given, how, is_of_some=bool(asked)).beside(beside)
-        verdict = verdict.more(of_dry_run(given)).more(doubles(fleet, fleet.robots))
+        verdict = beside_all(fleet, verdict.more(of_dry_run(given)))
         code = WRONG_COMMAND_LINE if misread else verdict.code
         if misread:
             verdict = Verdict(False, f"{misread} {verdict.sentence}")
@@ -266,6 +267,12 @@ def waiting_words(fleet: Fleet, left: set[int], hosts: tell.Hosts, timeout_s: fl
     return f"stop is said all the time; waiting up to {timeout_s:g} s for {whom}."
 
 
+def driving_words(robots: set[int]) -> str:
+    """Sentence on robots that drive while they are told to stop."""
+    words = several.of(robots, "drives, and has not confirmed the stop")
+    return f"{names(robots)} {words}."
+
+
 class LastStop:
     """The stop of a command that ends: like `swarm stop` it says what it awaits, and can be ended.
 
@@ -295,7 +302,14 @@ class LastStop:
         def ends() -> bool:
             return came is not None and _ends_a_stop(self._signals[came:])
 
-        given = tell.stop(fleet, robots, tell.STOP_S, waiting=wait, enough=ends)
+        given = tell.stop(
+            fleet,
+            robots,
+            tell.STOP_S,
+            waiting=wait,
+            driving=lambda those: self._voice.say(driving_words(those)),
+            enough=ends,
+        )
         passed_s = time.monotonic() - begin_s
         self.how = Saying(
             passed_s=passed_s,

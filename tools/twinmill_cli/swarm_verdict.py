@@ -12,7 +12,7 @@ from typing import Any
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
 from twinmill.robots.countdown import DOUBLE, NONE_BEGUN, STOPPED
-from twinmill.robots.fleet import DRIVING, DRY_RUN, Robot
+from twinmill.robots.fleet import AWAITS_START, DRIVING, DRY_RUN, SIGNED_S, Robot
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
     AHEAD_S,
@@ -20,7 +20,6 @@ from twinmill.robots.tell import (
     LATE_S,
     NEVER_HEARD,
     NO_KEY,
-    NO_SIGNATURE,
     STOP_LEAST_S,
     Answer,
     Start,
@@ -41,11 +40,14 @@ class Verdict:
         ok: it did, and exit code and JSON say so.
         sentence: what a person reads of it.
         ends_well: all stand, and nothing is wrong but that, it may be, a signal ended their start.
+        standing: names of robots that it says stand, as they have signed: of these nothing else
+            may be said.
     """
 
     ok: bool
     sentence: str
     ends_well: bool = False
+    standing: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Names of files and hosts, which a sentence quotes, may be no text."""
@@ -96,6 +98,7 @@ class Saying:
         reach: how far it got.
         key_fault: a sentence on why no robot's signature could be checked; empty: they were.
         to_all: to all that hear it, none by its number.
+        is_deaf: this computer could hear no robot, and `key_fault` says why.
     """
 
     passed_s: float = 10.0
@@ -105,11 +108,14 @@ class Saying:
     reach: Reach = field(default_factory=Reach)
     key_fault: str = ""
     to_all: bool = False
+    is_deaf: bool = False
 
     @property
     def hint(self) -> str:
         """Advice where a robot was not heard."""
         other = "Robots of another --lcm-url or --channel-prefix hear none of it."
+        if self.is_deaf:
+            return other
         if self.unheard:
             names = ", ".join(self.unheard)
             return (
@@ -157,13 +163,26 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
         how: it was said.
         is_of_some: these alone were asked, and others may be there.
     """
-    how = how or Saying()
+    told = _of_stop(given, how or Saying(), is_of_some=is_of_some)
+    return replace(told, standing=_standing(given))
+
+
+def _is_standing(answer: Answer) -> bool:
+    """It has confirmed a stop."""
+    return bool(answer.accepted and answer.signed and answer.stands and not answer.is_double)
+
+
+def _standing(given: Iterable[Answer]) -> frozenset[str]:
+    return frozenset(_names([a]) for a in given if _is_standing(a))
+
+
+def _of_stop(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdict:
     if not given:
         reached = how.reach.out or not how.reach.said
         hint = how.hint if reached or how.unheard else ""
         return Verdict(False, _joined(how.unanswered, how.cut, hint, how.key_fault))
     double = [a for a in given if a.is_double]
-    unconfirmed = [a for a in given if not ((a.accepted and a.signed and a.stands) or a.is_double)]
+    unconfirmed = [a for a in given if not (_is_standing(a) or a.is_double)]
     if not double and not unconfirmed:
         return _of_standing(given, how, is_of_some=is_of_some)
     told = [f"{_names(unconfirmed)}: no stop was confirmed"] if unconfirmed else []
@@ -176,6 +195,7 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
         False,
         _joined(
             f"NOT ALL {'HAVE CONFIRMED' if is_all else 'STAND'}: {'; '.join(told)}. {BY_HAND}",
+            _driving_on([a for a in unconfirmed if a.is_driving and not a.is_silent]),
             _standing_unconfirmed(standing),
             how.key_fault if unconfirmed else "",
             *_reasons(unconfirmed, how),
@@ -186,6 +206,11 @@ def of_stop(given: list[Answer], how: Saying | None = None, *, is_of_some: bool 
             how.hint if silent or how.unheard else "",
         ),
     )
+
+
+def _driving_on(given: list[Answer]) -> str:
+    """Sentence on robots that drive though they were told to stop; may be empty."""
+    return f"{_names(given)} {several.of(given, 'drives')}." if given else ""
 
 
 def _standing_unconfirmed(given: list[Answer]) -> str:
@@ -209,10 +234,11 @@ def _reasons(given: list[Answer], how: Saying) -> list[str]:
         those = [a for a in given if a.reason == reason]
         words = several.of(those, reason)
         sentences.append(f"{_names(those)}: {words}{'' if words.endswith('?') else '.'}")
-    strange = [a for a in given if a.reason == NO_SIGNATURE and a.mode == "stopped"]
-    if strange:
-        words = several.of(strange, "by its word, which nobody can check, it stands")
-        sentences.append(f"{_names(strange)}: {words}.")
+    speaking = [a for a in given if not (a.is_silent or a.signs_standing)]
+    unsigned = [a for a in speaking if a.mode == "stopped"]
+    if unsigned:
+        words = several.of(unsigned, "by its word, which nobody can check, it stands")
+        sentences.append(f"{_names(unsigned)}: {words}.")
     return sentences
 
 
@@ -264,11 +290,16 @@ def of_old_news(robots: Iterable[Robot]) -> str:
     if not old:
         return ""
     each = "; ".join(f"R{r.robot_id:02d} {r.old_news}" for r in old)
-    return (
+    told = (
         f"NOBODY KNOWS WHAT {', '.join(f'R{r.robot_id:02d}' for r in old)} "
-        f"{'DOES' if len(old) == 1 else 'DO'} NOW: {each}. It may be a recording that is played "
-        "while the robot is off or drives elsewhere; else the network is late, or its clock is "
-        "behind (NTP) and it hears nothing from here."
+        f"{'DOES' if len(old) == 1 else 'DO'} NOW: {each}."
+    )
+    if all(r.signs_no_more for r in old):
+        return told
+    return (
+        f"{told} What is old may be a recording that is played while the robot is off or drives "
+        "elsewhere; else the network is late, or its clock is behind (NTP) and it hears nothing "
+        "from here."
     )
 
 
@@ -295,8 +326,12 @@ def _besides(given: list[Answer]) -> str:
 
 
 def of_remarks(given: list[Answer]) -> str:
-    """Words of robots that have confirmed a stop: that they forget it if started anew."""
-    return _joined(*(f"{_names([a])} {a.reason}." for a in given if a.reason))
+    """Words on robots that have confirmed a stop: that they forget it if started anew, or when."""
+    late = [a for a in given if a.stood_ago_s is not None and a.stood_ago_s > SIGNED_S]
+    each = ", ".join(f"{_names([a])} up to {a.stood_ago_s:.0f} s ago" for a in late)
+    why = several.of(late, "packets are late or lost, or it was halted")
+    when = f"That was signed by {each}: {why}." if late else ""
+    return _joined(*(f"{_names([a])} {a.reason}." for a in given if a.reason), when)
 
 
 def _joined(*sentences: str) -> str:
@@ -304,27 +339,31 @@ def _joined(*sentences: str) -> str:
 
 
 def of_busy(busy: list[Robot]) -> str:
-    """That robots drive already or are about to, and by whom; empty where none does."""
+    """That robots drive already or are about to, and for whom; empty where none does."""
     by: dict[tuple[str, str], list[str]] = {}
     for robot in busy:
         who = BY_ITS_WORD
-        if robot.drives:
+        if robot.link_timeout_s is not None:
+            holder = "by another operator" if robot.hears_other_operator else "from here"
             who = {
                 None: "untethered",
-                True: "held by another operator",
+                True: f"held {holder}",
                 False: "and no operator is heard who holds it",
             }[robot.is_held]
         in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
-        if not robot.drives_by_any_word:
-            who = f"still{in_fault}, held by another operator who may be counting down to a start"
+        if robot.awaits_start:
+            who = f"still{in_fault}, {AWAITS_START}, {who}"
+        elif not robot.drives_by_any_word:
+            who = f"still{in_fault}, held by another operator"
+            who += " who may be counting down to a start" if robot.may_await_start else ""
         elif in_fault:
             who = f"still{in_fault}, was started, and drives once that is over: {who}"
         else:
             who = f"already, {who}"
-        moves = robot.drives_by_any_word and not in_fault
+        moves = robot.drives_by_any_word and not (in_fault or robot.awaits_start)
         by.setdefault(("drive" if moves else "stand", who), []).append(f"R{robot.robot_id:02d}")
     return "; ".join(
-        f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {who}"
+        f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {several.of(names, who)}"
         for (verb, who), names in by.items()
     )
 
@@ -342,14 +381,14 @@ def of_taking_over(busy: list[Robot]) -> str:
 def of_countdown(busy: list[Robot], behavior: str) -> str:
     """Sentence on robots that may not play what is chosen; empty where all will.
 
-    What the start names that they may wait for was said before anybody listened here.
+    What the start names that is to come was said before anybody listened here.
     """
     waiting = [f"R{robot.robot_id:02d}" for robot in busy if not robot.drives_by_any_word]
     if not waiting:
         return ""
     return (
-        f"{', '.join(waiting)} may not play {behavior}: where another operator counts down to a "
-        "start that names a behaviour, that is played."
+        f"{', '.join(waiting)} may not play {behavior}: where a start that is to come names a "
+        "behaviour, that is played."
     )
 
 
@@ -442,7 +481,7 @@ def _wrong(given: list[Answer]) -> str:
     """Who did not obey, or is two of whom one may not have; empty where all did."""
     double = [a for a in given if a.is_double]
     wrong = [a for a in _disobeyed(given) if a not in double]
-    unknown = [a for a in wrong if a.is_old_news and a.accepted is None]
+    unknown = [a for a in wrong if a.tells_nothing and a.accepted is None]
     wrong = [a for a in wrong if a not in unknown]
     told = [f"{_names(wrong)} did not obey{_because(wrong)}"] if wrong else []
     if unknown:
@@ -455,7 +494,7 @@ def _wrong(given: list[Answer]) -> str:
 def _are_unknown(given: list[Answer]) -> bool:
     """Whoever did not obey may have, for all that is known of now."""
     wrong = _disobeyed(given)
-    return bool(wrong) and all(a.is_old_news and a.accepted is None for a in wrong)
+    return bool(wrong) and all(a.tells_nothing and a.accepted is None for a in wrong)
 
 
 def of_start(
@@ -468,9 +507,12 @@ def of_start(
         ends: what stops those that are held.
         drove_before: robots that did before anything was said from here.
     """
+    told = _of_called_off(begun) if begun.called_off else _of_start(begun, ends, drove_before)
+    return replace(told, standing=_standing([*begun.stopped, *begun.late]))
+
+
+def _of_start(begun: Start, ends: str, drove_before: Iterable[int]) -> Verdict:
     given = begun.answers
-    if begun.called_off:
-        return _of_called_off(begun)
     at = datetime.fromtimestamp(begun.utime_us / 1e6).strftime("%H:%M:%S.%f")[:-3]
     faulty = [a for a in given if a.mode == "fault"]
     standing = [a for a in given if a.mode not in (*DRIVING, "fault")]
@@ -484,7 +526,8 @@ def of_start(
     late = {a.robot_id for a in begun.late}
     waiting = [a for a in standing if a.robot_id not in late]
     silent = [a for a in waiting if a.is_silent and a.accepted is not False]
-    idle = [a for a in waiting if a not in silent]
+    refusing = [a for a in waiting if a.accepted is False]
+    idle = [a for a in waiting if a not in silent and a not in refusing]
     unsure = [a for a in _disobeyed(given) if a.mode in DRIVING and a not in going]
     double = [a for a in given if a.is_double]
     theirs = [a for a in unsure if a.robot_id in begun.untold]
@@ -494,9 +537,11 @@ def of_start(
         f"{_names(faulty)} with a fault{_alarms(faulty)}, and will drive once it is over"
         if faulty
         else "",
-        f"{_names(idle)} did not{_because(idle)}" if idle else "",
+        _refused([a for a in refusing if a.stands], ", and stands"),
+        _refused([a for a in refusing if not a.stands]),
+        f"{_names(idle)} did not{_because(idle) or _alarms(idle)}" if idle else "",
         _unheard(silent) + _because(silent) if silent else "",
-        f"{_unheard(begun.late)} in time, told to stop" if begun.late else "",
+        f"{_unheard(begun.late)} in time{_alarms(begun.late)}, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
         f"{_names(double)}: two robots have this number, one may stand" if double else "",
@@ -514,6 +559,16 @@ def of_start(
     if begun.late:
         words = f"{words} {of_stop(begun.late, is_of_some=True).sentence}"
     return Verdict(False, words)
+
+
+def _refused(given: list[Answer], then: str = "") -> str:
+    """Words on robots that did not obey, and why; empty where none is so.
+
+    Args:
+        given: what they answered.
+        then: how each is, to go on behind.
+    """
+    return f"{_names(given)} refused it{_because(given)}{several.of(given, then)}" if given else ""
 
 
 def _unconfirmed(given: list[Answer], words: str) -> str:
@@ -613,14 +668,17 @@ def _of_nobody(begun: Start, at: str, ends: str) -> str:
     """Why none drives though its instant has come."""
     if begun.late:
         stopped = of_stop(begun.late, is_of_some=True).sentence
-        words = f"{_unheard(begun.late)} in time. Told to stop: {stopped}"
+        words = f"{_unheard(begun.late)} in time{_alarms(begun.late)}. Told to stop: {stopped}"
         return f"NOBODY WAS HEARD TO START: {words}"
     if len(_disobeyed(begun.answers)) == len(begun.answers):
         is_sure = not any(a.is_silent and a.accepted is None for a in begun.answers)
         return f"NOBODY {'STARTED' if is_sure else 'WAS HEARD TO START'}: {_why(begun.answers)}."
     waiting = [a for a in begun.answers if a.accepted and a.signed]
-    words = f"{_names(waiting)} accepted the start, and may begin late by a clock that is behind"
-    return f"NOBODY DRIVES, though it is {at}: {words}. {ends}."
+    is_unheard = any(a.is_silent for a in waiting)
+    drives = "WAS HEARD TO DRIVE" if is_unheard else "DRIVES"
+    may = "drive, unheard over a late network, or " if is_unheard else ""
+    words = f"accepted the start, and may {may}begin late by a clock that is behind"
+    return f"NOBODY {drives}, though it is {at}: {_names(waiting)} {words}. {ends}."
 
 
 def of_end(
@@ -638,14 +696,25 @@ def of_end(
         stopped: what came of the stop; None: all stood by themselves before.
         was_confirmed: all had confirmed a start that was ended.
     """
+    ends = _of_end(begun, states, stopped, was_confirmed=was_confirmed)
+    standing = frozenset(name for name, state in states.items() if state.stands)
+    return replace(ends, standing=stopped.standing if stopped else standing)
+
+
+def _of_end(
+    begun: Verdict | None,
+    states: dict[str, State],
+    stopped: Verdict | None,
+    *,
+    was_confirmed: bool,
+) -> Verdict:
     early: dict[State, list[str]] = {}
     for name, state in states.items():
         if state.stands or state.before:
             early.setdefault(state, []).append(name)
-    if stopped and not stopped.ok:
-        stood = [_told_early(names, state, True) for state, names in early.items() if state.stands]
-        return stopped.more(_joined(*(f"{words}." for words in stood)))
     told = [_told_early(names, state, bool(stopped)) for state, names in early.items()]
+    if stopped and not stopped.ok:
+        return stopped.more(_joined(*(f"{words}." for words in told)))
     if begun is None:
         known = "all had confirmed it" if was_confirmed else "not all had confirmed it"
         told.append(f"the start was ended before it was known to have begun; {known}")

@@ -41,6 +41,10 @@ SIOCGIFCONF, SIOCGIFFLAGS, SIOCGIFHWADDR, SIOCGIFINDEX = 0x8912, 0x8913, 0x8927,
 IFREQ_BYTES, NAME_BYTES = 40, 16
 NETWORKS_MAX = 256
 TOO_MANY = (errno.EMFILE, errno.ENFILE)
+NO_NETWORK = (
+    "there is no network; is there one with a route for multicast "
+    "(ip route add 224.0.0.0/4 dev DEVICE)?"
+)
 IFF_LOOPBACK, IFF_RUNNING, ARPHRD_ETHER = 0x8, 0x40, 1
 
 
@@ -53,15 +57,25 @@ def open_bus(url: str, *, needs_network: bool = True, hears: bool = True) -> Any
         hears: as of UdpBus.
 
     Raises:
-        RuntimeError: there is no such bus.
+        RuntimeError: there is no such bus; a sentence says why not, and what to do.
     """
     check_url(url)
     if url == "" or url.startswith("udpm:"):
         bus = UdpBus(url, hears=hears)
         if needs_network and not bus.has_network:
-            raise RuntimeError("no network")
+            raise RuntimeError(NO_NETWORK)
         return bus
     return lcm.LCM(url)
+
+
+def why_no_socket(error: OSError, port: int) -> str:
+    """Sentence on what keeps a bus at this port from being joined, and what to do."""
+    if error.errno == errno.EADDRINUSE:
+        return (
+            f"another program has UDP port {port} and shares it with nobody; "
+            f"`sudo ss -ulnp sport = :{port}` names it: end it."
+        )
+    return too_many_files(error) or f"{error.strerror}."
 
 
 def too_many_files(error: BaseException | None) -> str:
@@ -201,7 +215,7 @@ class UdpBus:
             if hears:
                 self.hear()
         except OSError as error:
-            raise RuntimeError(str(error)) from error
+            raise RuntimeError(why_no_socket(error, self.group[1])) from error
 
     def hear(self) -> None:
         """Hears what is said from now on.

@@ -8,13 +8,14 @@ from typing import Any
 
 import turbopi
 
-from twinmill.robots.fleet import GONE_S, SIGNED_S, TELEMETRY, Fleet, Heard, Robot
+from twinmill.robots.fleet import GONE_S, NO_MORE, SIGNED_S, TELEMETRY, Fleet, Heard, Robot
 
 ARM = turbopi.signed_command_t.VERB_ARM
 STOPPED = "stopped by another command"
 DOUBLE = "heard as two robots of one number"  # which refuses a start before it is said
 NOT_BEGUN = "not driving when the others had begun"
 NONE_BEGUN = "not driving when the instant of the start was past"  # clocks may have been set
+NOT_HEARD_SINCE = "not heard since the instant of the start (a hang, or a late network)"
 UNHEARD = "told something by another operator who was not heard here"
 HELD_BY_ANOTHER = "taken over by another operator, whose command was not heard here"
 
@@ -54,7 +55,7 @@ def find_dropouts(
 ) -> Dropouts:
     """Robots for which a start is over, by what they have signed, or not, since they were armed.
 
-    Or as they turn out to be two of one number.
+    Or as they turn out to be two of one number, of whom nothing else is known then.
 
     Who refuses it for a reason of his own is none of them.
 
@@ -67,14 +68,14 @@ def find_dropouts(
         link_timeout_ms: that was sent with it; None: nobody is judged by it.
     """
     words, taken = {}, set()
-    for robot in _linked(fleet, robots):
+    double = {i: DOUBLE for i in robots if (r := fleet.robots.get(i)) and r.is_double}
+    for robot in _linked(fleet, robots - {*double}):
         ack = robot.signed_acks.get(seq)
         whose = _whose(fleet, robot, ack, link_timeout_ms) if seq in fleet.said else ""
         why = whose or (_why(fleet, robot, ack) if ack else "")
         if why and (why == STOPPED or not only_stopped):
             words[robot.robot_id] = why
             taken |= {robot.robot_id} if whose else set()
-    double = {i: DOUBLE for i in robots if (r := fleet.robots.get(i)) and r.is_double}
     return Dropouts(double | words, frozenset(taken))
 
 
@@ -143,7 +144,7 @@ def _why(fleet: Fleet, robot: Robot, ack: Any) -> str:
     if not ack.accepted:
         return _why_not(fleet, robot, ack)
     if robot.is_old_news:
-        return "not heard any more, but by old news"
+        return NO_MORE if robot.signs_no_more else "not heard any more, but by old news"
     link, now_s = robot.link, time.monotonic()
     if _obeyed_a_stop(fleet, robot, ack.session, after_us=ack.session_us):
         return STOPPED

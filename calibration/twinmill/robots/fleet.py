@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import turbopi
 
 from twinmill.arguments import option
-from twinmill.data.bus import Reach, Senders, open_bus, too_many_files
+from twinmill.data.bus import Reach, Senders, open_bus, why_no_socket
 from twinmill.defaults import URL
 from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
@@ -31,6 +31,7 @@ ALL, ROBOTS_MAX = -1, 100  # in swarm_command_t, robot_id is one of 0..99, or al
 MODES = ("stopped", "running", "script", "fault")
 DRIVING = ("running", "script")
 TELEMETRY = turbopi.telemetry_t
+NO_MORE = "not heard to sign with this operator's key any more"
 DRY_RUN = "dry run: its motor board is not opened"
 # What keeps a robot from doing what it is told, or hides it, loudest first.
 ALARMS = (
@@ -41,12 +42,18 @@ ALARMS = (
     (TELEMETRY.STATUS_DRY_RUN, DRY_RUN),
     (TELEMETRY.STATUS_LINK_LOST, "lost its operator"),
     (TELEMETRY.STATUS_CAMERA_LOST, "camera lost"),
+    (TELEMETRY.STATUS_FRAME_STALE, "no new picture from the camera"),
     (TELEMETRY.STATUS_BATTERY_LOW, "battery low"),
     (TELEMETRY.STATUS_LOG_LOST, "rows of a log lost"),
     (TELEMETRY.STATUS_LATCH_LOST, "forgets a stop if started anew: run_dir cannot be written"),
 )
-# A robot with one of these may be moving, whatever it was told.
-MAY_MOVE = TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED
+# A fault for which there is no flag: a button, lights or battery that cannot be read.
+OF_A_PART = "a part does not answer"
+AWAITS_START = "waits for a start and begins by itself"
+# A robot with one of these may be moving, or is about to, whatever it was told.
+MAY_MOVE = (
+    TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED | TELEMETRY.STATUS_AWAITS_START
+)
 # Fields of text, which may be anybody's: most of these messages are not signed.
 TEXTS = {"source": NAME_MAX, "version": NAME_MAX, "behavior": NAME_MAX, "reason": LINE_MAX}
 SIGNED_COMMANDS, PLAIN_COMMANDS = "SWARM_SIGNED", "SWARM_COMMAND"
@@ -195,10 +202,7 @@ class Robot:
     @property
     def _said_mode(self) -> str:
         """As its newest telemetry says, however old that is."""
-        if not self.telemetry:
-            return ""
-        mode = self.telemetry.mode
-        return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
+        return _mode_of(self.telemetry) if self.telemetry else ""
 
     @property
     def source(self) -> str:
@@ -228,13 +232,18 @@ class Robot:
 
     @property
     def says_that_it_drives(self) -> bool:
-        """Its telemetry of just now does; not what it had said before it fell silent."""
-        is_new = bool(self.recent) and time.monotonic() - self.recent[-1].heard_s < GONE_S
-        return is_new and self.mode in DRIVING
+        """Its telemetry of just now does; not what it had said before it fell silent.
+
+        Of two of one number, that of either; not of one that may be a recording.
+        """
+        now_s, older = time.monotonic(), self.older_s if self.is_double else ()
+        new = [s for s in self.recent if now_s - s.heard_s < GONE_S and s.host not in older]
+        said = new if self.is_double else new[-1:]
+        return not self.is_old_news and any(_mode_of(s.telemetry) in DRIVING for s in said)
 
     @property
     def stands(self) -> bool:
-        """Its newest telemetry says so, and its board takes what it is told."""
+        """Its newest telemetry says so, its board obeys, and no start is to come."""
         t = self.telemetry
         return (
             self._said_mode == "stopped"
@@ -244,7 +253,7 @@ class Robot:
 
     @property
     def signs_that_it_stands(self) -> bool:
-        """It has signed just now, by its own stamp, that its board took zero.
+        """It has signed just now, by its own stamp, that its board took zero, and awaits no start.
 
         What else it says, signed or not, may only contradict that.
         """
@@ -302,16 +311,42 @@ class Robot:
         return self.is_old_news and (comes_signed or self.late_s > SIGNED_S)
 
     @property
+    def signs_no_more(self) -> bool:
+        """Its signature alone is silent, beside words that are new, as of one with a new key."""
+        return self.is_old_news and not self.signs_only_old_news
+
+    @property
     def old_news(self) -> str:
-        """Words on how old is what is known of it; empty where it is new."""
+        """Words on how old is what is known of it, or why that tells nothing; empty where it does.
+
+        To go on behind its name.
+        """
         if not self.is_old_news:
             return ""
+        if self.signs_no_more:
+            return f"is {NO_MORE}"
         if not self.link:
             return f"by what it said {self.late_s:.0f} s ago, or its clock is behind"
         if self.signed_ago_s == math.inf:
             return "its clock is ahead, and it answers nothing: nobody knows when it said that"
         how = "at most" if self.answered_now else "if its clock is right"
         return f"by what it signed {self.signed_ago_s:.0f} s ago, {how}"
+
+    def says_since(self, utime_us: int) -> bool:
+        """Its newest telemetry was said after an instant, us since the Unix epoch.
+
+        By its own clock, which begins a start; or by ours, where its own is behind for sure. Over a
+        late network it tells for a while only how it was before.
+        """
+        return self._is_since(self.telemetry, utime_us)
+
+    def signs_since(self, utime_us: int) -> bool:
+        """Its newest link was signed after an instant, as of `says_since`."""
+        return self._is_since(self.link, utime_us)
+
+    def _is_since(self, message: Any, utime_us: int) -> bool:
+        behind_us = -1e6 * min(0.0, self.clock_s)
+        return bool(message) and message.utime_us + behind_us >= utime_us
 
     def confirms(self, seq: int) -> bool:
         """It has signed that it obeyed this stop, and that its board took zero since.
@@ -330,6 +365,23 @@ class Robot:
             and (self.stands or not self.telemetry)
         )
 
+    def confirmed_ago_s(self, seq: int, said_s: float) -> float | None:
+        """How long ago, at most, it signed that it stands since this stop; None: it did not.
+
+        Args:
+            seq: of the stop, which nobody could answer before it was said.
+            said_s: when it was said first, by time.monotonic().
+        """
+        if not self.confirms(seq):
+            return None
+        ack, link, answered = self.signed_acks[seq], self.link, self.answered
+        now_s = time.monotonic()
+        signed = [said.session_us for said in (ack, link) if said and said.session == ack.session]
+        bounds_s = [now_s - said_s]
+        if answered and answered.session == ack.session:
+            bounds_s.append(now_s + answered.most_now_s - max(signed) / 1e6)
+        return min(bounds_s)
+
     def has_obeyed(self, command: Heard) -> bool:
         """It has signed so, to whoever said it or in its link."""
         ack, link = self.signed_acks.get(command.seq), self.link
@@ -346,8 +398,9 @@ class Robot:
 
     @property
     def link_timeout_s(self) -> float | None:
-        """How long it drives on without its operator, 0: for ever; None as `is_tethered`."""
-        return self.link.link_timeout_ms / 1e3 if self.drives else None
+        """How long it goes on without its operator, 0: for ever; None as `is_tethered`."""
+        is_started = self.drives or (self.link and self.awaits_start)
+        return self.link.link_timeout_ms / 1e3 if is_started else None
 
     @property
     def is_armed(self) -> bool | None:
@@ -355,9 +408,23 @@ class Robot:
         return bool(self.link.armed) if self.link and not self.is_old_news else None
 
     @property
+    def awaits_start(self) -> bool:
+        """It stands and, as it says, signed or not, begins at the instant of a start to come."""
+        is_said = bool(self._flags & TELEMETRY.STATUS_AWAITS_START)
+        return is_said and not self.is_old_news and self._said_mode not in DRIVING
+
+    @property
+    def may_await_start(self) -> bool:
+        """It may have obeyed a start that is to come.
+
+        Not one that has signed that it must be armed first, or obeyed nothing in its session yet.
+        """
+        return self.is_armed is None or bool(self.link.armed and self.link.counter)
+
+    @property
     def is_tethered(self) -> bool | None:
-        """It stops when its operator is lost; None if it does not drive or has not signed that."""
-        return self.link_timeout_s > 0 if self.drives else None
+        """It stops when its operator is lost; None if it was not started or has not signed that."""
+        return None if self.link_timeout_s is None else self.link_timeout_s > 0
 
     @property
     def lost_link(self) -> bool:
@@ -384,7 +451,7 @@ class Robot:
 
     @property
     def is_held(self) -> bool | None:
-        """An operator is heard who holds it; None if it needs none."""
+        """An operator is heard who holds it, driving or in the count; None if it needs none."""
         return self.hears_operator if self.is_tethered else None
 
     @property
@@ -406,13 +473,32 @@ class Robot:
     @property
     def alarms(self) -> list[str]:
         """Alarms about it that a person must know, loudest first."""
-        hosts = ", ".join(self.senders.hosts)
-        said = [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
         if self.is_old_news:
-            return [*said, f"OLD NEWS: {self.old_news}"]
+            what = "SIGNS NO MORE" if self.signs_no_more else "OLD NEWS"
+            return [*self._double_alarm, f"{what}: {self.old_news}"]
+        return self.last_alarms
+
+    @property
+    def last_alarms(self) -> list[str]:
+        """Alarms by its last words, however old these are."""
+        flags = self._flags
+        if flags & TELEMETRY.STATUS_CAMERA_LOST:  # which tells that there is no picture
+            flags &= ~TELEMETRY.STATUS_FRAME_STALE
+        told = self._double_alarm + [words for flag, words in ALARMS if flags & flag]
+        if self._said_mode == "fault" and not told:
+            told = [OF_A_PART]
+        return [*told, AWAITS_START] if self.awaits_start else told
+
+    @property
+    def _flags(self) -> int:
+        """STATUS_* of its newest words, signed or not."""
         flags = self.telemetry.status_flags if self.telemetry else 0
-        flags |= self.link.status_flags if self.link else 0
-        return said + [words for flag, words in ALARMS if flags & flag]
+        return flags | (self.link.status_flags if self.link else 0)
+
+    @property
+    def _double_alarm(self) -> list[str]:
+        hosts = ", ".join(self.senders.hosts)
+        return [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
 
     @property
     def clock_s(self) -> float:
@@ -458,6 +544,18 @@ class Robot:
             ages_s[step.host] = min(step.age_s, ages_s.get(step.host, math.inf))
         older_s = {host: age_s - self.age_s for host, age_s in ages_s.items()}
         return {host: s for host, s in older_s.items() if s > SIGNED_S}
+
+    def has_newer(self, step: Step) -> bool:
+        """Its machine is heard with words that are newer by far: this waited on its way.
+
+        As what a program said before it was started anew, which is no second robot. A recording
+        that begins anew is older than its end, of which nothing more is heard.
+        """
+        age_s, since_s = step.age_s, step.heard_s - LOOK_ROUND_S
+        return any(
+            s.host == step.host and s.heard_s > since_s and age_s - s.age_s > SIGNED_S
+            for s in self.recent
+        )
 
     @property
     def late_s(self) -> float:
@@ -508,6 +606,7 @@ class Robot:
             "hosts": self.senders.hosts,
             "signed": self.link is not None,
             "armed": self.is_armed,
+            "awaits_start": self.awaits_start,
             "tethered": self.is_tethered,
             "held": self.is_held,
             "signed_ago_s": self.signed_ago_s if self.link else None,
@@ -522,6 +621,11 @@ class Robot:
             "detected_frac": self.detected_frac,
             "status_flags": t.status_flags if t else None,
         }
+
+
+def _mode_of(telemetry: Any) -> str:
+    mode = telemetry.mode
+    return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
 
 def _time_of_day(utime_us: int) -> str:
@@ -579,13 +683,8 @@ class Fleet:
             channels = f"{re.escape(channel_prefix)}(R[0-9]{{2,3}}_({kinds})|{commands})"
             self.bus.subscribe(channels, self._on_message)
         except RuntimeError as error:
-            if words := too_many_files(error.__cause__):
-                raise ValueError(f"robots cannot be spoken to: {words}") from error
-            raise ValueError(
-                f"{option('lcm_url', url)}: cannot be joined ({error}); is there a network with a "
-                "route for "
-                "multicast (ip route add 224.0.0.0/4 dev DEVICE)?"
-            ) from error
+            words = f"{option('lcm_url', url)}: cannot be joined: {error}"
+            raise ValueError(words if words.endswith((".", "?")) else f"{words}.") from error
 
     def close(self) -> None:
         """Leaves the bus; other buses than a UdpBus leave by themselves."""
@@ -598,8 +697,7 @@ class Fleet:
             if hasattr(self.bus, "hear"):
                 self.bus.hear()
         except OSError as error:
-            why = too_many_files(error) or f"{error.strerror}."
-            return f"No robot can be heard: {why}"
+            return f"No robot can be heard: {why_no_socket(error, self.bus.group[1])}"
         return ""
 
     def _on_message(self, channel: str, data: bytes) -> None:
@@ -631,8 +729,10 @@ class Fleet:
             robot.telemetry = message
             waited_s = max(0.0, now_s - self._empty_s)
             host = sender[0] if sender else ""
-            robot.recent.append(Step(now_s, time.time(), message, waited_s, host))
-            robot.senders.add(sender)
+            step = Step(now_s, time.time(), message, waited_s, host)
+            if not robot.has_newer(step):
+                robot.senders.add(sender)
+            robot.recent.append(step)
             while robot.recent[0].heard_s < now_s - WINDOW_S:
                 robot.recent.popleft()
 

@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 import turbopi
 
-from twinmill.robots.fleet import MAY_MOVE, TELEMETRY, Fleet, Heard, Robot
+from twinmill.robots.fleet import (
+    MAY_MOVE,
+    NO_MORE,
+    OF_A_PART,
+    TELEMETRY,
+    Fleet,
+    Heard,
+    Robot,
+)
 from twinmill.robots.tell import Start
 
 # A robot signs ten times a second; without a word for as long as it would wait for its operator,
@@ -43,8 +51,13 @@ class State:
 
 DRIVES = State("drives", is_meant=True)
 WAITS = State(
-    "has accepted the start, and has not driven yet: its clock may be behind",
-    "had accepted the start, and had not driven yet",
+    "has accepted the start, and is not heard to drive yet: its clock may be behind, or the "
+    "network late",
+    "had accepted the start, and was not heard to drive yet",
+)
+AWAITS = State(
+    "waits for another start, unheard here, and begins by itself",
+    "waited for another start, unheard here",
 )
 DRIVES_AS_UNHEARD = State(
     "drives, and obeyed another operator whose words were not heard here",
@@ -64,7 +77,7 @@ OLD_NEWS = State(
     "had been told by old news alone for a while",
 )
 UNSIGNED = State(
-    "is not heard to sign with this operator's key any more: nobody knows whether it stands",
+    f"is {NO_MORE}: nobody knows whether it stands",
     "was not heard to sign with this operator's key for a while",
 )
 DOUBLE = State(
@@ -81,10 +94,16 @@ LINK_LOST_TO_OTHER = State("it had lost its link to that operator", stands=True)
 BY_COMMAND = State("stopped by another command", stands=True, is_meant=True)
 SCRIPT_OVER = State("its script is over, or its button was pressed", stands=True, is_meant=True)
 BY_BUTTON = State("its button was pressed", stands=True, is_meant=True)
+BY_UNHEARD = State(
+    "it obeyed another operator whose words were not heard here", stands=True, is_meant=True
+)
 
 
 def of_taken(command: Heard, then: State | None = None) -> State:
-    """A robot that was taken over by another operator, and why it stands by now."""
+    """A robot that was taken over by another operator, and why it stands by now, if that is known.
+
+    One of which it is not may wait for the instant of his start.
+    """
     words = f"taken over by another operator ({command.words})"
     if not then:
         return State(f"was {words}", f"was {words}", is_taken=True)
@@ -112,7 +131,8 @@ class Held:
         self._sessions = {
             r.robot_id: begun.sessions.get(r.robot_id, r.link.session) for r in self.robots
         }
-        self._drove: dict[int, int] = {}  # mode in which a robot drove last
+        # Mode in which a robot drove last, and by which command: session and counter.
+        self._drove: dict[int, tuple[int, int, int]] = {}
         self._told = dict.fromkeys(self._sessions, DRIVES)
         self._seen = dict.fromkeys(self._sessions, (DRIVES, 0.0))  # and since when
         self._begin_s = time.monotonic()
@@ -121,6 +141,7 @@ class Held:
         """By its newest link, which what it says unsigned may only contradict."""
         link = robot.link
         if robot.is_double:
+            self._forget(robot)
             return DOUBLE
         if robot.signs_only_old_news:
             return OLD_NEWS
@@ -133,35 +154,61 @@ class Held:
         if taken and link.mode == TELEMETRY.MODE_FAULT:
             return of_taken(taken)
         if link.mode == TELEMETRY.MODE_FAULT:
-            is_blind = link.status_flags & TELEMETRY.STATUS_FRAME_STALE
-            blind = "no new picture of its camera" if is_blind else "a part of it does not answer"
-            what = ", ".join(robot.alarms) or blind
+            what = ", ".join(robot.alarms) or OF_A_PART
             return State(
                 f"has a fault: {what}; it may drive again once that is over",
                 f"had a fault: {what}",
             )
         if link.mode != TELEMETRY.MODE_STOPPED:
-            self._drove[robot.robot_id] = link.mode
+            self._drove[robot.robot_id] = (link.mode, link.session, link.counter)
             if taken:
                 return of_taken(taken)
             return DRIVES_ANEW if is_anew else self._drives(robot)
         if robot.mode in ("running", "script"):
             return self._told[robot.robot_id]
+        if robot.awaits_start:
+            return of_taken(taken) if taken else self._waits(robot)
         if not (link.stands and robot.stands) or link.status_flags & MAY_MOVE:
             return UNCONFIRMED
-        why = RESTARTED if is_anew and not taken else self._why_it_stands(robot)
-        return of_taken(taken, why) if taken else why
+        if is_anew and not taken:
+            return RESTARTED
+        why, told = self._why_it_stands(robot), self._told[robot.robot_id]
+        others = self._others(robot)
+        if not why and told.stands and not (others and others[0].starts):
+            return told
+        return of_taken(taken, why) if taken else why or self._of_told_since(robot, others)
 
-    def _why_it_stands(self, robot: Robot) -> State:
-        flags = robot.link.status_flags
-        if flags & TELEMETRY.STATUS_LINK_LOST:
+    def _forget(self, robot: Robot) -> None:
+        """Nobody knows which of two of one number did what: it is as if one had begun just now."""
+        self._drove.pop(robot.robot_id, None)
+        self._sessions[robot.robot_id] = robot.link.session
+
+    def _why_it_stands(self, robot: Robot) -> State | None:
+        """As its signed words tell; None: they tell no more, as of one that was armed since.
+
+        A command that it obeyed after it drove last lets it forget a stop.
+        """
+        link = robot.link
+        if link.status_flags & TELEMETRY.STATUS_LINK_LOST:
             return LINK_LOST
-        if flags & TELEMETRY.STATUS_LATCHED:
+        if link.status_flags & TELEMETRY.STATUS_LATCHED:
             return BY_COMMAND
+        mode, *by = self._drove.get(robot.robot_id, (None,))
+        if by != [link.session, link.counter]:
+            return None
+        return SCRIPT_OVER if mode == TELEMETRY.MODE_SCRIPT else BY_BUTTON
+
+    def _waits(self, robot: Robot) -> State:
+        """Who has not driven yet waits for the start from here."""
+        return AWAITS if robot.robot_id in self._drove else WAITS
+
+    def _of_told_since(self, robot: Robot, others: list[Heard]) -> State:
+        """Who stands, and has obeyed another operator since it drove, or has not driven yet."""
         if robot.robot_id not in self._drove:
             return WAITS
-        was_script = self._drove[robot.robot_id] == TELEMETRY.MODE_SCRIPT
-        return SCRIPT_OVER if was_script else BY_BUTTON
+        if not others:
+            return BY_UNHEARD
+        return State(f"another operator said {others[0].words}", stands=True, is_meant=True)
 
     def _taken(self, robot: Robot) -> Heard | None:
         """The start of another operator that it obeyed last."""
@@ -212,8 +259,12 @@ class Held:
                 self._told[robot.robot_id] = state
 
     def ends(self) -> dict[str, State]:
-        """After a stop: `states`, but for those that the stop reached when they stood already."""
-        return {f"R{robot.robot_id:02d}": self._end(robot) for robot in self.robots}
+        """After a stop: `states`, but for those that the stop reached when they stood already.
+
+        Not of a number that two robots have: nobody knows which of them was so.
+        """
+        known = [robot for robot in self.robots if not robot.is_double]
+        return {f"R{robot.robot_id:02d}": self._end(robot) for robot in known}
 
     def _end(self, robot: Robot) -> State:
         told = self._told[robot.robot_id]
@@ -225,5 +276,5 @@ class Held:
 
     @property
     def is_over(self) -> bool:
-        """All stand."""
-        return all(state.stands for state in self._told.values())
+        """All stand, as was told and as they sign now."""
+        return all(self._told[r.robot_id].stands and self._state(r).stands for r in self.robots)

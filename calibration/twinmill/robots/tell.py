@@ -22,11 +22,23 @@ from twinmill.foreign_text import plain_line
 from twinmill.robots.countdown import (
     NONE_BEGUN,
     NOT_BEGUN,
+    NOT_HEARD_SINCE,
     Dropouts,
     find_dropouts,
     stopped_by_another,
 )
-from twinmill.robots.fleet import ALL, ASK, DRIVING, GONE_S, LINK_TIMEOUT_MS, Fleet, Robot
+from twinmill.robots.fleet import (
+    ALL,
+    ASK,
+    DRIVING,
+    GONE_S,
+    LINK_TIMEOUT_MS,
+    MODES,
+    NO_MORE,
+    TELEMETRY,
+    Fleet,
+    Robot,
+)
 
 REPEAT_S = 0.03
 FIND_S = 1.0  # robots that speak 30 times a second are found, though half of it is lost
@@ -53,10 +65,9 @@ OLD_ANSWER = "no answer, and what is heard of it is old news"
 # It signs, and by its key: the packet with the signature was lost, or is late.
 UNSEALED = "answered, and its signed answer has not come"
 NO_KEY = "cannot be checked without the operator's key"
-NO_SIGNATURE = (
-    "is not heard to sign with this operator's key, for lost packets or another key: "
-    "`twinmill robot flash` brings robots theirs"
-)
+_FLASH = "for lost packets or another key: `twinmill robot flash` brings robots theirs"
+NO_SIGNATURE = f"is not heard to sign with this operator's key, {_FLASH}"
+SIGNS_NO_MORE = f"is {NO_MORE}, {_FLASH}"
 
 
 @dataclass(frozen=True)
@@ -76,8 +87,13 @@ class Answer:
             operator, as it has signed since; 0: for ever.
         lost_link: it has signed that it stood because it had lost its operator.
         clock_ahead_s: how far its clock is ahead of this computer's; None if nothing new was heard.
-        is_old_news: nothing that is heard of it is of now; it has no mode then, and drives or not.
+        is_old_news: nothing that is heard of it is of now, or of after the instant of a start that
+            is past; it has no mode then, and drives or not.
+        signs_no_more: the same, as it signs nothing with this key any more; what is heard is new.
         signs_standing: it signs so just now, be it that it has not confirmed a stop.
+        stood_ago_s: how long ago, at most, it signed that it `stands`; None where it does not. Over
+            a slow network that is old, and its answer to a stop of now all the same: then neither
+            mode nor alarms are called old news.
     """
 
     robot_id: int
@@ -93,7 +109,9 @@ class Answer:
     lost_link: bool = False
     clock_ahead_s: float | None = None
     is_old_news: bool = False
+    signs_no_more: bool = False
     signs_standing: bool = False
+    stood_ago_s: float | None = None
 
     @property
     def is_driving(self) -> bool:
@@ -102,8 +120,13 @@ class Answer:
 
     @property
     def is_silent(self) -> bool:
-        """Nobody knows what it does: it was not heard, or not just now, or by old news alone."""
-        return self.last_heard_s is None or self.last_heard_s > GONE_S or self.is_old_news
+        """Nobody knows what it does: it was not heard, or not just now, or tells nothing of now."""
+        return self.last_heard_s is None or self.last_heard_s > GONE_S or self.tells_nothing
+
+    @property
+    def tells_nothing(self) -> bool:
+        """It is heard by words alone that are old, or not signed any more."""
+        return self.is_old_news or self.signs_no_more
 
     @property
     def untethered(self) -> bool | None:
@@ -175,13 +198,18 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
     return fleet.here()
 
 
-def ask_clocks(fleet: Fleet, robots: set[int]) -> None:
+def ask_clocks(fleet: Fleet, robots: set[int], within_s: float = ASK_S) -> None:
     """Asks robots of which all comes late, or was signed long ago, for an answer.
 
     By that a network that is late is told from a clock that is behind, and a robot that is there
     from a recording of it. Without the operator's key no answer is believed, and none asked for.
+
+    Args:
+        fleet: where they are.
+        robots: the robots.
+        within_s: no answer is awaited for longer.
     """
-    end_s = time.monotonic() + ASK_S
+    end_s = time.monotonic() + within_s
     while _unasked(fleet, robots) and time.monotonic() < end_s:
         ask_once(fleet, robots)
         fleet.listen(REPEAT_S, lambda: not _unasked(fleet, robots))
@@ -208,15 +236,15 @@ def _unasked(fleet: Fleet, robots: set[int]) -> set[int]:
 
 
 def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
-    """Those of some robots that drive already, or that an operator holds who counts to their start.
+    """Those of some robots that drive already, or wait for a start, or that an operator holds.
 
     Be it by a word that nobody can check: a robot of another key signs nothing. Who holds them is
     heard by then. To be asked before this program holds any.
     """
     known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
     fleet.listen(OTHERS_S, lambda: all(robot.hears_operator for robot in known))
-    fleet.listen(FIND_S, lambda: all(r.is_held is not False for r in known if r.drives))
-    return [robot for robot in known if robot.drives_by_any_word or robot.hears_operator]
+    fleet.listen(FIND_S, lambda: all(r.is_held is not False for r in known))
+    return [r for r in known if r.drives_by_any_word or r.awaits_start or r.hears_operator]
 
 
 def hear_doubles(fleet: Fleet, robots: set[int]) -> list[Robot]:
@@ -295,6 +323,7 @@ def stop(
     *,
     hosts: "Hosts | None" = None,
     waiting: Callable[[set[int]], None] = lambda _: None,
+    driving: Callable[[set[int]], None] = lambda _: None,
     enough: Callable[[], object] = lambda: False,
 ) -> list[Answer]:
     """Says stop until all robots have signed that they stand.
@@ -311,6 +340,8 @@ def stop(
         hosts: machines to be told besides; each has to be heard.
         waiting: told once, soon after stop was first said, which of the robots that were asked or
             heard have not signed; it must not block.
+        driving: told of those that are heard to drive though stop is said, each once, be it that
+            they begin to by themselves; as `waiting`.
         enough: what else ends it, once it was said.
 
     Returns:
@@ -318,7 +349,8 @@ def stop(
     """
     with fleet.unwatched():
         hosts = hosts or Hosts(())
-        return _stop(fleet, robots, timeout_s, hosts, waiting=waiting, enough=enough)
+        told = {"waiting": waiting, "driving": driving}
+        return _stop(fleet, robots, timeout_s, hosts, **told, enough=enough)
 
 
 def say_stop(fleet: Fleet, robots: set[int]) -> None:
@@ -336,9 +368,10 @@ def _stop(
     hosts: "Hosts",
     *,
     waiting: Callable[[set[int]], None],
+    driving: Callable[[set[int]], None],
     enough: Callable[[], object],
 ) -> list[Answer]:
-    command = make_command(VERBS.VERB_STOP)
+    command, moving = make_command(VERBS.VERB_STOP), Moving(fleet)
     fleet.held -= robots or set(fleet.held)
     fleet.reach_anew()
     begin_s, was_told = time.monotonic(), False
@@ -347,7 +380,7 @@ def _stop(
         return {
             i
             for i in robots or set(fleet.robots)
-            if not ((robot := fleet.robots.get(i)) and _says_that_it_stands(robot, command.seq))
+            if not ((robot := fleet.robots.get(i)) and _has_done(fleet, robot, command.seq))
         }
 
     def stopped() -> bool:
@@ -359,6 +392,8 @@ def _stop(
         if passed_s > TELL_S and not (was_told or stopped()):
             was_told = True
             waiting(open_robots())
+        if new := moving.new(open_robots()):
+            driving(new)
         for command.robot_id in sorted(robots or {ALL}):
             with suppress(OSError):
                 fleet.send(command)
@@ -368,12 +403,41 @@ def _stop(
             break
     told = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
     fleet.listen(OTHERS_S, lambda: all(_says_since(robot, command.seq) for robot in told))
+    # Nobody knows which copy a robot answered: one that was switched on since is not late by that.
+    ask_clocks(fleet, {robot.robot_id for robot in told}, OTHERS_S)
     return answers(fleet, command, robots or set(fleet.robots))
 
 
-def _says_that_it_stands(robot: Robot, seq: int) -> bool:
-    """Enough to go on to the next; a robot without our key can do no better than say so."""
-    return robot.confirms(seq) or (not robot.link and seq in robot.acks and robot.stands)
+class Moving:
+    """Robots that drive on while stop is said: what stops at once was on its way.
+
+    Args:
+        fleet: where they are.
+    """
+
+    def __init__(self, fleet: Fleet):
+        self._fleet = fleet
+        self._since_s: dict[int, float] = {}
+        self._told: set[int] = set()
+
+    def new(self, robots: set[int]) -> set[int]:
+        """Those of some robots that have been heard to drive for TELL_S, and were not given yet."""
+        now_s = time.monotonic()
+        known = [r for i in robots if (r := self._fleet.robots.get(i))]
+        driving = {r.robot_id for r in known if r.is_here and r.drives_by_any_word}
+        self._since_s = {i: self._since_s.get(i, now_s) for i in driving}
+        new = {i for i, since_s in self._since_s.items() if now_s - since_s > TELL_S} - self._told
+        self._told |= new
+        return new
+
+
+def _has_done(fleet: Fleet, robot: Robot, seq: int) -> bool:
+    """Nothing more is to be had of it.
+
+    It has signed that it stands; or says so, where no signature can be checked. One of which no
+    signature has come may have another key, or its packets are lost: it is asked to the end.
+    """
+    return robot.confirms(seq) or (not fleet.has_key and seq in robot.acks and robot.stands)
 
 
 def reached_s(fleet: Fleet, passed_s: float) -> float:
@@ -480,6 +544,11 @@ class Start:
     untold: frozenset[int] = frozenset()
 
     @property
+    def left_alone(self) -> set[int]:
+        """Robots of another operator, which a start that was called off did not stop."""
+        return {*self.untold, *self.dropouts.taken} if self.called_off else set()
+
+    @property
     def begun_utime_us(self) -> int | None:
         """The instant; None where no robot was to start at it in the end."""
         told = [a for a in self.answers if a.robot_id not in self.untold]
@@ -550,7 +619,7 @@ def start(
     out, others, stopped, late = dropouts(), Dropouts(), [], []
     if agreed and not out:
         patience_s = LATE_S if partial and not link_timeout_ms else BEGUN_S
-        waiting = _not_begun(fleet, given, patience_s)
+        waiting = _not_begun(fleet, command, given, patience_s)
         waiting |= set() if link_timeout_ms else _unanswering(fleet, command, robots)
         # Those that drive may do so by another's start: their own word tells.
         others = all_dropouts(only_stopped=False).theirs
@@ -560,7 +629,7 @@ def start(
             out = others
         elif waiting and not partial:
             why = NOT_BEGUN if len(waiting) < len(given) else NONE_BEGUN
-            words = {i: _not_driving(fleet.robots[i], why) for i in waiting}
+            words = {i: _not_driving(fleet.robots[i], command, why) for i in waiting}
             out = dropouts().beside(words)
         elif waiting and not link_timeout_ms:
             late = stopping(fleet, waiting)
@@ -576,8 +645,13 @@ def start(
         if (robot := fleet.robots.get(i)) and command.seq in robot.signed_acks
     }
     if not called_off:
-        fleet.listen(OTHERS_S, lambda: _all_say_how_long(fleet, command, robots))
-    final = answers(fleet, command, robots)
+        fleet.listen(
+            OTHERS_S,
+            lambda: (
+                _all_say_how_long(fleet, command, robots) and _all_say_since(fleet, command, robots)
+            ),
+        )
+    final = [_as_it_stands(a, [*stopped, *late]) for a in answers(fleet, command, robots)]
     if called_off:
         final = [
             _at_call_off(a, now, fleet.robots.get(a.robot_id), command.seq)
@@ -586,6 +660,14 @@ def start(
     begun = (command.start_utime_us, final, sessions, called_off, stopped, late, out or others)
     untold = frozenset(robots - fleet.addressed)
     return Start(*begun, link_timeout_ms, fleet.stop_heard(robots), untold)
+
+
+def _as_it_stands(answer: Answer, stopped: list[Answer]) -> Answer:
+    """Answer to a start of a robot that may have signed since that it stands, as it was told to."""
+    still = next((a for a in stopped if a.robot_id == answer.robot_id and a.stands), None)
+    now = ("mode", "stands", "stood_ago_s", "signs_standing", "alarms")
+    now += ("is_old_news", "signs_no_more")
+    return replace(answer, **{name: getattr(still, name) for name in now}) if still else answer
 
 
 def _at_call_off(then: Answer, now: Answer, robot: Robot | None, seq: int) -> Answer:
@@ -621,12 +703,16 @@ def have_confirmed(fleet: Fleet, robots: set[int]) -> bool:
     )
 
 
-def _not_begun(fleet: Fleet, given: list[Answer], patience_s: float) -> set[int]:
-    """Waits until those that have accepted drive. Returns those that do not, or are in a fault."""
+def _not_begun(fleet: Fleet, command, given: list[Answer], patience_s: float) -> set[int]:
+    """Waits until those that have accepted drive. Returns those not heard to, or in a fault."""
     accepted = [fleet.robots[a.robot_id] for a in given if a.accepted]
 
     def waiting() -> set[int]:
-        return {r.robot_id for r in accepted if r.mode in STANDING or r.is_old_news}
+        return {
+            r.robot_id
+            for r in accepted
+            if r.mode in STANDING or r.is_old_news or not r.says_since(command.start_utime_us)
+        }
 
     fleet.listen(patience_s, lambda: not waiting())
     return waiting()
@@ -640,41 +726,59 @@ def _unanswering(fleet: Fleet, command, robots: set[int]) -> set[int]:
     }
 
 
-def _not_driving(robot: Robot, why: str) -> str:
+def _not_driving(robot: Robot, command, why: str) -> str:
+    if not robot.says_since(command.start_utime_us):
+        return NOT_HEARD_SINCE
     alarms = "; ".join(robot.alarms)
     return f"{why} ({alarms})" if alarms else why
 
 
 def answers(fleet: Fleet, command, robots: set[int]) -> list[Answer]:
     """Replies of some robots to a command."""
+    return [_answer(fleet, fleet.robots.get(i) or Robot(i), command) for i in sorted(robots)]
+
+
+def _answer(fleet: Fleet, robot: Robot, command) -> Answer:
     unsigned = NO_SIGNATURE if fleet.has_key else NO_KEY
-    return [_answer(fleet.robots.get(i) or Robot(i), command, unsigned) for i in sorted(robots)]
-
-
-def _answer(robot: Robot, command, unsigned: str) -> Answer:
     signed = robot.signed_acks.get(command.seq)
     if signed and (signed.command_utime_us, signed.verb) != (command.utime_us, command.verb):
         signed = None
     ack = signed or robot.acks.get(command.seq)
     reason = ack.reason if ack else _why_silent(robot, unsigned)
     if ack and not signed:
-        reason = reason or (UNSEALED if robot.link or robot.signed_acks else unsigned)
+        is_known = robot.link or robot.signed_acks
+        unsealed = SIGNS_NO_MORE if robot.signs_no_more else UNSEALED
+        reason = reason or (unsealed if is_known else unsigned)
+    stood_ago_s = _stood_ago_s(fleet, robot, command, signed)
+    stands = stood_ago_s is not None
+    is_before = _changes(command, signed) and not robot.says_since(command.start_utime_us)
+    is_unknown = (robot.is_old_news or is_before) and not stands
+    signs_no_more = is_unknown and robot.signs_no_more
+    mode = MODES[TELEMETRY.MODE_STOPPED] if stands else robot.mode
     return Answer(
         robot_id=robot.robot_id,
         accepted=bool(ack.accepted) if ack else None,
         signed=signed is not None,
         reason=reason,
-        mode=robot.mode,
-        stands=_stands(robot, command),
+        mode="" if is_unknown else mode,
+        stands=stands,
         is_double=robot.is_double,
-        alarms=robot.alarms,
+        alarms=robot.last_alarms if stands else robot.alarms,
         last_heard_s=time.monotonic() - robot.heard_s if robot.heard_s else None,
         link_timeout_s=_link_timeout_s(robot, signed) if command.verb in STARTS else None,
         lost_link=robot.lost_link,
         clock_ahead_s=robot.clock_s if robot.recent and not robot.is_old_news else None,
-        is_old_news=robot.is_old_news,
-        signs_standing=robot.signs_that_it_stands,
+        is_old_news=is_unknown and not signs_no_more,
+        signs_no_more=signs_no_more,
+        signs_standing=robot.signs_that_it_stands and (stands or not is_before),
+        stood_ago_s=stood_ago_s,
     )
+
+
+def _all_say_since(fleet: Fleet, command, robots: set[int]) -> bool:
+    """Those that are there tell how they are since the instant of a start."""
+    known = [fleet.robots[i] for i in robots & fleet.here()]
+    return all(robot.says_since(command.start_utime_us) for robot in known)
 
 
 def _all_say_how_long(fleet: Fleet, command, robots: set[int]) -> bool:
@@ -691,11 +795,28 @@ def _link_timeout_s(robot: Robot, ack) -> float | None:
     return link.link_timeout_ms / 1e3 if link.session_us > ack.session_us else None
 
 
-def _stands(robot: Robot, command) -> bool:
-    """It confirmed this stop; or, of another command, it signs so now."""
-    if command.verb == VERBS.VERB_STOP:
-        return robot.confirms(command.seq) and not robot.is_double
-    return robot.signs_that_it_stands
+def _changes(command, signed) -> bool:
+    """The instant of a start is past by this computer's clock: the robot may have begun since.
+
+    Args:
+        command: the start; another changes nothing later.
+        signed: the robot's signed answer, if any; whoever has refused is then as it was before.
+    """
+    is_due = command.verb in STARTS and time.time_ns() >= 1000 * command.start_utime_us
+    return is_due and not (signed and not signed.accepted)
+
+
+def _stood_ago_s(fleet: Fleet, robot: Robot, command, signed) -> float | None:
+    """How long ago, at most, it confirmed this stop; or signed that it stands, of another command.
+
+    None where it did not.
+    """
+    if command.verb != VERBS.VERB_STOP:
+        is_now = not _changes(command, signed) or robot.signs_since(command.start_utime_us)
+        return robot.signed_ago_s if robot.signs_that_it_stands and is_now else None
+    if robot.is_double:
+        return None
+    return robot.confirmed_ago_s(command.seq, fleet.said.get(command.seq, -math.inf))
 
 
 def _why_silent(robot: Robot, unsigned: str) -> str:
@@ -703,6 +824,8 @@ def _why_silent(robot: Robot, unsigned: str) -> str:
         return NEVER_HEARD
     if not (robot.link or robot.signed_acks):
         return unsigned
+    if robot.signs_no_more:
+        return SIGNS_NO_MORE
     return OLD_ANSWER if robot.is_old_news else "no answer"
 
 
