@@ -22,9 +22,9 @@ from threadpoolctl import threadpool_limits
 
 from twinmill.data.measurement import load_measurements
 from twinmill.defaults import ALARM_RATE
+from twinmill.estimation.opened import Opened
 from twinmill.experiment.drives import drive
 from twinmill.files import plain
-from twinmill.fitting.opening import Opened
 from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import Alarm, alarm
 from twinmill.runs.changes import kinds_of

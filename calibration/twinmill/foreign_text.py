@@ -36,3 +36,16 @@ def plain_line(text: str, most: int = LINE_MAX) -> str:
     line = printable(" ".join(text[: 4 * most].split()))
     is_cut = len(line) > most or len(text) > 4 * most
     return f"{line[: most - 1]}{ELLIPSIS}" if is_cut else line
+
+
+def first_line(text: object) -> str:
+    """A name as an error quotes it: of several lines, which are a file's text, the first and cut.
+
+    Args:
+        text: a path, or what was given for one.
+
+    Returns:
+        A text of one line as it is.
+    """
+    first, *others = str(text).strip().splitlines() or [""]
+    return f"{plain_line(first)} {ELLIPSIS}" if others else str(text)

@@ -219,6 +219,18 @@ def test_frames_and_files_of_two_wheels_tell_one_thing(tmp_path, names):
     np.testing.assert_allclose(again.commands().query("t_s == t_s.round(1)").iloc[:2, 4:8], both)
 
 
+@pytest.mark.parametrize("kind", [None, "twist"])
+def test_frames_arrays_and_files_without_a_sideways_speed_tell_one_thing(tmp_path, kind):
+    told = pd.DataFrame(COMMANDS_FRAME).drop(columns="vy_mps")
+    log = tm.Log.from_frames(POSES_FRAME, told, kind=kind, name="arrays")
+    assert log.to_pandas().equals(circle().to_pandas())
+    told.to_csv(tmp_path / "commands.csv", index=False)
+    pd.DataFrame(POSES_FRAME).to_csv(tmp_path / "poses.csv", index=False)
+    again = tm.import_log(tmp_path / "poses.csv", tmp_path / "commands.csv", robot_id=0)
+    velocities = ["vx_mps", "vy_mps", "omega_radps"]
+    np.testing.assert_array_equal(again.commands()[velocities], log.commands()[velocities])
+
+
 def test_other_numbers_of_wheels_are_refused_or_told(tmp_path):
     t_s, pose, told_t_s, told = two_wheels()
     for kind in ("duty", "wheel_speed"):

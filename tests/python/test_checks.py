@@ -13,7 +13,7 @@ from twinmill.data.checks.lateness import lateness_of
 from twinmill.data.log import LogError, RobotLog
 from twinmill.data.measurement import load_measurements
 from twinmill.data.track import make_track
-from twinmill_cli.diagnose import robots_recorded
+from twinmill_cli.swarm_as_whole import robots_recorded
 
 LEVER_M, TOP_MPS, LAG_S, RADIUS_M = 0.126, 0.36, 0.07, 0.0325
 MECANUM = np.array([[1, 1, 1, 1], [-1, 1, 1, -1], [-1, 1, -1, 1]]) / 4  # Muir and Neuman 1987

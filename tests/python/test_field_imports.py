@@ -8,6 +8,7 @@ import pickle
 import shutil
 import subprocess
 import sys
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
@@ -108,6 +109,57 @@ def test_stamps_of_date_and_time_in_digits_are_read(case, imported):
     assert len(robot.pose_t_s) == 2000
     np.testing.assert_allclose(robot.pose_t_s, np.arange(2000) * 0.02, atol=1e-6)
     assert log.t0_utime_us == 1_767_607_230_000_000  # 2026-01-05 10:00:30 UTC, by date -u
+
+
+@pytest.fixture
+def dated(case, tmp_path):
+    """Words of an import of tables stamped in a form of `strftime`, and their begin since 1970."""
+
+    def make(form, begin):
+        files = []
+        for name in ("poses", "commands"):
+            head, *rows = (case("underscore_stamps") / f"{name}.csv").read_text().split()
+            at_s = 0.02 if name == "poses" else 0.05
+            stamps = [begin + timedelta(seconds=k * at_s) for k in range(len(rows))]
+            cells = [row.split(",", 1)[1] for row in rows]
+            lines = [f"{s.strftime(form)},{c}" for s, c in zip(stamps, cells, strict=True)]
+            files.append(tmp_path / f"{name}.csv")
+            files[-1].write_text("\n".join([head, *lines]))
+        words = ("--poses", files[0], "--commands", files[1], "--robot-id", 1)
+        return words, round(begin.timestamp() * 1e6)
+
+    return make
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["%d/%m/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f", "%m/%d/%Y %I:%M:%S.%f %p", "%Y/%m/%d %T.%f"],
+)
+def test_dates_with_slashes_are_read_where_a_day_above_12_tells_the_order(dated, imported, form):
+    """Over midnight, as the standard library writes them."""
+    words, begin_us = dated(form, datetime(2026, 3, 25, 23, 59, 50, tzinfo=UTC))
+    log, _ = imported(*words)
+    np.testing.assert_allclose(log.robots[1].pose_t_s, np.arange(2000) * 0.02, atol=1e-6)
+    assert log.t0_utime_us == begin_us
+
+
+def test_dates_that_tell_no_order_are_asked_about(dated, twinmill, tmp_path):
+    words, _ = dated("%d/%m/%Y %H:%M:%S.%f", datetime(2026, 3, 5, 12, 15, tzinfo=UTC))
+    code, _, wrong = twinmill("import", *words, "-o", tmp_path / "o.lcmlog")
+    assert code == 1 and "the day or the month comes first" in wrong and "dayfirst" in wrong
+
+
+def test_a_steering_angle_by_another_name_is_asked_for(case, imported, twinmill, tmp_path):
+    folder = case("steering_csv")
+    table = tmp_path / "c.csv"
+    text = (folder / "commands.csv").read_text()
+    table.write_text(text.replace("speed_mps,steering_rad", "v,delta"))
+    words = ["--poses", folder / "poses.csv", "--commands", table, "--wheelbase-m", "0.3"]
+    code, _, wrong = twinmill("import", *words, "-o", tmp_path / "o.lcmlog")
+    assert code == 1 and "--rename COLUMN=steering_rad" in wrong
+    log, _ = imported(*words, "--rename", "v=speed_mps", "--rename", "delta=steering_rad")
+    _, _, speed, steering = rows_of(table).T
+    np.testing.assert_allclose(log.robots[1].command[:, 2], speed * np.tan(steering) / 0.3)
 
 
 def test_header_cells_of_motive_in_small_letters_are_read(case, imported):

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import twinmill_native as native
 
+import twinmill as tm
 from twinmill_cli.main import BELOW, COMMANDS, LazyCommand, run
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -129,6 +130,33 @@ def test_a_robot_on_ros_comes_to_the_answer_on_its_axes(folder, monkeypatch, cap
     for line in lines:
         result = run(shlex.split(line)[1:])
     assert result == 0 and "Each does what it should" in capsys.readouterr().out
+
+
+def test_diagnose_says_of_the_guessed_lag_what_the_model_file_says_of_it():
+    """By algebra the robot follows what is told with a lag of 0.25 s; the guess is 0.05 s."""
+    plan(*told("ros", "csv", "twist", "differential", "one"))
+    (comment,) = re.findall(r"^motor_lag_s = .*# (.*)$", Path("plan/mine.toml").read_text(), re.M)
+    assert "while it is wrong, diagnose calls the base's numbers stale" in comment
+    step_s, held = 0.01, 100
+    rng = np.random.default_rng(2)
+    legs = rng.choice([-0.2, 0.1, 0.3], 40), rng.choice([-1.0, 0.0, 1.0], 40)
+    legs_t_s, t_s = np.arange(40) * held * step_s, np.arange(40 * held) * step_s
+    felt = np.zeros((len(t_s), 2))
+    for k, to in enumerate(np.repeat(np.column_stack(legs), held, axis=0)[:-1]):
+        felt[k + 1] = to + (felt[k] - to) * np.exp(-step_s / 0.25)
+    v_mps, turn_rad = ((felt[1:] + felt[:-1]) / 2 * [1, step_s]).T
+    theta = np.append(0, np.cumsum(turn_rad))
+    steps = v_mps * step_s * np.exp(1j * (theta[:-1] + turn_rad / 2))
+    place = np.append(0, np.cumsum(steps))
+    pose = np.column_stack([place.real, place.imag, theta]) + rng.normal(0, 1e-3, (len(t_s), 3))
+    log = tm.Log.from_arrays(
+        *(t_s, pose, legs_t_s, np.column_stack(legs)), kind="twist", same_clock=True
+    )
+    said = tm.diagnose(log, "plan/mine.toml").sentence
+    assert said.startswith("Nothing is missing") and "the base's numbers are stale" in said
+    found = tm.fit(log, "plan/mine.toml").model
+    assert found["base.motor_lag_s"] == pytest.approx(0.25, abs=0.01)
+    assert "a guess until a fit finds it" in found.file.text  # true of what the fit found, too
 
 
 def test_what_is_not_said_is_asked(monkeypatch):

@@ -9,10 +9,19 @@ import re
 import numpy as np
 import pytest
 
+import twinmill as tm
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import read_log
 
 STEP_S, HELD_S, DURATION_S = 0.02, 1.2, 60.0
+TWIST = """
+name = "t"
+[base]
+drive = "twist"
+wheels = "none"
+control_period_s = 0.02
+speed_per_input_mps = 0.0036
+"""
 TURNED = 0.4  # the heading at the beginning
 
 
@@ -68,6 +77,29 @@ def test_units_of_speeds_are_told_at_import(tmp_path, speed, place, words):
     commands = np.column_stack([t_s, speed * told[:, 0], 0 * t_s, told[:, 1]])
     poses = np.column_stack([t_s, place * pose[:, :2], pose[:, 2]])
     assert words in _said(tmp_path, POSES, poses, BODY, commands)
+
+
+@pytest.mark.parametrize(("unit", "in_a_second"), [("ms", 1e3), ("us", 1e6)])
+def test_stamps_in_another_unit_are_told_and_not_judged(tmp_path, unit, in_a_second):
+    """A second has so many of each (SI); way and turns are then as much too slow."""
+    t_s, told, pose = _drive()
+    (tmp_path / "twist.toml").write_text(TWIST)
+    stamps = in_a_second * t_s
+    log = tm.Log.from_arrays(stamps, pose, stamps, told, kind="twist", same_clock=True)
+    with pytest.raises(tm.LogError, match=rf"stamps are in {unit}, not in s: .*t_{unit}"):
+        tm.compare(log, tmp_path / "twist.toml")
+    right = tm.Log.from_arrays(t_s, pose, t_s, told, kind="twist", same_clock=True)
+    assert tm.compare(right, tmp_path / "twist.toml").score < 2
+
+
+def test_stamps_in_milliseconds_of_quick_poses_are_told_at_import(tmp_path):
+    """A thousand poses a second, which are a second apart where ms count as s."""
+    t_s, told, pose = _drive()
+    quick_s = np.arange(0, t_s[-1], 0.001)
+    quick = np.column_stack([np.interp(quick_s, t_s, column) for column in pose.T])
+    commands = np.column_stack([1e3 * t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    said = _said(tmp_path, POSES, np.column_stack([1e3 * quick_s, quick]), BODY, commands)
+    assert "the stamps are in ms, not in s" in said and "rename={'t_s': 't_ms'}" in said
 
 
 def test_turns_in_degrees_are_told_at_import(tmp_path):

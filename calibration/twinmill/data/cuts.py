@@ -16,7 +16,6 @@ USUAL_MPS, USUAL_RADPS = 1.5, 12.0  # below which no step is a jump: four times 
 JUMP_NOISE_M, JUMP_NOISE_RAD = 0.005, 0.05  # ten times the noise of a motion capture
 JUMP_SIGMA = 8  # times the noise of a camera that is worse than that
 JUMP_FACTOR = 3  # times as fast as just before or after: no wheels do that between two frames
-UNDONE = 2  # times the noise of a turn, by which a turn back may miss
 BESIDE = 3  # steps that tell how fast the robot is just before, or just after
 FAST_S = 0.5  # over which speeds are told where stamps jitter
 MARGIN_S = 0.1  # frames beside a pick-up show the hand or half a marker body
@@ -68,21 +67,25 @@ class Limits:
         usual: m/s, rad/s.
         fastest: m/s, rad/s that it has nowhere in its log.
         noise: m, rad.
+        own_radps: faster than it turns by far, however slow it is.
+        period_s: time from pose to pose.
     """
 
     usual: tuple[float, float]
     fastest: tuple[float, float]
     noise: tuple[float, float]
+    own_radps: float
+    period_s: float
 
     @classmethod
     def of(cls, robot: RobotLog, usable: np.ndarray, *usual: float) -> "Limits":
         """With the noise that second differences of the poses show: motion is smooth beside it.
 
-        Stamps that jitter are noise as well: the way in the time that they are off. Half turns of
-        the heading are none, be they many: a tag whose front flickers makes them.
+        Stamps that jitter are noise as well: the way in the time that they are off. Quarter turns
+        of the heading are none, be they many: a square tag whose front flickers makes them.
         """
         pose = robot.pose[usable]
-        pose[:, 2] = np.unwrap(pose[:, 2], period=np.pi)
+        pose[:, 2] = np.unwrap(pose[:, 2], period=np.pi / 2)
         fast = _fast(robot.pose_t_s[usable], pose)
         late = JUMP_SIGMA * _jitter_s(robot.pose_t_s[usable]) * fast
         bend = np.abs(np.diff(np.nan_to_num(pose), n=2, axis=0))
@@ -95,19 +98,41 @@ class Limits:
                 max(JUMP_NOISE_M, JUMP_SIGMA * float(sigma[:2].max()), float(late[0])),
                 max(JUMP_NOISE_RAD, JUMP_SIGMA * float(sigma[2]), float(late[1])),
             ),
+            JUMP_FACTOR * float(fast[1]),
+            float(np.median(np.diff(robot.pose_t_s))),
         )
 
-    def far(self, dt_s: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """(K,) bool: a robot does not go so far, or turn so, in such times; step (K, 3)."""
+    def far(
+        self, dt_s: np.ndarray, step: np.ndarray, left_out_s: np.ndarray | float = 0.0
+    ) -> np.ndarray:
+        """(K,) bool: a robot does not go so far, or turn so, in such times; step (K, 3).
+
+        Poses that are left out may be part of the times: their tracker had not lost the robot.
+        """
         moved_m, turn_rad = np.hypot(*step[:, :2].T), np.abs(np.nan_to_num(_short_way(step[:, 2])))
-        return (moved_m > self.fastest[0] * dt_s + self.noise[0]) | (
-            turn_rad > self.fastest[1] * dt_s + self.noise[1]
-        )
+        most_rad = self._most_rad(np.float64(self.fastest[1]), dt_s, left_out_s)
+        return (moved_m > self.fastest[0] * dt_s + self.noise[0]) | (turn_rad > most_rad)
 
-    def possible(self, channel: int, speed: np.ndarray, dt_s: np.ndarray) -> np.ndarray:
-        """(K,) longest step of one channel, by the speeds before and after it."""
-        fastest = np.maximum(self.usual[channel], JUMP_FACTOR * _beside(speed))
-        return fastest * dt_s + self.noise[channel]
+    def possible(self, speed: np.ndarray, dt_s: np.ndarray) -> np.ndarray:
+        """(K,) m, longest step by the speeds before and after it."""
+        return np.maximum(self.usual[0], JUMP_FACTOR * _beside(speed)) * dt_s + self.noise[0]
+
+    def possible_rad(
+        self, speed: np.ndarray, dt_s: np.ndarray, left_out_s: np.ndarray
+    ) -> np.ndarray:
+        """(K,) rad, widest turn likewise, at most pi."""
+        fastest = np.maximum(self.usual[1], JUMP_FACTOR * _beside(speed))
+        return np.minimum(self._most_rad(fastest, dt_s, left_out_s), np.pi)
+
+    def _most_rad(
+        self, fastest_radps: np.ndarray, dt_s: np.ndarray, left_out_s: np.ndarray | float
+    ) -> np.ndarray:
+        """(K,) rad: as fast as that, and over poses that are left out as this robot turns.
+
+        A usual rate is none that a robot keeps: over some poses it would be a turn to anywhere.
+        """
+        own_radps = np.minimum(self.own_radps, fastest_radps)
+        return fastest_radps * (dt_s - left_out_s) + own_radps * left_out_s + self.noise[1]
 
 
 def _jitter_s(t_s: np.ndarray) -> float:
@@ -118,13 +143,20 @@ def _jitter_s(t_s: np.ndarray) -> float:
 
 
 def _fast(t_s: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """m/s and rad/s that a robot seldom exceeds, over FAST_S: jitter hardly shows in these."""
+    """m/s and rad/s that a robot seldom exceeds, over FAST_S: jitter hardly shows in these.
+
+    Of turns the middle one of each while: headings that flicker, by whatever angle, are none.
+    """
     after = np.searchsorted(t_s, t_s + FAST_S)
     first = np.flatnonzero(after < len(t_s))
     if not len(first):
         return np.zeros(2)
-    rate = np.nan_to_num(pose[after[first]] - pose[first]) / FAST_S
-    return np.quantile([np.hypot(rate[:, 0], rate[:, 1]), np.abs(rate[:, 2])], 0.95, axis=1)
+    rate = np.nan_to_num(pose[after[first], :2] - pose[first, :2]) / FAST_S
+    turns = np.nan_to_num(np.diff(pose[:, 2]) / np.diff(t_s))
+    count = int(np.median(after[first] - first))
+    whiles = turns[: len(turns) // count * count].reshape(-1, count)
+    turn = np.abs(np.median(whiles, axis=1))
+    return np.array([np.quantile(np.hypot(*rate.T), 0.95), np.quantile(turn, 0.95)])
 
 
 def _beside(speed: np.ndarray) -> np.ndarray:
@@ -139,9 +171,15 @@ def _jumps(robot: RobotLog, index: np.ndarray, limits: Limits) -> tuple[np.ndarr
     dt_s = np.diff(robot.pose_t_s[index])
     step = np.diff(robot.pose[index, :2], axis=0)
     moved_m, turn_rad = np.hypot(*step.T), np.abs(_turns_rad(robot, index))
-    return moved_m > limits.possible(0, moved_m / dt_s, dt_s), turn_rad > np.minimum(
-        limits.possible(1, turn_rad / dt_s, dt_s), np.pi
-    )
+    left_out_s = np.where(_lost(robot, index), 0, np.maximum(dt_s - limits.period_s, 0))
+    most_rad = limits.possible_rad(turn_rad / dt_s, dt_s, left_out_s)
+    return moved_m > limits.possible(moved_m / dt_s, dt_s), turn_rad > most_rad
+
+
+def _lost(robot: RobotLog, index: np.ndarray) -> np.ndarray:
+    """(len(index) - 1,) bool: between these poses there are none, or none that are valid."""
+    seen = np.diff(np.cumsum(robot.valid)[index]) == np.diff(index)
+    return ~seen | (np.diff(index) == 1)
 
 
 def _turns_rad(robot: RobotLog, index: np.ndarray) -> np.ndarray:
@@ -186,7 +224,9 @@ def _links(robot: RobotLog, index: np.ndarray, limits: Limits, gap_s: float) -> 
     t_s, pose, links = robot.pose_t_s[index], robot.pose[index], []
     for reach in range(1, len(index)):
         dt_s = t_s[reach:] - t_s[:-reach]
-        far, within = limits.far(dt_s, pose[reach:] - pose[:-reach]), dt_s <= gap_s
+        left_out_s = np.maximum(dt_s - limits.period_s, 0) if links else 0.0
+        far = limits.far(dt_s, pose[reach:] - pose[:-reach], left_out_s)
+        within = dt_s <= gap_s
         if links:
             jumps = ~links[0]
             links.append(within & ~far & jumps[: 1 - reach] & jumps[reach - 1 :])
@@ -238,22 +278,56 @@ def _turned_by_tracker(
     turned = np.zeros(len(usable), bool)
     index = np.flatnonzero(usable)
     turns_rad, t = _turns_rad(robot, index), robot.pose_t_s[index]
-    jumps = np.flatnonzero(_jumps(robot, index, limits)[1])
-    position = 0
-    while position + 1 < len(jumps):
-        first, last = jumps[position], jumps[position + 1]
-        undone = abs(_short_way(turns_rad[first] + turns_rad[last])) < UNDONE * limits.noise[1]
-        if not undone or t[last] - t[first] > np.ptp(t) / 2:
-            position += 1
-            continue
+    meanwhile_s = np.where(_lost(robot, index), limits.period_s, np.diff(t))
+    own_rad = limits.own_radps * meanwhile_s + limits.noise[1]
+    jumps = np.flatnonzero(_jumps(robot, index, limits)[1]).tolist()
+    for first, last, k, how in _whiles_turned(t, turns_rad, own_rad, jumps):
         turned[index[first + 1 : last + 1]] = True
         notes.append(
             f"from {t[first + 1]:.3f} to {t[last]:.3f} s the tracker has the robot turned by "
-            f"{np.degrees(abs(turns_rad[first])):.0f} degrees, from one pose to the next and back; "
+            f"{np.degrees(abs(turns_rad[k])):.0f} degrees, from one pose to the next {how}; "
             "left out."
         )
-        position += 2
     return turned
+
+
+def _whiles_turned(
+    t_s: np.ndarray, turns_rad: np.ndarray, own_rad: np.ndarray, jumps: list[int]
+) -> list[tuple[int, int, int, str]]:
+    """Whiles from a turn to the one that undoes it, and those at the ends of the same turn.
+
+    Args:
+        t_s: (K,) of the poses.
+        turns_rad: (K - 1,) from each pose to the next.
+        own_rad: (K - 1,) of them, that the robot may make by itself.
+        jumps: steps that no robot makes.
+
+    Returns:
+        Step before the first pose and behind the last, a step of the turn, and words on its end.
+    """
+
+    def apart(a_rad: float, b_rad: float, steps: list[int]) -> bool:
+        return abs(_short_way(a_rad - b_rad)) > own_rad[steps].sum()
+
+    def lasts(first: int, last: int) -> bool:
+        return t_s[last] - t_s[first + 1] > np.ptp(t_s) / 2
+
+    found, k = [], 0
+    while k + 1 < len(jumps):
+        first, last = pair = jumps[k : k + 2]
+        undone = not (lasts(*pair) or apart(turns_rad[first], -turns_rad[last], pair))
+        if undone:
+            found.append((first, last, first, "and back"))
+        k += 2 if undone else 1
+    sizes, paired = np.abs(turns_rad), {step for row in found for step in row[:2]}
+    ends = [(-1, j, j, "as later") for j in jumps[:1]]
+    ends += [(j, len(turns_rad), j, "as before") for j in jumps[-1:]]
+    return found + [
+        (*end, j, how)
+        for *end, j, how in ends
+        if not (j in paired or lasts(*end))
+        and any(not apart(sizes[j], sizes[i], [i, j]) for _, _, i, _ in found)
+    ]
 
 
 def _cuts(

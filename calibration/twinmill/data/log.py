@@ -26,7 +26,7 @@ from twinmill.data.lcm_log import (
 )
 from twinmill.data.other_files import LCM_LOG, LOOKED_AT, other_file
 from twinmill.data.world_bodies import CHANNEL, WorldBody, world_bodies
-from twinmill.foreign_text import NAME_MAX, plain_line
+from twinmill.foreign_text import NAME_MAX, first_line, plain_line
 
 __all__ = ["Log", "LogError", "RobotLog", "read_log"]
 
@@ -218,7 +218,9 @@ def read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise LogError(f"{path}: cannot be read ({error.strerror}); check the name.") from error
+        raise LogError(
+            f"{first_line(path)}: cannot be read ({error.strerror}); check the name."
+        ) from error
 
 
 def _robot_channels(

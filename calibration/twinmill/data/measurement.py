@@ -17,6 +17,7 @@ from twinmill.data.checks import (
     check_driven,
     check_poses,
     check_recorded,
+    check_stamps,
     of_all_robots,
     own_option,
 )
@@ -67,6 +68,11 @@ class Measurement:
     def label(self) -> str:
         """Short name of log and robot."""
         return f"{self.log_name} R{self.track.robot_id:02d}"
+
+    @property
+    def robot_id(self) -> int:
+        """Number of the robot in the log."""
+        return self.track.robot_id
 
     def __repr__(self) -> str:
         return f"Measurement({self.label})"
@@ -292,6 +298,7 @@ def clean_measurements(
         for robot in robots.values():
             own = own_option(robot.robot_id, count)
             wrong = check_commanded(robot, name) or check_poses(robot, name, own)
+            wrong = wrong or check_stamps(robot, model, name, own)
             of_log += wrong
             if any(f.fatal for f in wrong):
                 continue

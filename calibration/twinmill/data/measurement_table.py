@@ -31,6 +31,11 @@ THOUSANDS = re.compile(r"\s*[+-]?\d{1,3},\d{3}\s*")
 OF_EXCEL = re.compile(r"\s*sep=.\s*", re.IGNORECASE)  # a first line that tells Excel the delimiter
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d")
 DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[T ]+(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?")
+SLASHED = re.compile(  # day and month in the order that the rows tell
+    r"(\d{1,2})/(\d{1,2})/(\d{4})[T, ]+(\d{1,2}):(\d\d:\d\d)(?:[.,](\d+))?\s*(?:([AP])M)?",
+    re.IGNORECASE,
+)
+MONTHS = 12  # a larger number is the day
 # As programs write them into names of files: all parts in digits, which alone would be a number.
 DIGITS = re.compile(
     r"(20\d\d)[_./-]?([01]\d)[_./-]?([0-3]\d)[_T -]?([0-2]\d)[_:.-]?([0-5]\d)[_:.-]?([0-5]\d)"
@@ -250,21 +255,26 @@ class Table:
     def is_dated(self, column: str) -> bool:
         """True if a column holds dates with times, or times of day."""
         first = self.rows[0][self._place(column)].strip()
-        kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
+        kinds = (DATE, DAY_FIRST, SLASHED, TIME_OF_DAY)
         return any(kind.match(first) for kind in kinds) or bool(DIGITS.fullmatch(first))
 
     def seconds(self, column: str) -> np.ndarray:
         """(rows,) s of a column of numbers, dates or times of day.
 
-        Dates are ISO 8601, in digits alone (20260105_100030_020), or day, month and year with
-        points between; UTC if they name no zone. Times of day go on over midnight.
+        Dates are ISO 8601, in digits alone (20260105_100030_020), day, month and year with points
+        between, or these with slashes, where a day above 12 tells the order; UTC if they name no
+        zone. Times of day go on over midnight.
+
+        Raises:
+            LogError: no day tells the order.
+            CellError: a cell is no time.
         """
         if not self.is_dated(column):
             return self.finite(column)
         import pandas as pd  # slow to import
 
         cells = self._with_days(self.cells(column))
-        cells = _of_digits([_day_last(cell) for cell in cells])
+        cells = _of_digits(self._of_slashed([_day_last(cell) for cell in cells], column))
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
             spans = stamps - pd.Timestamp(0, tz="UTC")
@@ -287,6 +297,20 @@ class Table:
         if day is None or not TIME_OF_DAY.match(cells[0]):
             return cells
         return [f"{date} {time}" for date, time in zip(self.cells(day), cells, strict=True)]
+
+    def _of_slashed(self, cells: list[str], column: str) -> list[str]:
+        """Dates with slashes as ISO 8601 has them, if the first cell is one; else as they are."""
+        found = [SLASHED.fullmatch(cell.strip()) for cell in cells]
+        if not found[0]:
+            return cells
+        day = next((n for m in found if m for n in (1, 2) if int(m[n]) > MONTHS), None)
+        if day is None:
+            raise LogError(
+                f"{self.name}: {column} is '{cells[0].strip()}', and no row tells whether the day "
+                "or the month comes first; write the year first, 2026-01-31 10:00:30, as with "
+                "pandas: pd.to_datetime(COLUMN, dayfirst=True)."
+            )
+        return [_iso(m, day) if m else cell for m, cell in zip(found, cells, strict=True)]
 
     def refuse(self, bad: np.ndarray, column: str, values: np.ndarray, why: str) -> None:
         """Raises LogError on the first row that is bad, with its value and why."""
@@ -337,6 +361,15 @@ def _day_last(cell: str) -> str:
         return cell
     day, month, year, clock, part = found.groups()
     return f"{year}-{int(month):02}-{int(day):02}T{clock.zfill(8)}.{part or 0}"
+
+
+def _iso(found: re.Match[str], day: int) -> str:
+    """A date of SLASHED as ISO 8601 has it; the day is that group of it."""
+    hour = int(found[4])
+    if half := found[7]:
+        hour = hour % 12 + 12 * (half in "Pp")
+    date = f"{found[3]}-{int(found[3 - day]):02}-{int(found[day]):02}"
+    return f"{date}T{hour:02}:{found[5]}.{found[6] or 0}"
 
 
 def _of_digits(cells: list[str]) -> list[str]:
@@ -494,7 +527,7 @@ def _between_values(line: str) -> str:
 
 
 def _is_value(cell: str) -> bool:
-    kinds = (DATE, DAY_FIRST, TIME_OF_DAY)
+    kinds = (DATE, DAY_FIRST, SLASHED, TIME_OF_DAY)
     times = (DECIMAL_COMMA.fullmatch, DIGITS.fullmatch, *(kind.match for kind in kinds))
     return is_number(cell) or any(matches(cell) for matches in times)
 

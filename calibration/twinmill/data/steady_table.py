@@ -30,6 +30,17 @@ LIMITS = {"robot_id": (0, 99), "speed_input": (-100, 100), "turn_input": (-2, 2)
 READ_AS_ZERO = (0.05, 0.05)  # m/s, rad/s
 READING = (0.005, 0.02)  # m/s, rad/s: of a single run by stopwatch; repeated ones tell their own
 STILL_MPS = 0.03  # rim speed below which a wheel is said to stand still
+# What a measurement must have for an effect to show, and why a table does not have it.
+LACKS = {
+    "changes": "acts only while the speed changes, and a steady table has no starts and stops",
+    "clocks": "a steady table has no clocks",
+    "poses": "a steady table has no poses",
+    "heading": "a steady table has no poses",
+    "room": "a steady table does not say where and in which direction of the room the robot drove",
+    "battery": "a steady table does not say how full the battery was",
+    "history": "a steady table does not say how long the robot had been driving",
+    "wheel_angle": "a steady table gives means over many turns of the wheels",
+}
 POOLED = 3.0  # cells that the spread of all cells counts for in the spread of one
 
 

@@ -84,11 +84,7 @@ def from_bus(
         bus = open_bus(url)
         bus.subscribe(CHANNELS, hear)
     except RuntimeError as error:
-        raise ValueError(
-            f"{option('lcm_url', url)}: cannot be joined; is there a network with a route for "
-            "multicast "
-            "(ip route add 224.0.0.0/4 dev DEVICE)?"
-        ) from error
+        raise ValueError(f"{option('lcm_url', url)}: cannot be joined: {error}") from error
     end_s = time.monotonic() + duration_s
     while (left_s := end_s - time.monotonic()) > 0:
         batch_end_s = time.monotonic() + min(BATCH_S, left_s)

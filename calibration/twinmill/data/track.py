@@ -34,14 +34,11 @@ class Timing:
     Attributes:
         pose_period_s, command_period_s: medians.
         pose_lost_share: part of the frames that segments span but that are missing or unusable.
-        command_held_share: part of the commands that equal the one before. Near 1 is an operator;
-            half or more in measured wheel speeds is a log that repeats rows of a slower loop.
     """
 
     pose_period_s: float
     command_period_s: float
     pose_lost_share: float
-    command_held_share: float
 
 
 @dataclass(frozen=True)
@@ -318,7 +315,7 @@ def _filled(t_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _timing(robot: RobotLog, segment: np.ndarray) -> Timing:
     pose_period_s = float(np.median(np.diff(robot.pose_t_s)))
-    steps = np.diff(robot.command, axis=0)
+    steps_s = np.diff(robot.command_t_s)
     spans_s = sum(
         np.ptp(robot.pose_t_s[segment == number]) + pose_period_s
         for number in range(segment.max() + 1)
@@ -326,9 +323,8 @@ def _timing(robot: RobotLog, segment: np.ndarray) -> Timing:
     lost = 1 - np.count_nonzero(segment >= 0) * pose_period_s / spans_s if spans_s else np.nan
     return Timing(
         pose_period_s=pose_period_s,
-        command_period_s=float(np.median(np.diff(robot.command_t_s))) if len(steps) else np.nan,
+        command_period_s=float(np.median(steps_s)) if len(steps_s) else np.nan,
         pose_lost_share=max(0.0, float(lost)),
-        command_held_share=float((steps == 0).all(axis=1).mean()) if len(steps) else np.nan,
     )
 
 

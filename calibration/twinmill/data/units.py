@@ -3,6 +3,7 @@
 
 import math
 import re
+from datetime import UTC, datetime
 
 OURS = ("m", "rad", "s", "mps", "radps", "pct")
 UNITS = {  # unit in a name: that of ours, and the factor
@@ -11,6 +12,7 @@ UNITS = {  # unit in a name: that of ours, and the factor
     "cm": ("m", 1e-2),
     "km": ("m", 1e3),
     "ft": ("m", 0.3048),  # international, by definition, as the mile of 5280
+    "inch": ("m", 0.0254),  # a twelfth of it
     "px": ("m", math.nan),  # no table says how wide a pixel is
     "deg": ("rad", math.pi / 180),
     "mmps": ("mps", 1e-3),
@@ -32,10 +34,12 @@ SYMBOLS = {  # as people write them in brackets, beside those above
     **dict.fromkeys(("\u00b0", "degrees", "degree", "grad"), "deg"),
     **dict.fromkeys(("radians", "radian"), "rad"),
     **dict.fromkeys(("meters", "metres"), "m"),
+    **dict.fromkeys(("in", "inches"), "inch"),
     **dict.fromkeys(("\u00b0/s", "deg/s"), "degps"),
     **{"%": "pct", "m/s": "mps", "cm/s": "cmps", "mm/s": "mmps", "km/h": "kmh", "rad/s": "radps"},
 }
 LATEST_S = 1e11  # in the year 5138; a later stamp has another unit
+LONGEST_STEP_S = 2.0  # between rows of a log: those further apart count in another unit
 SINCE_1970 = {"ms": 1e14, "us": 1e17}  # stamps of our days are smaller
 BRACKETED = re.compile(r"(.*?)[\s_]*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 
@@ -60,3 +64,15 @@ def unit_of_stamps(largest: float) -> str:
     if largest <= LATEST_S:
         return "s"
     return next((unit for unit, top in SINCE_1970.items() if largest < top), "ns")
+
+
+def unit_of_steps(step: float) -> str:
+    """Unit of stamps by the time from row to row; empty where it fits none."""
+    units = (unit for unit in ("s", "ms", "us", "ns") if step * UNITS[unit][1] < LONGEST_STEP_S)
+    return next(units, "")
+
+
+def date_of(utime_us: int) -> datetime | None:
+    """Date of a stamp in us since 1970; None where the clock counted from another moment."""
+    date = datetime.fromtimestamp(utime_us / 1e6, UTC)
+    return date if date.year > 2000 else None

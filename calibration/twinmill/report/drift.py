@@ -15,6 +15,7 @@ from twinmill.report.canvas import FLOOR, MEASURED, PREDICTED, draw, each_of
 from twinmill.report.html import Figure, Section
 from twinmill.report.tables import Cell, Table, Tone, number
 from twinmill.runs.drift import FEWEST_BEFORE, Drift, Series
+from twinmill.runs.history import Calibration
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,12 +49,16 @@ def _told(s: Series, result: Drift) -> str:
         band = f"{number(s.low[-1])} to {number(s.high[-1])}{unit}"
         share = f", {100 * (s.values[-1] / before - 1):+.1f} %" if before else ""
         return f"{said} left its band: {now}{share} from its mean before; the band is {band}."
-    ends = [f"{result.calibrations[s.days[k]].date:%Y-%m-%d}" for k in (0, -1)]
+    (first, last) = (_when(result.calibrations[s.days[k]], s.days[k]) for k in (0, -1))
     way = "rises" if s.values[-1] > s.values[0] else "falls"
     return (
-        f"{said} {way} steadily: {number(s.values[0])}{unit} on {ends[0]}, {now} on {ends[1]} "
+        f"{said} {way} steadily: {number(s.values[0])}{unit} {first}, {now} {last} "
         f"(chance in a random order {number(s.trend_p, 2)})."
     )
+
+
+def _when(one: Calibration, place: int) -> str:
+    return f"on {one.date:%Y-%m-%d}" if one.date else f"in calibration {place + 1}"
 
 
 def terminal(result: Drift) -> RenderableType:
@@ -81,9 +86,10 @@ def numbers(result: Drift) -> Table:
                 Cell(_state(s), tone or ("dim" if s.natural else "")),
             ]
         )
-    first, last = (f"{result.calibrations[k].date:%Y-%m-%d}" for k in (0, -1))
+    dates = [c.date for c in result.calibrations]
+    span = f"{dates[0]:%Y-%m-%d} to {dates[-1]:%Y-%m-%d}" if all(dates) else "as appended"
     return Table(
-        f"{len(result.calibrations)} calibrations, {first} to {last}",
+        f"{len(result.calibrations)} calibrations, {span}",
         ["number", "course", "last", "95 %", "band", "", ""],
         rows,
         words=(0, 1, 5, 6),
@@ -114,7 +120,10 @@ def section(result: Drift) -> Section:
         facts=[
             ("false alarms", f"{100 * result.rate:g} % of calibrations, all numbers together"),
             *(
-                (f"{c.date:%Y-%m-%d %H:%M}", f"{_logs(c.logs)}: {c.model}")
+                (
+                    f"{c.date:%Y-%m-%d %H:%M}" if c.date else "date unknown",
+                    f"{_logs(c.logs)}: {c.model}",
+                )
                 for c in result.calibrations
             ),
         ],
@@ -131,13 +140,18 @@ def _logs(logs: Sequence[tuple[str, str]]) -> str:
 def courses(result: Drift) -> Figure:
     """Each number with its intervals over the days, and its band."""
     from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+    from matplotlib.ticker import MaxNLocator
 
-    dates = np.array([c.date.replace(tzinfo=None) for c in result.calibrations])
+    dates = [c.date for c in result.calibrations]
+    dated = all(dates)
+    places = np.array(
+        [date.replace(tzinfo=None) if date and dated else k for k, date in enumerate(dates, 1)]
+    )
 
     def paint(panels: Axes | np.ndarray) -> None:
         every = each_of(panels)
         for axes, s in zip(every, result.series, strict=True):
-            at = dates[s.days]
+            at = places[s.days]
             axes.fill_between(at, s.low, s.high, color=FLOOR, alpha=0.18, lw=0)
             reach = 1.96 * s.stds
             axes.errorbar(at, s.values, reach, fmt="o", ms=3.5, lw=1, color=MEASURED)
@@ -146,6 +160,10 @@ def courses(result: Drift) -> Figure:
             _limits(axes, s, reach)
             unit = "" if s.last.unit == "1" else f" ({s.last.unit})"
             axes.set_title(f"{s.last.name}{unit}", loc="left")
+        if not dated:
+            every[-1].set_xlabel("calibration, as appended")
+            every[-1].xaxis.set_major_locator(MaxNLocator(6, integer=True))
+            return
         locator = AutoDateLocator(maxticks=6)
         every[-1].xaxis.set_major_locator(locator)
         every[-1].xaxis.set_major_formatter(ConciseDateFormatter(locator))

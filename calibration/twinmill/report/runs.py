@@ -17,7 +17,7 @@ from rich.text import Text
 from twinmill.arguments import option
 from twinmill.charts.arrays import measured_speed
 from twinmill.data.track import Track
-from twinmill.fitting.opening import Opened
+from twinmill.estimation.opened import Opened
 from twinmill.predict.regimes import HORIZON
 from twinmill.predict.windows import HORIZONS_S
 from twinmill.report import show

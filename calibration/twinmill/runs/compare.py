@@ -13,7 +13,8 @@ from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.defaults import ALARM_RATE
-from twinmill.fitting.opening import Opened, open_measurements
+from twinmill.estimation.opened import Opened
+from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.runs.alarm import Alarm, alarm
 from twinmill.runs.changes import MOSTLY, SHARE_95, Change, Judged, kinds_of
@@ -52,6 +53,7 @@ class RunComparison:
     Attributes:
         first, second: the runs.
         whole: all differences of the second run from the first, the marker's included.
+        settled: likewise, of the second run since what changed within it.
         tested_keys: of the differences that may be an alarm.
         alarm: of these, with the healthy runs.
         changes: what changed, the surest first; empty if nothing did.
@@ -61,6 +63,7 @@ class RunComparison:
     first: Opened
     second: Opened
     whole: Difference
+    settled: Difference
     tested_keys: tuple[str, ...]
     alarm: Alarm
     changes: tuple[Named, ...]
@@ -74,7 +77,7 @@ class RunComparison:
     @property
     def remounted(self) -> bool:
         """True if the marker sits elsewhere, at the rate of false alarms that alarms have."""
-        marker = self.whole.only([k for k in self.whole.keys if k.startswith("marker.")])
+        marker = self.settled.only([k for k in self.whole.keys if k.startswith("marker.")])
         size = len(marker.values)
         square = marker.values @ np.linalg.pinv(marker.covariance) @ marker.values
         return f_above(square / size, size, self.alarm.tested.free) <= self.alarm.rate
@@ -86,7 +89,7 @@ class RunComparison:
 
     def size_of(self, key: str) -> tuple[float, float]:
         """A difference and half of its 95 % interval."""
-        own = self.whole.only([key])
+        own = self.settled.only([key])
         reach = t_quantile(SHARE_95, self.alarm.tested.free) * np.sqrt(own.covariance[0, 0])
         return float(own.values[0]), float(reach)
 
@@ -208,11 +211,12 @@ def compared(
     for change, rest in found.found:
         beside = [c for c, _ in found.found if c is not change]
         named.append(Named(change, rest, onset(change, beside, own, rate)))
-    since_s = max((n.onset.at_s for n in named), default=0.0)
+    settled, since_s = whole, max((n.onset.at_s for n in named), default=0.0)
     if since_s:
-        after = judge(difference(first, _since(second, since_s))).tested
+        settled = difference(first, _since(second, since_s))
+        after = judge(settled).tested
         named = [replace(n, change=_sized_anew(n, named, after)) for n in named]
-    return RunComparison(first, second, whole, tuple(keys), found, tuple(named))
+    return RunComparison(first, second, whole, settled, tuple(keys), found, tuple(named))
 
 
 def both_ways(pair: Difference) -> tuple[Difference, Difference]:

@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 import twinmill_native as native
 
+from twinmill.estimation.opened import Opened
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.fitting.fit import base_names, effects_free
-from twinmill.fitting.opening import Opened
-from twinmill.fitting.score_fit import ScoreFit
 from twinmill.model.parameters import (
     BASE_GAINS,
     CLOCK,
@@ -30,7 +30,7 @@ from twinmill.predict.datasets import Trajectory
 from twinmill.runs.white_step import white_step
 
 MOUNTING = ("marker_offset", "heading_bias")  # effects of how the marker sits on the robot
-BATTERY = "battery_sag"
+BATTERY, WHEELS = "battery_sag", "wheel_gain"
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,9 @@ def follows_charge(model: native.Model) -> bool:
 
 
 def _with_changes(model: native.Model, charged: bool) -> tuple[native.Model, dict[str, str]]:
-    """The model with how markers sit, and a fresh instance of each effect that may have changed.
+    """The model with how wheels are and markers sit, and a fresh instance of each that may change.
+
+    What it does not know of the robot, as that a wheel has always been weak, is of both runs.
 
     Args:
         model: of the robot.
@@ -158,11 +160,11 @@ def _with_changes(model: native.Model, charged: bool) -> tuple[native.Model, dic
         The model, and names of the fresh instances by effect.
     """
     model, fresh = model.copy(), {}
-    kept = [*MOUNTING, *([BATTERY] if charged and follows_charge(model) else [])]
-    for effect in kept:
+    own = (*([WHEELS] if model.wheel_kind != "none" else []), *MOUNTING)
+    for effect in (*own, *([BATTERY] if charged and follows_charge(model) else [])):
         if effect not in effect_names(model):
             _add_neutral(model, effect)
-    for effect in (*(["wheel_gain"] if model.wheel_kind != "none" else []), *MOUNTING):
+    for effect in own:
         fresh[effect] = _add_neutral(model, effect)
     return model, fresh
 
@@ -178,11 +180,11 @@ def _add_neutral(model: native.Model, effect: str) -> str:
 
 def _quantities(model: native.Model, fresh: dict[str, str], first: Opened) -> tuple[Quantity, ...]:
     gains = [n for n in base_names(model, [first]) if n in BASE_GAINS]
-    if "wheel_gain" in fresh:  # the mean of the wheels is the forward gain
+    if WHEELS in fresh:  # the mean of the wheels is the forward gain
         gains = [n for n in gains if n != BASE_GAINS[0]]
         wheels = [w["name"] for w in model.wheels()]
-        acting = {p.name for p in effect_parameters(model, fresh["wheel_gain"])}
-        named = [(w, f"{fresh['wheel_gain']}.{w}") for w in wheels]
+        acting = {p.name for p in effect_parameters(model, fresh[WHEELS])}
+        named = [(w, f"{fresh[WHEELS]}.{w}") for w in wheels]
         found = [Quantity(f"wheel.{w}", "1", n, False) for w, n in named if n in acting]
     else:
         found = []

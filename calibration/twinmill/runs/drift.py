@@ -95,7 +95,7 @@ class Drift:
         }
 
     def _series(self, s: Series) -> dict[str, Any]:
-        dates = [f"{self.calibrations[k].date:%Y-%m-%dT%H:%M:%SZ}" for k in s.days]
+        dates = [self.calibrations[k].date_json for k in s.days]
         rows = zip(dates, s.values, s.stds, s.low, s.high, s.outside, strict=True)
         keys = ("date", "value", "std", "low", "high", "outside")
         return {

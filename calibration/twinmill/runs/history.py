@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 from twinmill.arguments import option
 from twinmill.data.measurement import Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
+from twinmill.data.units import date_of
 from twinmill.files import plain
 from twinmill.fitting.fit import FitResult
 
@@ -59,14 +60,19 @@ class Calibration:
     numbers: tuple[Number, ...]
 
     @property
-    def date(self) -> datetime:
-        """When it was recorded."""
-        return datetime.fromtimestamp(self.recorded_utime_us / 1e6, UTC)
+    def date(self) -> datetime | None:
+        """When it was recorded; None where its logs do not say."""
+        return date_of(self.recorded_utime_us)
+
+    @property
+    def date_json(self) -> str | None:
+        """Date in the form of the interface, null where there is none."""
+        return f"{self.date:%Y-%m-%dT%H:%M:%SZ}" if self.date else None
 
     def to_json(self) -> dict[str, Any]:
         """The line's object."""
         return {
-            "date": f"{self.date:%Y-%m-%dT%H:%M:%SZ}",
+            "date": self.date_json,
             **vars(self),
             "logs": [{"path": path, "sha256": digest} for path, digest in self.logs],
             "numbers": [vars(n) for n in self.numbers],
@@ -95,15 +101,22 @@ class Calibration:
 
 
 def read_history(path: Path) -> list[Calibration]:
-    """All calibrations by date; of one log that was fitted again, the last one.
+    """All calibrations by date, or as they were appended where any has none.
+
+    Of one log that was fitted again it is the last one.
 
     Raises:
         ValueError: it cannot be read, or a line of it is damaged.
     """
     try:
         lines = Path(path).read_text().split("\n")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read as a history: {error}.") from error
+    except OSError as error:
+        raise ValueError(
+            f"{path}: cannot be read ({error.strerror}); give the file that `twinmill fit` with "
+            f"{option('history')} writes."
+        ) from error
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is no history, which is text: {error}.") from error
     found: dict[tuple[str, ...], Calibration] = {}
     for number, line in enumerate(lines, 1):
         if not line.strip():
@@ -116,7 +129,9 @@ def read_history(path: Path) -> list[Calibration]:
                 f"({option('history')}); delete that line and fit its log again."
             ) from error
         found[tuple(digest for _, digest in one.logs)] = one
-    return sorted(found.values(), key=lambda c: c.recorded_utime_us)
+    if all(one.date for one in found.values()):
+        return sorted(found.values(), key=lambda c: c.recorded_utime_us)
+    return list(found.values())
 
 
 def check_history(

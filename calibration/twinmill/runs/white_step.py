@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.inference.noise import Course, Usual, first_noise, fit_noise, weights_of
 from twinmill.inference.steps import Steps, StepsOfLog, motion_of
 from twinmill.predict.datasets import Trajectory

@@ -29,7 +29,7 @@ WORDS = {
     "ellipsoidal": "an uneven ring",
     "cluster": "one colliding group",
     "separated": "groups out of sight of each other",
-    "jammed": "a ring that touches or stands",
+    "jammed": "a ring that touches, or does not turn as one",
     "undefined": "too few robots",
 }
 # Aims beyond a class: nobody can reach another's view for all of the last 10 s.

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from same_robot import MOMENT_S, WEAKER
+from same_robot import MOMENT_S, WEAKER, mounting
 
 from twinmill.chance import t_quantile
 from twinmill.data.measurement import load_measurements
@@ -129,6 +129,16 @@ def test_a_weak_wheel_is_named_with_its_size(opened):
     assert low < -WEAKER < high and high < 0
 
 
+def test_a_wheel_that_has_always_been_weak_did_not_change_though_the_model_lacks_it(opened):
+    assert not compared(opened["weak"], opened["always"], (), 0.05).changed
+
+
+def test_a_wheel_that_was_weak_in_the_first_run_alone_is_stronger_in_the_second(opened):
+    change = compared(opened["weak"], opened["whole"], (), 0.05).changes[0].change
+    low, high = change.interval
+    assert change.kind.key == "wheel.fl" and 0 < low < WEAKER / (1 - WEAKER) < high
+
+
 def test_white_steps_tell_by_how_much_a_wheel_is_weaker_to_a_tenth_of_it(opened):
     white = difference(opened["first"], opened["weak"]).precise().only(["wheel.fl"])
     bound = float(np.sqrt(white.by_curvature[0, 0]))
@@ -140,6 +150,14 @@ def test_the_moment_is_found_from_which_on_a_wheel_is_weak(opened):
     at = next(n.onset for n in found.changes if n.change.kind.key == "wheel.fl")
     # Predictions of up to 2 s that begin before the moment see it, too.
     assert not at.from_start and at.low_s - 2.5 < MOMENT_S < at.high_s + 2.5
+
+
+def test_a_marker_is_where_it_was_mounted_though_a_wheel_grew_weak_meanwhile(opened):
+    """To 2.5 mm and half a degree of how the mountings were drawn, by the run since then."""
+    found = compared(opened["first"], opened["later"], (), 0.05)
+    differs = np.subtract(mounting("later"), mounting("first"))
+    told = [found.size_of(f"marker.{key}")[0] for key in ("x_m", "y_m", "bias_rad")]
+    assert found.remounted and np.all(np.abs(told - differs) < [2.5e-3, 2.5e-3, np.radians(0.5)])
 
 
 def test_exit_codes_tell_scripts_whether_anything_changed(twinmill, same_robot, tmp_path):
@@ -196,6 +214,19 @@ def test_a_line_that_cannot_be_written_whole_leaves_the_history_as_it_was(tmp_pa
     with pytest.raises(OSError, match="no space"):
         append(path, _calibration(1, 0.9))
     assert path.read_bytes() == before
+
+
+def test_logs_that_have_no_date_are_compared_in_the_order_of_their_fits(twinmill, tmp_path):
+    """Stamps that count from a start of their own tell no order, and no day of 1970."""
+    path = tmp_path / "r.jsonl"
+    for number, value in enumerate((1.001, 0.999, 1.0, 1.002, 0.998, 1.0, 0.9)):
+        append(path, replace(_calibration(number, value, 0.001), recorded_utime_us=-number))
+    code, out, _ = twinmill("drift", path, "--out", tmp_path / "page")
+    page = (tmp_path / "page" / "index.html").read_text()
+    assert code == 3 and "(yaw_gain) left its band: 0.900" in " ".join(out.split())
+    assert "19" not in out.split("calibrations, ")[1].split("\n")[0] and "date unknown" in page
+    told = json.loads(twinmill("drift", path, "--json")[1])
+    assert [point["date"] for point in told["numbers"][0]["points"]] == [None] * 7
 
 
 @pytest.mark.parametrize("damage", ['{"date": "20', "[]", '{"recorded_utime_us": 1}', "\x00\x00"])

@@ -33,6 +33,7 @@ from twinmill.data.checks.series import (
     check_poses,
     check_track,
 )
+from twinmill.data.checks.stamps import check_stamps
 from twinmill.data.track import Track
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "check_driven",
     "check_poses",
     "check_recorded",
+    "check_stamps",
     "check_tracks",
     "of_all_robots",
     "own_option",

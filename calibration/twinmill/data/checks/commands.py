@@ -42,7 +42,12 @@ DRIVEN_BY = {
 Units = tuple[tuple[tuple[float, float], str, dict[str, str]], ...]
 POSES_IN = (
     ((300.0, 3000.0), "the positions are in millimetres", {"x_m": "x_mm", "y_m": "y_mm"}),
-    ((30.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
+    ((63.0, 300.0), "the positions are in centimetres", {"x_m": "x_cm", "y_m": "y_cm"}),
+    (  # up to halfway, by ratio, from 39.4 inches in a metre to 100 cm
+        (30.0, 63.0),
+        "the positions are in inches, or in centimetres and the robot is slower than told",
+        {"x_m": "x_inch", "y_m": "y_inch"},
+    ),
 )
 SMALL_POSES_IN: Units = (  # a unit in a name is taken at its word: the name is to change
     (
@@ -258,7 +263,7 @@ def _in_room(
         "the velocities are along the room's axes, not the body's",
         f"the commands explain {1 - own.left:.0%} of the motion as the body's, and "
         f"{1 - room.left:.0%} as the room's",
-        _anew_with(IN_ROOM),
+        anew_with(IN_ROOM),
     )
 
 
@@ -352,9 +357,9 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     turn = turn if checked.track.has_heading else 0.0
     (window, what, names), *_ = HEADINGS_IN
     if window[0] < turn < window[1]:  # speeds along axes of a wrong heading tell nothing
-        return [checked.finding(what, _pace(turn), _anew_with(names))]
+        return [checked.finding(what, _pace(turn), anew_with(names))]
     found = [
-        checked.finding(what, _pace(ratio), _anew_with(names))
+        checked.finding(what, _pace(ratio), anew_with(names))
         for ratio, units in _ratios(checked.track.command_kind, speed, turn)
         for (low, high), what, names in units
         if low < ratio < high
@@ -392,7 +397,7 @@ def _no_gain(checked: CheckedTrack, speed: float) -> list[InputFinding]:
     ]
 
 
-def _anew_with(names: dict[str, str]) -> Remedy:
+def anew_with(names: dict[str, str]) -> Remedy:
     """Remedy for columns that have other units or meanings than their names say."""
     if not names:
         return "correct it where the log is made, or the unit in the names of its columns"

@@ -7,7 +7,7 @@ never guessed silently: `explain` says what it looks like, a mapping file keeps 
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from twinmill.data.importers.topics import APART, field_of, is_path, is_si
 from twinmill.data.importers.turning import unit_of_heading
 from twinmill.data.log import LogError
 from twinmill.data.measurement_table import LOST, TIMES, Table, is_number
-from twinmill.data.units import UNITS, plain_name, split_unit
+from twinmill.data.units import UNITS, plain_name, split_unit, unit_of_steps
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,8 @@ def by_name(column: str, known: frozenset[str]) -> tuple[tuple[str, ...], float]
 def _time(values: np.ndarray) -> tuple[float, str]:
     steps = np.diff(np.unique(values))  # whatever the order of the rows
     step = float(np.median(steps)) if len(steps) else 0.0
-    for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
-        if step * factor < 2:
-            return factor, f"rows are {step:g} apart, so it looks like {unit}"
+    if unit := unit_of_steps(step):
+        return UNITS[unit][1], f"rows are {step:g} apart, so it looks like {unit}"
     return 1.0, f"rows are {step:g} apart, which fits no unit"
 
 
@@ -287,10 +286,14 @@ def explain(
             guess = replace(guess, targets=(), why=why, sure=True, rival=holder[taken[0]])
         holder |= dict.fromkeys(guess.targets, column)
         guesses.append(guess)
-    told = {"vx_mps", "omega_radps"} <= holder.keys()
-    if told and not {"vy_mps", "steering_rad"} & holder.keys():
+    if is_never_sideways(holder):
         guesses.append(Guess("", ("vy_mps",), 0.0, "no sideways speed: 0", False))
     return guesses
+
+
+def is_never_sideways(names: Collection[str]) -> bool:
+    """True if columns tell velocities of a robot that is not told to drive sideways."""
+    return {"vx_mps", "omega_radps"} <= {*names} and not {"vy_mps", "steering_rad"} & {*names}
 
 
 def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list[Guess]:

@@ -9,7 +9,7 @@ import numpy as np
 import tomlkit
 import turbopi
 
-from twinmill.data.importers.columns import by_name
+from twinmill.data.importers.columns import by_name, is_never_sideways
 from twinmill.data.importers.log_writer import log_parts
 from twinmill.data.importers.plain import OF_COMMANDS, OF_POSES, QUATERNION, STEERED, VALUES
 from twinmill.data.importers.series import (
@@ -246,8 +246,10 @@ def _kinds(frame: Any) -> list[Kind]:
 
 
 def _group_of(kind: Kind, frame: Any) -> tuple[str, ...]:
-    """Columns of a kind; speeds of wheels without those that the robot has not."""
+    """Columns of a kind, but of wheels and a sideways speed only those that the robot has."""
     names = COLUMNS.get(kind, ())
+    if kind == "twist" and is_never_sideways(frame):
+        return tuple(name for name in names if name != "vy_mps")
     return of_its_wheels(names, frame) if kind == "wheel_speed" else names
 
 

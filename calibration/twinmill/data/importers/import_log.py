@@ -17,6 +17,7 @@ from twinmill.data.checks import (
     check_driven,
     check_poses,
     check_recorded,
+    check_stamps,
     of_all_robots,
     own_option,
 )
@@ -338,9 +339,9 @@ def _check_wheelbase(options: ImportOptions, commands: tuple[Path, ...]) -> None
     mapped = read_mapping(options.mapping, "commands", KNOWN) if options.mapping else ()
     if "steering_rad" not in {*mapped, *names_in(commands, KNOWN, options.rename)}:
         raise LogError(
-            f"{option('wheelbase_m')}: no table of commands has a steering angle (steering_rad), "
-            "which it is "
-            "for; leave the option out."
+            f"{option('wheelbase_m')}: no column of the commands is known as a steering angle, "
+            "which it is for; say which holds it "
+            f"({option('rename', {'COLUMN': 'steering_rad'})}), or leave the option out."
         )
 
 
@@ -689,7 +690,8 @@ def _told_of(robots: Sequence[RobotLog]) -> list[str]:
     of_series = []
     for robot in robots:
         own = own_option(robot.robot_id, len(robots))
-        of_series += check_commanded(robot, "") or check_poses(robot, "", own)
+        of_one = check_commanded(robot, "") or check_poses(robot, "", own)
+        of_series += of_one or check_stamps(robot, None, "", own)
     add(of_all_robots(of_series, {"": len(robots)}))
     sound = [r for r in robots if len(r.command_t_s) and not found[r.robot_id]]
     cleaned = {r.robot_id: ("", make_track(r)) for r in sound}
