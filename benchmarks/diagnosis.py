@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A diagnosis against the whole catalogue, and inference and mujoco.sysid on the same log."""
+"""A diagnosis against the whole catalogue, and mujoco.sysid on the same log."""
 
 import resource
 import subprocess
@@ -20,9 +20,9 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.experiment.rich_script import write_rich_script
 from twinmill.fitting.fit import fit
 from twinmill.inference.always import always_of
-from twinmill.inference.infer import infer
 from twinmill.inference.kept import with_kept
 from twinmill.model.model_file import ModelFile
+from twinmill.report.judged import sentence
 
 DUTY_PCT = [0, 12.5, 25, 37.5, 50, 75, 100]
 ROBOT = f"""
@@ -62,14 +62,11 @@ def measure(build: Path) -> Iterator[Ratio]:
         for seed, (hidden, effect) in enumerate(HIDDEN.items(), 2):
             (run,) = _drive(build, folder, hidden, effect, seed=seed)
             runs = _from_rest(run, base)
-            ours_s, found = _timed(lambda run=run: diagnose([run], base))
-            inferred_s, inferred = _timed(lambda run=run: infer([run], known))
+            ours_s, found = _timed(lambda run=run: diagnose([run], known))
             theirs_s, theirs = _timed(lambda runs=runs: _sysid(runs, base))
             says = f"{', '.join(theirs['insights'])} ({1e3 * theirs['rms_m']:.0f} mm)"
             yield single(f"diagnosis, {hidden} : {GOAL_S:g} s", ours_s, GOAL_S, "s",
-                         at_most=1, says=found.sentence)  # fmt: skip
-            yield single(f"inference, {hidden} : diagnosis", inferred_s, ours_s, "s",
-                         says=inferred.answer.verdict)  # fmt: skip
+                         at_most=1, says=sentence(found))  # fmt: skip
             yield single(f"sysid, {hidden} : diagnosis", theirs_s, ours_s, "s", says=says)
             yield single(f"command, {hidden} : {COMMAND_S:g} s", _command_s(folder, hidden),
                          COMMAND_S, "s", at_most=1)  # fmt: skip

@@ -2,7 +2,6 @@
 """Twinmill itself: `twinmill explain`, as any user gets it."""
 
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,11 @@ import twinmill_native as native
 
 from rivals.protocol import DOCUMENTED, Answer, Predict, Problem, Rival
 from twinmill.data.measurement import Measurement
-from twinmill.diagnosis.explain import explain
-from twinmill.model.model_file import ModelFile
+from twinmill.diagnosis.better import better
+from twinmill.diagnosis.diagnose import diagnose
 from twinmill.model.parameters import phases
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms
+from twinmill.report import judged
 
 NAMED = ("effect_missing", "ambiguous")
 PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 2.0))
@@ -21,14 +21,12 @@ PHASES_RAD = np.radians(np.arange(-180.0, 180.0, 2.0))
 
 def answers(problem: Problem) -> dict[str, Answer]:
     """Its diagnosis, and the model that it writes."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "explained.toml"
-        found = explain([problem.measurement], problem.file, out=path, command="")
-        model = ModelFile.load(str(path)).model
-    said: dict[str, Any] = found.to_json()
+    found = diagnose([problem.measurement], problem.file)
+    file = better(found, problem.file, Path("explained.toml"), "").file
+    said: dict[str, Any] = judged.to_json(found)
     told = said["verdict"] in (*NAMED, "outside_catalogue")
-    own = model.for_robot(problem.measurement.track.robot_id)
-    answer = Answer(told, found.diagnosis.before.score, predicted_in_phase(own), said=said)
+    own = file.model.for_robot(problem.measurement.track.robot_id)
+    answer = Answer(told, found.before.score, predicted_in_phase(own), said=said)
     return {DOCUMENTED: answer}
 
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import Explanation as Explanation
     from twinmill.api import Finding as Finding
     from twinmill.api import Fit as Fit
-    from twinmill.api import Improvement as Improvement
-    from twinmill.api import Inference as Inference
     from twinmill.api import Log as Log
     from twinmill.api import Model as Model
     from twinmill.api import compare as compare
@@ -37,14 +35,13 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
     from twinmill.api import explain as explain
     from twinmill.api import fit as fit
     from twinmill.api import import_log as import_log
-    from twinmill.api import infer_robots as infer_robots
     from twinmill.api import load as load
     from twinmill.api import next_run as next_run
     from twinmill.api import simulate as simulate
     from twinmill.data.log import LogError as LogError
     from twinmill.defaults import Certainty as Certainty
     from twinmill.defaults import Verdict as Verdict
-    from twinmill.fitting.settings import FitSettings as FitSettings
+    from twinmill.estimation.settings import FitSettings as FitSettings
     from twinmill.joint_results import Excitation as Excitation
     from twinmill.joint_results import ImportedJoints as ImportedJoints
     from twinmill.joint_results import JointComparison as JointComparison
@@ -70,7 +67,7 @@ if TYPE_CHECKING:  # for editors and type checkers; the same names as below
 _HOME = {
     "Certainty": "twinmill.defaults",
     "Verdict": "twinmill.defaults",
-    "FitSettings": "twinmill.fitting.settings",
+    "FitSettings": "twinmill.estimation.settings",
     "LogError": "twinmill.data.log",
     **dict.fromkeys(
         (
@@ -86,8 +83,8 @@ _HOME = {
     **dict.fromkeys(("Number", "PythonEffect", "python_effect"), "twinmill.model.python_effect"),
     **dict.fromkeys(
         (
-            *("Addition", "Diagnosis", "Explanation", "Finding", "Fit", "Improvement"),
-            *("Inference", "Log", "Model"),
+            *("Addition", "Diagnosis", "Explanation", "Finding", "Fit"),
+            *("Log", "Model"),
             *(
                 "compare",
                 "compare_models",
@@ -99,7 +96,7 @@ _HOME = {
                 "fit",
                 "import_log",
             ),
-            *("infer_robots", "load", "next_run", "simulate"),
+            *("load", "next_run", "simulate"),
         ),
         "twinmill.api",
     ),

@@ -60,9 +60,13 @@ from twinmill.defaults import (
     Verdict,
     least_seeds,
 )
+from twinmill.diagnosis import better as _better
 from twinmill.diagnosis import diagnose as _diagnose
-from twinmill.diagnosis import explain as _explain
-from twinmill.diagnosis import result as _diagnosed
+from twinmill.diagnosis.better_fleet import better_of_fleet
+from twinmill.diagnosis.fleet import Fleet
+from twinmill.diagnosis.infer import Inference
+from twinmill.estimation.equations import EQUATION
+from twinmill.estimation.settings import FIT_SETTINGS, FitSettings
 from twinmill.experiment.design import Limits, design, plan_run
 from twinmill.experiment.design import check as check_limits
 from twinmill.export.carried import open_robot
@@ -74,10 +78,6 @@ from twinmill.fitting import add as _add
 from twinmill.fitting import compare as _compare
 from twinmill.fitting import fit as _fit
 from twinmill.fitting import model_comparison as _models
-from twinmill.fitting.equations import EQUATION
-from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
-from twinmill.inference import better as _better
-from twinmill.inference import infer as _infer
 from twinmill.inference import keeping as _keeping
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
@@ -90,10 +90,10 @@ from twinmill.model.parameters import (
 from twinmill.model.python_effect import PythonEffect
 from twinmill.model.set_values import with_values
 from twinmill.programs import find_program
-from twinmill.report import detections, inference, sections, show
-from twinmill.report import diagnosis as diagnosis_report
+from twinmill.report import detections, judged, sections, show
 from twinmill.report.canvas import draw
 from twinmill.report.log_figures import Drawing
+from twinmill.report.tables import doubt_of
 from twinmill.results import (
     Comparison,
     Effect,
@@ -116,13 +116,13 @@ from twinmill.swarm.metrics import swarm_metrics
 
 Frame = Any  # a data frame of pandas or polars, a dataset of xarray, a dictionary of arrays
 Logs = Union["Log", str, Path, "Sequence[Log | str | Path]"]
-NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 LONGEST_RUN_S = 600.0
 LEAST_TOP_DUTY = 0.2  # below it no robot on a floor moves
 SPREADS = ("idiosyncrasy.theta_a1_std", "idiosyncrasy.theta_a2_std")  # of robots' gains
 NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
+NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
 OF_ROBOTS = ((Real, Mapping), "a number, or a dictionary of numbers by robot")
 PAIRS = "a list of pairs of robots, as [(1, 2)]"
 SWITCH = (bool, "True or False")
@@ -267,10 +267,11 @@ class Log(Shown):
             poses: columns t_s (s, or dates), x_m, y_m, and theta_rad, or qw, qx, qy, qz, where
                 headings were measured; robot_id where there are several robots; rows where `valid`
                 is false, or with NaN, are lost poses.
-            commands: columns t_s and one group: vx_mps, vy_mps, omega_radps; fl_pct, fr_pct,
-                rl_pct, rr_pct; left_pct, right_pct (or left_pwm ...); w1_radps to w4_radps, the
-                first three of omni wheels, left_radps, right_radps (or w1_radps, w2_radps) of two;
-                or vx_mps, steering_rad; robot_id as in poses.
+            commands: columns t_s and one group: vx_mps, omega_radps, and vy_mps where the robot is
+                told to drive sideways; fl_pct, fr_pct, rl_pct, rr_pct; left_pct, right_pct (or
+                left_pwm ...); w1_radps to w4_radps, the first three of omni wheels, left_radps,
+                right_radps (or w1_radps, w2_radps) of two; or vx_mps, steering_rad; robot_id as
+                in poses.
             kind: which group; by default the one that is there.
             same_clock: one clock stamped poses and commands; False: their offset is fitted.
             robot_id: of frames that do not say.
@@ -847,9 +848,10 @@ class Model(Shown):
         """
         checked("robot", robot, (Integral, NoneType), "the number of a robot")
         own = () if robot is None else (_add.OWN_GAINS,)
-        name, priors = effect, None
+        name, priors, bounds = effect, None, None
         if isinstance(effect, PythonEffect):
-            name, texts, priors = effect.name, effect.texts, effect.priors
+            name, texts = effect.name, effect.texts
+            priors, bounds = effect.priors, effect.bounds
             effect = EQUATION
         known("effect", (effect,), {*catalogue(), *own})
         for key, text in texts.items():
@@ -863,6 +865,7 @@ class Model(Shown):
             command=f"twinmill.add {name}",
             texts=texts,
             priors=priors,
+            bounds=bounds,
             robot_id=None if robot is None else int(robot),
         )
         result = replace(result, child=_keeping.with_its_error(result.child, measurements))
@@ -950,7 +953,7 @@ class Model(Shown):
         )
         return [*(left.sentence() for left in done.left), *done.warnings]
 
-    def explain(self, log: "Log | str | Path", **options: Any) -> "Improvement | Explanation":
+    def explain(self, log: "Log | str | Path", **options: Any) -> "Explanation":
         """Diagnoses, and adds the effects that are found.
 
         Args:
@@ -990,7 +993,7 @@ class Model(Shown):
         """
         return next_run(log, self, **options)
 
-    def diagnose(self, log: "Log | str | Path", **options: Any) -> "Inference | Diagnosis":
+    def diagnose(self, log: "Log | str | Path", **options: Any) -> "Diagnosis":
         """Names the physical effect that the model lacks.
 
         Args:
@@ -1138,14 +1141,9 @@ class Fit(Reported):
         rows = pd.DataFrame({"value": self.params, "stderr": self.stderr})
         rows = rows.join(self.conf_int().set_axis(["[0.025", "0.975]"], axis=1))
         rows["unit"] = [p.unit for p in (*self._result.parameters, *self._result.held)]
-        table = self.table()
-        told = np.select(
-            [table["held"], table["prior"] & ~(table["seen"] | table["together"])],
-            ["(held)", "(from the prior)"],
-            "",
-        )
-        if any(told):
-            rows[""] = told
+        doubts = [*map(doubt_of, self._result.parameters), *("held" for _ in self._result.held)]
+        if any(doubts):
+            rows[""] = [f"({doubt})" if doubt else "" for doubt in doubts]
         head = {
             "model": self.model.name,
             "score": f"{self.before.score:.3g} -> {self.score:.3g}",
@@ -1289,8 +1287,8 @@ class Finding(Shown):
         parameters: estimates by name, with all other findings in the model.
         share: of the squared error above the noise floor that is the effect's.
         certainty: sure, group or doubtful.
-        probability: that it is missing; None where several robots or a table were judged.
-        score_heldout: there, of the model with it, on data that was not fitted to; else None.
+        probability: that it is missing; of several robots that all lack it.
+        score_heldout: None.
 
     Examples:
         >>> d.best.parameters["deceleration_mps2"] > 0
@@ -1346,8 +1344,7 @@ class Finding(Shown):
         """Its parameters.
 
         Returns:
-            name, value, std, unit; of several robots and tables also at_bound, seen, together, as
-            of `Fit.table`.
+            name, value, std, unit; the std of a place or a time is None.
 
         Examples:
             >>> d.best.table()["name"].tolist()
@@ -1360,11 +1357,74 @@ class Finding(Shown):
         return f"Finding({self.effect}: {values})"
 
 
-class Judged(Reported):
-    """A diagnosis that can design the run which tells what it leaves open."""
+class Diagnosis(Reported):
+    """Posterior probabilities of the effects that a model may lack.
 
-    _result: _diagnosed.Diagnosis | _infer.Inference
-    _file: ModelFile
+    Attributes:
+        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
+            cannot_tell; of several robots that on what all of them lack.
+        sentence: the same for people.
+        found: effects that are missing, surest first.
+        best: the first of them; None if none is named.
+        nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
+        score: as of `compare`, of the model as given.
+        score_refit: of its base at its posterior where no effect is new.
+        score_after: with the likeliest set of new effects. All three are RMS errors of predictions
+            0.1 to 2 s ahead over the noise floor; the models are the most probable ones, not those
+            with the least score, so that it may also rise.
+
+    Examples:
+        >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
+        >>> d.nothing < 0.05
+        True
+    """
+
+    _result: Inference | Fleet
+
+    def __init__(self, result: Inference | Fleet, log: Log, file: ModelFile):
+        self._result, self._file, self._log, answer = result, file, log, result.answer
+        self.verdict: Verdict = result.verdict
+        self.nothing, self.outside = answer.nothing, answer.outside
+        self.sentence, self.score = judged.sentence(result), result.before.score
+        self.score_refit, self.score_after = result.refitted.score, result.after.score
+        told = result.to_json()
+        ranked = {row["effect"]: row for row in told["ranking"]}
+        there = {catalogue_name(name) for name in effect_names(file.model)}
+        self.found = [
+            Finding({**ranked[f["effect"]], **f}, log, catalogue_name(f["effect"]) in there)
+            for f in told["findings"]
+        ]
+        self.best = self.found[0] if self.found else None
+
+    @property
+    def robots(self) -> "dict[int, Diagnosis]":
+        """Each robot of several in the light of the others, by number; empty of one.
+
+        Examples:
+            >>> both = tm.diagnose("both.lcmlog", "fitted.toml")
+            >>> {robot: one.best.effect for robot, one in both.robots.items()}
+            {0: 'coasting', 1: 'coasting'}
+        """
+        if not isinstance(self._result, Fleet):
+            return {}
+        return {
+            one.measurements[0].robot_id: Diagnosis(one, self._log, self._file)
+            for one in self._result.robots
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """All numbers and names, as of `twinmill diagnose --json`.
+
+        Returns:
+            As the page on probabilities tells; an absent number is None. Of several robots
+            `robots_off` has those that differ from the others.
+
+        Examples:
+            >>> d.to_json()["found"]
+            ['coasting']
+        """
+        told: dict[str, Any] = plain(judged.to_json(self._result))
+        return told
 
     @_one_thread
     def next_run(
@@ -1398,141 +1458,6 @@ class Judged(Reported):
         planned.input = self.input
         return planned
 
-
-class Diagnosis(Judged):
-    """Physical effects that a model of several robots lacks, or of a table of steady speeds.
-
-    Attributes:
-        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue
-            or cannot_tell.
-        sentence: the same for people.
-        found: the missing effects, most important first.
-        best: the first of them; None if none is named.
-
-    Examples:
-        >>> both = tm.diagnose("both.lcmlog", "fitted.toml")
-        >>> both.verdict
-        'effect_missing'
-    """
-
-    _result: _diagnosed.Diagnosis
-
-    def __init__(self, result: _diagnosed.Diagnosis, log: Log, file: ModelFile):
-        self._result, self._file = result, file
-        self.verdict: Verdict = result.verdict
-        self.sentence = result.sentence
-        ranked = {r.effect: r for r in result.ranking}
-        named = [(result.finding(name), ranked.get(name)) for name in result.found]
-        self.found = [
-            Finding({**rank.to_json(), **f.to_json()}, log, f.again)
-            for f, rank in named
-            if f and rank
-        ]
-        self.best = self.found[0] if self.found else None
-
-    def table(self) -> pd.DataFrame:
-        """The effects that explain most, best first.
-
-        Returns:
-            effect, found, score_heldout and share_explained (of the search step that tried it),
-            p_value, group (effects with the same number cannot be distinguished in this log),
-            takes_away and certainty (of findings: `share` and `certainty` of `Finding`), estimates
-            (with standard errors; of effects that were not found, from the step that tried them).
-
-        Examples:
-            >>> both.table().loc[0, "effect"]
-            'coasting'
-        """
-        keys = ("effect", "score_heldout", "share_explained", "p_value", "group")
-        rows = []
-        for r in self._result.ranking:
-            f = self._result.finding(r.effect)
-            rows.append(
-                {
-                    **{k: getattr(r, k) for k in keys},
-                    "takes_away": f.share if f else np.nan,
-                    "certainty": f.certainty if f else "",
-                    "estimates": diagnosis_report.estimates((f or r).parameters),
-                }
-            )
-        table = pd.DataFrame(rows)
-        if len(table):
-            table.insert(1, "found", table["effect"].isin(self._result.found))
-        return table
-
-    def plot(self) -> Figure:
-        """Score after each step: as given, refitted, with each effect found.
-
-        Returns:
-            A figure of matplotlib; where robots reported detections, what their cameras see.
-
-        Examples:
-            >>> both.plot().axes[0].get_xlabel()
-            'score: error over noise floor'
-        """
-        return diagnosis_report.section(self._result).figures[0].svg.picture
-
-    def _page(self) -> tuple[report.Section, str]:
-        return diagnosis_report.section(self._result), "twinmill.diagnose"
-
-    def _text(self) -> RenderableType:
-        return diagnosis_report.terminal(self._result)
-
-    def __repr__(self) -> str:
-        return f"Diagnosis({self.verdict}: {self.sentence})"
-
-
-class Inference(Judged):
-    """Posterior probabilities of the effects that a model of a robot may lack.
-
-    Attributes:
-        verdict: model_adequate, refit_enough, effect_missing, ambiguous, outside_catalogue or
-            cannot_tell.
-        sentence: the same for people.
-        found: effects that are missing, surest first.
-        best: the first of them; None if none is named.
-        nothing, outside: probabilities that nothing is missing, and that an unknown cause is.
-        score: as of `compare`, of the model as given.
-        score_refit: of its base at its posterior where no effect is new.
-        score_after: with the likeliest set of new effects. All three are RMS errors of predictions
-            0.1 to 2 s ahead over the noise floor; the models are the most probable ones, not those
-            with the least score, so that it may also rise.
-
-    Examples:
-        >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
-        >>> d.nothing < 0.05
-        True
-    """
-
-    _result: _infer.Inference
-
-    def __init__(self, result: _infer.Inference, log: Log, file: ModelFile):
-        self._result, self._file, answer = result, file, result.answer
-        self.verdict: Verdict = answer.verdict
-        self.nothing, self.outside = answer.nothing, answer.outside
-        self.sentence, self.score = inference.sentence(answer), result.before.score
-        self.score_refit, self.score_after = result.refitted.score, result.after.score
-        told = answer.to_json()
-        ranked = {row["effect"]: row for row in told["ranking"]}
-        there = {catalogue_name(name) for name in effect_names(file.model)}
-        self.found = [
-            Finding({**ranked[f["effect"]], **f}, log, catalogue_name(f["effect"]) in there)
-            for f in told["findings"]
-        ]
-        self.best = self.found[0] if self.found else None
-
-    def to_json(self) -> dict[str, Any]:
-        """All numbers and names, as of `twinmill diagnose --json`.
-
-        Returns:
-            As the page on probabilities tells; an absent number is None.
-
-        Examples:
-            >>> d.to_json()["found"]
-            ['coasting']
-        """
-        return {"sentence": self.sentence, **super().to_json()}
-
     def table(self) -> pd.DataFrame:
         """Effects and their numbers.
 
@@ -1561,94 +1486,20 @@ class Inference(Judged):
             >>> len(d.plot().axes)
             1
         """
-        return inference.probabilities(self._result.answer).svg.picture
+        return judged.bars(self._result).svg.picture
 
     def _page(self) -> tuple[report.Section, str]:
-        return inference.section([self._result]), "twinmill.diagnose"
+        return judged.section(judged.Told(self._result)), "twinmill.diagnose"
 
     def _text(self) -> RenderableType:
-        return inference.terminal(self._result)
+        return judged.terminal(judged.Told(self._result))
 
     def __repr__(self) -> str:
-        return f"Inference({self.verdict}: {self.sentence})"
+        return f"Diagnosis({self.verdict}: {self.sentence})"
 
 
 class Explanation(Reported):
-    """A model of several robots, or of a table, with the effects that were found.
-
-    Attributes:
-        model: the new one.
-        diagnosis: of the model as given.
-        after: comparison of the new model with the log.
-        score: of the new model on the log that it was fitted to.
-
-    Examples:
-        >>> widely = tm.explain("both.lcmlog", "fitted.toml")
-        >>> widely.diagnosis.verdict
-        'effect_missing'
-    """
-
-    def __init__(self, result: _explain.Explanation, log: Log, file: ModelFile):
-        self._result, self.model = result, Model(result.child or file)
-        self.diagnosis = Diagnosis(result.diagnosis, log, file)
-        self.after = Comparison(result.after)
-        self.score = self.after.score
-
-    def table(self) -> pd.DataFrame:
-        """Fitted quantities.
-
-        Returns:
-            name, value, std, unit, at_bound, seen, together, as of `Fit.table`.
-
-        Examples:
-            >>> "coasting.deceleration_mps2" in widely.table()["name"].tolist()
-            True
-        """
-        return pd.DataFrame([e.to_json() for e in self._result.parameters])
-
-    def steps(self) -> pd.DataFrame:
-        """The model as given, then with each finding.
-
-        Returns:
-            effect (`as given` first; `refit` stands for stale parameters of the base, `equation`
-            for a validated formula) and score_heldout.
-
-        Examples:
-            >>> widely.steps()["score_heldout"].is_monotonic_decreasing
-            True
-        """
-        steps = self._result.steps
-        return pd.DataFrame(
-            {"effect": effect or "as given", "score_heldout": score} for effect, score in steps
-        )
-
-    def plot(self) -> Figure:
-        """Score after each step: as given, refitted, with each effect found.
-
-        Returns:
-            A figure of matplotlib, as of `Diagnosis.plot`.
-
-        Examples:
-            >>> widely.plot().axes[0].get_xlabel()
-            'score: error over noise floor'
-        """
-        return self.diagnosis.plot()
-
-    def _page(self) -> tuple[report.Section, str]:
-        page = diagnosis_report.explanation_section(self._result, not_written=NOT_WRITTEN)
-        return page, "twinmill.explain"
-
-    def _text(self) -> RenderableType:
-        return diagnosis_report.terminal_explanation(self._result, not_written=NOT_WRITTEN)
-
-    def __repr__(self) -> str:
-        found = ", ".join(self._result.diagnosis.found) or "nothing"
-        before = self._result.diagnosis.before
-        return f"Explanation(found {found}: score {before.score:.3g} -> {self.score:.3g})"
-
-
-class Improvement(Reported):
-    """A model of a robot with what it lacked, and the diagnosis behind it.
+    """A model with what it lacked, and the diagnosis behind it.
 
     Attributes:
         model: the new one: the likeliest set of effects, all numbers at their posterior mean. It
@@ -1663,7 +1514,7 @@ class Improvement(Reported):
         'effect_missing'
     """
 
-    def __init__(self, written: _better.Better, found: Inference):
+    def __init__(self, written: _better.Better, found: Diagnosis):
         self._written, self.diagnosis, self.model = written, found, Model(written.file)
         self.after = Comparison(written.after)
         self.score = self.after.score
@@ -1692,6 +1543,22 @@ class Improvement(Reported):
         """
         return self.model.table()
 
+    def steps(self) -> pd.DataFrame:
+        """Scores of the model as given, of its refitted base, and with what was found.
+
+        Returns:
+            effect (`as given` first; `refit` is the base refitted, `equation` a formula) and
+            score_heldout, which is None between effects that were found together.
+
+        Examples:
+            >>> explained.steps()["effect"].tolist()[:2]
+            ['as given', 'refit']
+        """
+        return pd.DataFrame(
+            {"effect": step["effect"] or "as given", "score_heldout": step["score_heldout"]}
+            for step in self.diagnosis.to_json()["steps"]
+        )
+
     def plot(self) -> Figure:
         """Errors over the horizon, of both models.
 
@@ -1706,16 +1573,19 @@ class Improvement(Reported):
         return errors_drawn(both)
 
     def _page(self) -> tuple[report.Section, str]:
-        page = inference.section([self.diagnosis._result], written=self._written)
-        return page, "twinmill.explain"
+        return judged.section(self._told), "twinmill.explain"
 
     def _text(self) -> RenderableType:
-        return inference.terminal_of_robots([self.diagnosis._result], (), self._written)
+        return judged.terminal(self._told)
+
+    @property
+    def _told(self) -> judged.Told:
+        return judged.Told(self.diagnosis._result, written=self._written)
 
     def __repr__(self) -> str:
         added = ", ".join(self._written.added) or "nothing"
         before = self._written.before.score
-        return f"Improvement(added {added}: score {before:.3g} -> {self.score:.3g})"
+        return f"Explanation(added {added}: score {before:.3g} -> {self.score:.3g})"
 
 
 def load(*paths: str | Path) -> Log:
@@ -1962,7 +1832,7 @@ def diagnose(
     own: Logs | None = None,
     without: Iterable[str] = (),
     progress: Callable[[str], None] | None = None,
-) -> Inference | Diagnosis:
+) -> Diagnosis:
     """Names the physical effect that a model lacks, or says that none is missing or identifiable.
 
     Args:
@@ -1975,14 +1845,13 @@ def diagnose(
         progress: called with a sentence on each step.
 
     Returns:
-        Of one robot's poses the posterior probability of each effect. Several robots are compared
-        with each other, and tables judged, without probabilities: `Diagnosis`.
+        The posterior probability of each effect; of several robots that all of them lack it, and
+        `robots` has each.
 
     Raises:
         LogError: the log cannot be used; one sentence.
         ModelError: the model cannot be read.
-        ValueError: there is no such effect as is named in `without`, or `own` is given for several
-            robots or a table.
+        ValueError: there is no such effect as is named in `without`.
 
     Examples:
         >>> d = tm.diagnose("run.lcmlog", "fitted.toml")
@@ -1994,54 +1863,11 @@ def diagnose(
     log, model = _log(log), _model(model)
     excluded = known("without", without, catalogue())
     measurements = log.measurements(model)
-    tell = _progress(progress)
-    found: Inference | Diagnosis
-    if own is not None or _keeping.by_probabilities(measurements):
-        before = _log(own).measurements(model) if own is not None else ()
-        told = _infer.infer(measurements, model.file, before, tell, without=excluded)
-        found = Inference(told, log, model.file)
-    else:
-        older = _diagnose.diagnose(measurements, model.file, tell, excluded)
-        found = Diagnosis(older, log, model.file)
-    return _told(found, measurements)
-
-
-@_one_thread
-def infer_robots(
-    log: Log | str | Path,
-    model: Model | str | Path | None = None,
-    *,
-    own: Logs | None = None,
-    progress: Callable[[str], None] | None = None,
-) -> dict[int, Inference]:
-    """Posterior probabilities for each robot of a log separately.
-
-    Args:
-        log: of several robots, or the path of one.
-        model: of all of them; None is TurboPi's.
-        own: the log (or logs) that the model was fitted to; see `diagnose`.
-        progress: called with a sentence on each step.
-
-    Returns:
-        Robot's number -> verdict, effects and dependences with their probabilities.
-
-    Raises:
-        LogError: the log cannot be used; one sentence.
-        ModelError: the model cannot be read.
-
-    Examples:
-        >>> found = tm.infer_robots(log, "fitted.toml")
-        >>> {robot: one.best.effect for robot, one in found.items()}
-        {0: 'coasting'}
-    """
-    log, model = _log(log), _model(model)
-    measurements = log.measurements(model)
     before = _log(own).measurements(model) if own is not None else ()
-    results = _infer.infer_robots(measurements, model.file, before, _progress(progress))
-    return {
-        r.measurements[0].track.robot_id: _told(Inference(r, log, model.file), measurements)
-        for r in results
-    }
+    told = _diagnose.diagnose(
+        measurements, model.file, before, _progress(progress), without=excluded
+    )
+    return _told(Diagnosis(told, log, model.file), measurements)
 
 
 @_one_thread
@@ -2052,7 +1878,7 @@ def explain(
     own: Logs | None = None,
     formula: bool = True,
     progress: Callable[[str], None] | None = None,
-) -> Improvement | Explanation:
+) -> Explanation:
     """Diagnoses, adds the effects found, and estimates all parameters.
 
     Args:
@@ -2063,8 +1889,7 @@ def explain(
         progress: called with a sentence on each step.
 
     Returns:
-        The new model, and the diagnosis behind it: of one robot's poses by probabilities, of
-        others cross-validated at each step.
+        The new model, and the diagnosis behind it.
 
     Raises:
         LogError: the log cannot be used; one sentence.
@@ -2078,22 +1903,16 @@ def explain(
     log, model = _log(log), _model(model)
     checked("formula", formula, (bool,), "True or False")
     measurements = log.measurements(model)
-    if own is not None or _keeping.by_probabilities(measurements):
-        found = diagnose(log, model, own=own, progress=progress)
-        assert isinstance(found, Inference)
-        told = found._result if formula else replace(found._result, formula=None)
-        path = Path(f"{model.file.path.stem}_explained.toml")
+    found = diagnose(log, model, own=own, progress=progress)
+    path, result = Path(f"{model.file.path.stem}_explained.toml"), found._result
+    if isinstance(result, Fleet):
+        written = better_of_fleet(
+            result, model.file, path, command="twinmill.explain", progress=_progress(progress)
+        )
+    else:
+        told = result if formula else replace(result, formula=None)
         written = _better.better(told, model.file, path, "twinmill.explain")
-        return _told(Improvement(written, found), measurements)
-    result = _explain.explain_model(
-        measurements,
-        model.file,
-        path=Path(f"{model.file.path.stem}_explained.toml"),
-        command="twinmill.explain",
-        progress=_progress(progress),
-        formula=formula,
-    )
-    return _told(Explanation(result, log, model.file), measurements)
+    return _told(Explanation(written, found), measurements)
 
 
 @_one_thread
@@ -2109,9 +1928,8 @@ def next_run(
 ) -> NextRun:
     """Designs the run that best tells apart what these logs cannot.
 
-    What is in question is what `diagnose` leaves open: effects that look alike, else effects that
-    would not show. With `own`, or a model that keeps what it misses there, it is what `infer` finds
-    neither sure nor ruled out. Play the script, log it, and judge all logs together.
+    What is in question is what `diagnose` finds neither sure nor ruled out. Play the script, log
+    it, and judge all logs together.
 
     Args:
         log: a log, or the path of one.

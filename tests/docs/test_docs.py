@@ -57,6 +57,18 @@ def test_the_tutorial_names_the_effect_that_the_recording_has(outputs, folder):
     assert std < 0.2
 
 
+def test_the_python_of_the_tutorial_runs_after_its_commands(outputs, folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    page = (ROOT / "docs/tutorial.md").read_text()
+    before = (folder / "better.toml").read_bytes()
+    names: dict = {}
+    for block in re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL):
+        exec(block, names)
+    assert "coasting (" in names["d"].sentence
+    assert "coasting" in tm.Model.load(folder / "coasting.toml").effects
+    assert (folder / "better.toml").read_bytes() == before
+
+
 def test_the_tutorial_with_ros_finds_what_its_bag_has(tmp_path):
     """As examples/make_ros_bag.py simulates it with NumPy: 1 m/s² at most, and a lag of 80 ms."""
     page = (ROOT / "docs/tutorial-ros.md").read_text()

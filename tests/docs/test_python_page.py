@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib import pyplot as plt
 
@@ -41,15 +42,18 @@ def test_what_is_there_is_kept_unless_forced(tmp_path):
         assert (tmp_path / name).read_bytes() != b"mine"
 
 
-def test_all_blocks_of_the_page_run(tmp_path, monkeypatch):
+def test_all_blocks_of_the_page_run(tmp_path, monkeypatch, capsys):
     run(f"python {ROOT}/examples/make_recording.py", tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", str(ROOT / "build/bin"), prepend=":")
     names: dict = {}
     blocks = BLOCK.findall((ROOT / "docs/python.md").read_text())
     assert len(blocks) == 10  # eight tasks, two with a second one
-    for block in blocks:
-        exec(block, names)
+    with pd.option_context("display.width", 60):  # of a narrow window, in which pandas cuts
+        for block in blocks:
+            exec(block, names)
+    printed = capsys.readouterr().out
+    assert all(column in printed for column in names["table"].columns)  # which the page explains
     plt.close(names["figure"])
     assert "base.yaw_gain" not in names["fit"].stderr.dropna()
     # As examples/make_recording.py hides it.

@@ -78,7 +78,7 @@ TEST_F(Installed, MissingModelListsThoseThereAre)
 
 TEST_F(Installed, MissingFolderIsNoCrash)
 {
-    setenv("TWINMILL_MODELS", "/no/such/folder", 1);
+    setenv("TWINMILL_MODELS", "/no/such/other/../folder", 1);
     EXPECT_EQ(LoadComplaint("third_test.toml"),
               "third_test.toml: no such file here, nor among the installed models "
               "(none in /no/such/folder)");

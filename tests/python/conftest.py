@@ -7,7 +7,7 @@ import sys
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before numpy is loaded
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,11 +19,15 @@ import twinmill_native as native
 
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import RobotLog
+from twinmill.diagnosis import diagnose
 from twinmill.robots.key import load_or_make
 from twinmill_cli import ending, main
 
 sys.path.insert(0, str(Path(__file__).parent))
+from asked_once import AskedOnce
 from same_robot import make_days
+
+JUDGES = {name: AskedOnce(getattr(diagnose, name)) for name in ("infer", "judge_fleet")}
 
 NOISE = """
 [noise]
@@ -101,7 +105,7 @@ def message() -> Callable:
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def driven() -> Callable[..., RobotLog]:
     """A robot at 0.3 m/s, 0.5 rad/s for some seconds: 120 Hz poses, 45 Hz commands, no noise."""
 
@@ -162,6 +166,15 @@ def own_ctrl_c():
     before = signal.getsignal(signal.SIGINT)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(scope="module")
+def asked_once() -> Iterator[None]:
+    """Diagnoses of the same logs by the same model are made once, for all modules that use this."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, judge in JUDGES.items():
+            patch.setattr(diagnose, name, judge)
+        yield
 
 
 @pytest.fixture

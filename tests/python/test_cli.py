@@ -54,7 +54,7 @@ def test_compare_tells_what_the_interface_promises(compared, coasting_robot):
         found
     )
     assert {"sensor_m", "sensor_rad", "drive_mps", "drive_radps", "drive_s"} <= set(found["noise"])
-    assert found["floor_kind"] == "response"
+    assert found["floor_kind"] == "noise"
     cells = {(row["channel"], row["unit"], row["horizon_s"]) for row in found["errors"]}
     units = {"forward": "m", "left": "m", "heading": "rad"}
     assert cells == {(c, u, h) for c, u in units.items() for h in (0.1, 0.2, 0.5, 1.0, 2.0)}

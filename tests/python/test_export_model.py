@@ -513,6 +513,15 @@ def test_sdformat_holds_the_frame_of_friction_by_the_letters_that_each_gazebo_as
     assert frames == [("ignition:expressed_in", "gz:expressed_in")] * rolling
 
 
+@pytest.mark.parametrize("to", ["urdf", "sdf", "ros2_control"])
+def test_a_gain_of_one_to_three_digits_is_none(to, folder, model_text):
+    """The sentence that would tell it has as many."""
+    gains = {"forward_gain": 1.0004, "sideways_gain": 1.0001, "yaw_gain": 0.7}
+    open_text(folder, model_text("m", **gains))
+    left = run(["export-model", "m.toml", "--to", to, "--json"])["not_carried"]
+    assert not [item for item in left if " 1 times" in item["why"]]
+
+
 @pytest.mark.parametrize("wheels", ["mecanum", "differential"])
 def test_gazebo_whose_physics_has_no_gains_drives_as_told(wheels, folder, model_text):
     """The inverse kinematics of Gazebo's own drives, by hand, on the wheels of the same file."""

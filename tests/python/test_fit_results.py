@@ -172,6 +172,19 @@ def test_there_is_one_standard_error(arcs):
     assert np.linalg.eigvalsh(fitted.covariance()).min() > 0
 
 
+def test_a_number_that_the_log_does_not_tell_is_marked(sheet):
+    """A robot that only stands and goes straight ahead tells nothing of how it turns."""
+    t_s = np.arange(0, 60, 0.02)
+    v = np.where((t_s // 1.2) % 3 == 1, 0.2, 0.0)
+    pose = np.column_stack([np.append(0, np.cumsum(v[:-1]) * 0.02), 0 * t_s, 0 * t_s])
+    pose += np.random.default_rng(3).normal(0, 5e-4, pose.shape)
+    told = np.column_stack([v, 0 * v])[::60]
+    log = tm.Log.from_arrays(t_s, pose, t_s[::60], told, kind="twist", same_clock=True)
+    said = tm.fit(log, sheet[3], free=["base.forward_gain", "base.yaw_gain"]).summary()
+    assert re.search(r"^base\.yaw_gain .*\(not determined by this log\)$", said, re.M)
+    assert re.search(r"^base\.forward_gain .* 1$", said, re.M)
+
+
 def test_what_is_held_is_listed_and_marked(arcs, tmp_path):
     """At the values given here: as lmfit lists what does not vary, without an error."""
     _, log, model = arcs

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`twinmill lab infer`, and `diagnose` and `explain` with a model's own log, which it answers."""
+"""`twinmill diagnose` and `explain` on one robot, and with a model's own log."""
 
 import json
+import os
 import re
+import subprocess
 import tomllib
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,14 +12,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from twinmill.diagnosis.infer import Inference
 from twinmill.inference.answer import Answer
-from twinmill.inference.infer import Inference
 from twinmill_cli.frame import Given
-from twinmill_cli.infer import _mending
+from twinmill_cli.inferred import _mending
+
+pytestmark = pytest.mark.usefixtures("asked_once")
 
 
 def answer(verdict, *added):
-    return Answer(verdict, [], 0.0, 0.1, 0.0, {}, {}, 0.0, added, None, None)
+    return Answer(verdict, [], 0.0, 0.1, 0.0, {}, {}, 0.0, added)
 
 
 @pytest.mark.parametrize(
@@ -34,10 +38,11 @@ def test_a_model_is_offered_that_has_what_lasts(said, new):
     given = Given([Path("run.lcmlog")], "base.toml", None, None)
     scores = {"refitted": SimpleNamespace(score=2.0), "after": SimpleNamespace(score=1.0)}
     found = SimpleNamespace(answer=said, formula=None, **scores)
+    found.holds = Inference.holds.fget(found)
     found.lasting = Inference.lasting.fget(found)
     found.added = Inference.added.fget(found)
-    typed = [c for _, c in _mending(found, "lab infer", given)]
-    assert typed == ([f"twinmill lab infer run.lcmlog --model base.toml -o {new}"] if new else [])
+    typed = [c for _, c in _mending(found, "explain", given)]
+    assert typed == ([f"twinmill explain run.lcmlog --model base.toml -o {new}"] if new else [])
 
 
 def test_diagnose_and_explain_with_the_models_own_log_find_what_came_since(
@@ -97,6 +102,18 @@ def test_the_page_of_a_diagnosis_shows_its_probabilities(
     assert "m/s²" in page and "so they do not add up to 100 %" in page
 
 
+@pytest.mark.skipif("TWIN_RUN" not in os.environ, reason="TWIN_RUN does not name the program")
+def test_what_one_model_misses_is_not_kept_of_several_robots(twinmill, tmp_path):
+    """Refused in one sentence: each robot's own log has errors of its own."""
+    log, known = tmp_path / "both.lcmlog", tmp_path / "known.toml"
+    drive = ["--plant", "planar", "--model", "turbopi.toml", "--n", "2", "--duration-s", "12"]
+    subprocess.run([os.environ["TWIN_RUN"], *drive, "--log", log], check=True, capture_output=True)
+    own = ["--model", "turbopi.toml", "--own", log, "--keep", known]
+    code, _, err = twinmill("diagnose", log, *own)
+    assert code == 1 and "these are 2 robots; give logs of one robot" in " ".join(err.split())
+    assert not known.exists()
+
+
 def test_a_run_is_designed_for_what_probabilities_leave_open(
     twinmill, brief_coasting_robot, brief_log_without_coasting, tmp_path
 ):
@@ -126,7 +143,7 @@ def test_effects_that_a_log_cannot_show_are_said_with_why(
 ):
     """Two logs of one robot: what begins at a moment of one is looked for in neither."""
     logs = [brief_coasting_robot.log, brief_log_without_coasting]
-    code, out, _ = twinmill("lab", "infer", *logs, "--model", brief_coasting_robot.model, "--json")
+    code, out, _ = twinmill("diagnose", *logs, "--model", brief_coasting_robot.model, "--json")
     found = json.loads(out)
     assert code == 0
     why = {row["effect"]: row["why"] for row in found["not_identifiable"]}

@@ -28,6 +28,7 @@ from twinmill_cli import next as next_command
 from twinmill_cli import swarm_stop, twin_sweep
 from twinmill_cli.options import ScriptForm
 from twinmill_cli.spelling import typed
+from twinmill_cli.word_order import in_order
 
 ROOT = Path(__file__).resolve().parents[2]
 COASTS = '[[effect]]\nname = "coasting"\ndeceleration_mps2 = 0.7\n'
@@ -84,7 +85,7 @@ def words_of(line: str) -> list[str]:
 
 def command_of(words: list[str]) -> tuple[typer.core.TyperCommand, list[str]]:
     """The command that the words name, by place in the tree or flat name, and the rest."""
-    first, *rest = words
+    first, *rest = in_order(words)
     if rest and rest[0] in (below := cli.BELOW.get(first, {})):
         return COMMANDS[below[rest[0]]].command(), rest[1:]
     command = COMMANDS[first].command()

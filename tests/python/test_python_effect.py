@@ -163,6 +163,37 @@ def test_a_saved_model_is_read_with_its_names(carpet, added, tmp_path):
     assert fitted.params[NAMED] == pytest.approx(0.05, abs=1e-4)
 
 
+def test_a_model_keeps_the_limits_and_units_of_the_numbers(carpet, added, tmp_path):
+    """They are those that the author of the effect gave, also in a file and after a fit."""
+    added.model.save(tmp_path / "grain.toml")
+    read = tm.Model.load(tmp_path / "grain.toml")
+    for model in (added.model, read, tm.fit(carpet[0], read).model):
+        row = model.table().set_index("name").loc[NAMED]
+        assert (row["min"], row["max"], row["unit"]) == (-1, 1, "1")
+        with pytest.raises(tm.ModelError, match=r"= 1\.5: must be within -1 to 1"):
+            model.set({NAMED: 1.5})
+
+
+def test_a_number_stays_within_limits_that_the_log_contradicts(carpet):
+    """The robot is faster along x, which the effect's author rules out; 0 is what is nearest."""
+    log, model = carpet
+
+    @tm.python_effect(
+        "vx_mps",
+        {"slow": tm.Number("1", low=0), "rate": tm.Number("1/s", low=0.1, high=20, prior=(1, 1))},
+        state_rate=lambda theta, s, rate: rate * (np.cos(theta) - s),
+    )
+    def reluctant(vx, s, slow, rate):
+        return -slow * vx * s
+
+    added = model.add(reluctant, log)
+    table = added.model.table().set_index("name")
+    assert table.loc["equation#reluctant.rate", "unit"] == "1/s"
+    assert added.model.numbers(reluctant)["slow"] == 0
+    found = added.table().set_index("name")["at_bound"]
+    assert found["equation#reluctant.slow"] and not found["equation#reluctant.rate"]
+
+
 def test_a_prior_decides_where_data_do_not(carpet):
     """Data know the product of two numbers: 0.8 and 0.5 are a gain of 0.4, or others."""
     log, model = carpet

@@ -14,7 +14,7 @@ from twinmill.data.measurement import load_measurements
 from twinmill.fitting.compare import Comparison, compare
 from twinmill.model.model_file import ModelFile
 from twinmill.report import Provenance, Section, show, write_report
-from twinmill.report.sections import comparison_section, steps_section
+from twinmill.report.sections import comparison_section
 from twinmill.report.tables import _clocks, _date
 
 SOURCE = Provenance("twinmill compare run.lcmlog", "twinmill 0.1.0", "ab" * 32)
@@ -102,18 +102,6 @@ def test_names_from_a_log_are_text_and_not_markup(section, tmp_path):
     told = Section(hostile, section.score, hostile, [("log", hostile)], warnings=[hostile])
     page = Page(write_report(tmp_path, hostile, SOURCE, [told, told]).read_text())
     assert "script" not in page.tags and hostile in page.text
-
-
-def test_a_chain_shows_each_step_and_its_score(tmp_path):
-    chain = [("data sheet", 35.0), ("numbers fitted", 22.0), ("+ coasting", 2.5), ("+ worse", 3.0)]
-    section = steps_section("Gained", chain, "A sentence.")
-    page = Page(write_report(tmp_path, "Demo", SOURCE, [section]).read_text())
-    for label, score in chain:
-        assert label in page.text and f"{score:.3g}" in page.text
-    # On a scale of factors 35 fills the bar, 2.5 takes log 2.5 / log 35 of it, 1.0 would be empty.
-    assert [row[1].bar for row in section.tables[0].rows] == pytest.approx(
-        [1.0, 0.8694, 0.2577, 0.3090], abs=1e-4
-    )
 
 
 @pytest.mark.parametrize("columns", [40, 48, 80])

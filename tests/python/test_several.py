@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from twinmill.robots import hold, tell
-from twinmill.robots.countdown import HELD_BY_ANOTHER, NONE_BEGUN, NOT_BEGUN, STOPPED, UNHEARD
+from twinmill.robots.countdown import (
+    HELD_BY_ANOTHER,
+    NONE_BEGUN,
+    NOT_BEGUN,
+    NOT_HEARD_SINCE,
+    STOPPED,
+    UNHEARD,
+)
 from twinmill_cli import several
 
 COMMAND = Path(__file__).parents[2] / "firmware" / "core" / "command.c"
@@ -17,7 +24,10 @@ WORDS = {
     *(state.before for state in STATES if state.before),
     *re.findall(r'return "(.+)";', COMMAND.read_text()),
     *(tell.NO_KEY, tell.NO_SIGNATURE, tell.UNSEALED, tell.NEVER_HEARD),
-    *(f"was {words}" for words in (HELD_BY_ANOTHER, NONE_BEGUN, NOT_BEGUN, STOPPED, UNHEARD)),
+    *(
+        f"was {words}"
+        for words in (HELD_BY_ANOTHER, NONE_BEGUN, NOT_BEGUN, NOT_HEARD_SINCE, STOPPED, UNHEARD)
+    ),
     "was started anew, and has forgotten it",
     "a start that it waits for plays milling",
 }

@@ -48,6 +48,7 @@ if working():  # not for --help
     from twinmill.robots.key import of_operator
     from twinmill.robots.remote import Remote
     from twinmill.terminal import progress_bar
+    from twinmill_cli.ctrl_c import kept_free
     from twinmill_cli.keyboard import any_key
     from twinmill_cli.ros_script import write_script
     from twinmill_cli.swarm_door import check_clocks, refuse_doubles
@@ -277,7 +278,7 @@ class Run:
             )
         if self.arm:
             tell.arm(self.fleet, {self.robot_id})
-        with ended_by_signals(self.fleet, self.voice.check):
+        with ended_by_signals(self.fleet, self.voice.check), kept_free(self.fleet):
             try:
                 with self._watched("starts; any key stops", countdown_s, pressed):
                     held = self._start(script, countdown_s)

@@ -28,14 +28,14 @@ if working():  # not for --help
     from matplotlib.axes import Axes
     from rich.text import Text
 
+    from twinmill.diagnosis.better import Better
     from twinmill.experiment.rich_script import write_rich_script
     from twinmill.extras import command
-    from twinmill.inference.better import Better
     from twinmill.model.model_file import ModelFile
     from twinmill.model.parameters import ParameterEstimate, catalogue_name
     from twinmill.programs import find_program
     from twinmill.report import Figure, Section, show, write_report
-    from twinmill.report import inference as present
+    from twinmill.report import judged as present
     from twinmill.report.canvas import FLOOR, PREDICTED, draw, legend_above
     from twinmill.report.tables import Cell, Table, Tone, number, tone
     from twinmill.terminal import PlainConsole
@@ -127,7 +127,7 @@ def _demo(
         FOLDER / "report",
         page.title,
         provenance(f"twinmill demo --seed {seed}", ModelFile.load(GIVEN)),
-        [page, present.section([result.found], written=result)],
+        [page, present.section(present.Told(result.found, written=result))],
     )
     print(f"\nReport: {report.resolve()}")
     program = _as_typed(Path(sys.argv[0]))

@@ -109,16 +109,12 @@ ANSWERS = (
     ),
     ("`model_adequate`", "nothing is missing that this log would show", "use the model"),
     ("`refit_enough`", "the numbers are stale, no effect is missing", "`fit`"),
-    (
-        "`effect_missing`",
-        "one effect or more, named, tested on data that was not fitted",
-        "`explain`",
-    ),
+    ("`effect_missing`", "one effect or more, each with its probability", "`explain`"),
     ("`ambiguous`, `group`", "this log cannot tell some effects apart", "`next`"),
     (
         "`outside_catalogue`",
         "something is missing that no effect explains; `rest` says what it depends on",
-        "look there; `explain` adds a validated formula for it, `add equation` one of your own",
+        "look there; `explain` adds a formula that holds, `add equation` one of your own",
     ),
     ("`cannot_tell`", "the log does not determine the answer", "`next`"),
     ("`bad_input`", "the log itself is wrong; `input` says what", "correct it, import again"),

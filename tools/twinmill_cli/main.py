@@ -12,6 +12,7 @@ from twinmill.arguments import spelled
 from twinmill_cli.ending import leave
 from twinmill_cli.lazy import LazyCommand
 from twinmill_cli.spelling import typed
+from twinmill_cli.word_order import in_order
 
 # Name, module (of this package unless another is named) and what it does. The modules are imported
 # when called.
@@ -117,11 +118,6 @@ COMMANDS = (
         "diagnose",
         "diagnose",
         "Name the physical effect that a model lacks, or say that none is missing or identifiable.",
-    ),
-    (
-        "infer",
-        "infer",
-        "Posterior probability of each effect that a model may lack, and of an unknown cause.",
     ),
     (
         "explain",
@@ -240,7 +236,6 @@ BELOW = {
         "optitrack": "optitrack",
     },
     "lab": {
-        "infer": "infer",
         "challenge": "challenge",
         "claims": "claims",
         "discover": "discover",
@@ -251,7 +246,7 @@ BELOW = {
 GROUPS = {
     "twin": "Change a model by hand, list effects, export to other simulators.",
     "robot": "Set up a robot, drive it, and test whether it has changed.",
-    "lab": "Probabilities, blind tests, preregistered predictions, claims, new behaviours.",
+    "lab": "Blind tests, preregistered predictions, claims, new behaviours.",
 }
 
 
@@ -332,7 +327,7 @@ def run(arguments: list[str]) -> Any:
     Raises:
         ValueError, OSError: it failed, in one sentence.
     """
-    return app(arguments, prog_name="twinmill", standalone_mode=False)
+    return app(in_order(arguments), prog_name="twinmill", standalone_mode=False)
 
 
 def main() -> None:

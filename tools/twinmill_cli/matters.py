@@ -181,13 +181,14 @@ def _hidden(logs: list[Path], model_file: ModelFile, folder: Path) -> list[Hidde
     if kept.exists() and (known := json.loads(kept.read_text()))["of"] == key:
         return [Hidden(**one) for one in known["hidden"]]
     with telling("looking for what the logs do not exclude") as progress:
-        diagnosis = diagnose(load(logs, model_file), model_file, progress)
-    if diagnosis.found:
+        measurements = load(logs, model_file)
+        diagnosis = diagnose(measurements, model_file, progress=progress)
+        found = hidden_effects(measurements, model_file, progress)
+    if diagnosis.answer.added:
         say(
-            f"these logs show that {model_file.path} lacks {', '.join(diagnosis.found)}; "
+            f"these logs show that {model_file.path} lacks {', '.join(diagnosis.answer.added)}; "
             "twinmill explain adds it. What follows is of the model as it is."
         )
-    found = hidden_effects(diagnosis)
     folder.mkdir(parents=True, exist_ok=True)
     write_whole(kept, json.dumps({"of": key, "hidden": [one.to_json() for one in found]}, indent=1))
     return found

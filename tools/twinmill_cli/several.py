@@ -17,8 +17,11 @@ OF_SEVERAL = {
     "heard of it": "heard of them",
     "its link": "their link",
     "its operator": "their operator",
+    "holds it": "holds them",
     "it had": "they had",
     "it did": "they did",
+    "it was halted": "they were halted",
+    "it obeyed": "they obeyed",
     "it stood": "they stood",
     "it has": "they have",
     "has it": "have they",
@@ -33,7 +36,10 @@ OF_SEVERAL = {
     "and has forgotten": "and have forgotten",
     "and was not": "and were not",
     "and is left alone": "and are left alone",
+    "was started, and drives": "were started, and drive",
     "and drives": "and drive",
+    "and stands": "and stand",
+    "waits for a start and begins by itself": "wait for a start and begin by themselves",
     "and has not confirmed": "and have not confirmed",
     "and obeys": "and obey",
 }
@@ -54,6 +60,5 @@ def of(robots: Sized, words: str) -> str:
     """Words on one robot, as they are said of these; a verb may stand first, behind their names."""
     if len(robots) == 1:
         return words
-    verb, space, rest = words.partition(" ")
-    words = f"{VERBS.get(verb, verb)}{space}{rest}"
+    words = re.sub(r"^\w+", lambda verb: VERBS.get(verb[0], verb[0]), words)
     return PATTERN.sub(lambda found: OF_SEVERAL[found[1]], words)

@@ -58,7 +58,6 @@ void TakeOwnNumbers(EffectInstance &effect)
 }
 
 constexpr double kSpeedPrior_mps = 0.15;  // of a speed of the duty table
-constexpr double kUsualLag_s = 0.06;      // of a small geared motor
 constexpr std::string_view kTable = "base.wheel_speed_mps.";
 
 // Speed `i` of the duty table.
@@ -247,21 +246,6 @@ std::vector<Inert> Model::InertIn(PlantKind plant) const
     if (base.drive != Drive::kSteering)
         name("base.steering_per_input_rad", "the robot is not commanded by its steering angle");
     return inert;
-}
-
-Model Model::Form() const
-{
-    Model form = *this;
-    const Base usual;
-    form.effects.clear();
-    form.robot_overrides.clear();
-    form.theta_a1 = form.theta_a2 = 1;
-    form.base.forward_gain = form.base.sideways_gain = form.base.yaw_gain = 1;
-    form.base.motor_lag_s = kUsualLag_s;
-    form.base.steering_lag_s = usual.steering_lag_s;
-    form.base.duty_pct = {0, 20, 40, 60, 80, 100};
-    form.base.wheel_speed_mps = {0, 0.072, 0.144, 0.216, 0.288, 0.36};
-    return form;
 }
 
 Model Model::ForRobot(int robot_id) const

@@ -458,8 +458,10 @@ std::string FindModelFile(const std::string &name)
     std::string list;
     for (const std::string &other : others)
         list += (list.empty() ? "" : ", ") + other;
-    Fail(name, "no such file here, nor among the installed models (" +
-                   (list.empty() ? "none in " + InstalledModels().string() : list) + ")");
+    Fail(name,
+         "no such file here, nor among the installed models (" +
+             (list.empty() ? "none in " + InstalledModels().lexically_normal().string() : list) +
+             ")");
 }
 
 }  // namespace twin

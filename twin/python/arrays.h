@@ -18,7 +18,6 @@ namespace nb = nanobind;
 using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using Matrix = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Cube = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
-using Cubes = nb::ndarray<const double, nb::ndim<4>, nb::c_contig, nb::device::cpu>;
 using Indices = nb::ndarray<const int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using IndexMatrix = nb::ndarray<const int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Array = nb::ndarray<nb::numpy, double>;
@@ -52,10 +51,7 @@ void BindEvents(nb::module_ &m);
 // Adds sums and filters over time.
 void BindSeries(nb::module_ &m);
 
-// Adds regressions judged on what they were not fitted to.
-void BindHeldOut(nb::module_ &m);
-
-// Adds products of columns by block.
+// Adds gains in evidence by products of columns.
 void BindProducts(nb::module_ &m);
 
 // Adds what the module knows of swarms.

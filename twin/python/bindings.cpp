@@ -325,19 +325,6 @@ Array OneStep(const Model &model, const PyTrack &track)
     return ToNumpy(PredictOneStep(model, track.View()), {track.pose_t_s.size(), 3});
 }
 
-Array Velocities(const std::vector<Model> &models, const PyTrack &track, Indices poses)
-{
-    for (const int64_t pose : Span(poses))
-        if (pose < 0 || static_cast<size_t>(pose) >= track.pose_t_s.size())
-            throw std::invalid_argument("poses must be rows of the track's poses");
-    std::vector<double> velocities;
-    {
-        nb::gil_scoped_release unlocked;
-        velocities = PredictVelocities(models, track.View(), Span(poses));
-    }
-    return ToNumpy(std::move(velocities), {models.size(), poses.size(), 3});
-}
-
 Array OneStepBatch(const Model &model, const PyTrack &track, const std::vector<std::string> &names,
                    Matrix values)
 {
@@ -429,9 +416,6 @@ NB_MODULE(twinmill_native, m)
         .def("inert", &InertList, "plant"_a,
              "(name, why) of the numbers that were stated and do not act in 'planar' or 'mujoco'.")
         .def("for_robot", &Model::ForRobot, "robot_id"_a)
-        .def("form", &Model::Form,
-             "The robot's form alone: no effect, gains of 1, a usual lag, speeds in proportion to "
-             "the duty.")
         .def(
             "stated_of",
             [](const Model &model, int robot_id) {
@@ -471,9 +455,6 @@ NB_MODULE(twinmill_native, m)
 
     m.def("one_step", &OneStep, "model"_a, "track"_a,
           "(N, 3) poses predicted from the pose before each.");
-    m.def("velocities", &Velocities, "models"_a, "track"_a, "poses"_a,
-          "(B, K, 3) mean velocities in the body's axes, m/s and rad/s, in the steps that end at "
-          "`poses` (K,), ascending, of B models; 0 where a segment starts.");
     m.def("one_step_batch", &OneStepBatch, "model"_a, "track"_a, "names"_a, "values"_a,
           "(B, N, 3) one-step predictions for B rows of values.");
     m.def("steady", &Steady, "model"_a, "commands"_a, "names"_a, "values"_a,
@@ -503,7 +484,6 @@ NB_MODULE(twinmill_native, m)
           "From now on memory that was freed is used again and not given back to the system, which "
           "would hand it out anew, page by page.");
     BindEvents(m);
-    BindHeldOut(m);
     BindProducts(m);
     BindSeries(m);
     BindSwarms(m);

@@ -10,7 +10,7 @@ from twinmill.data.camera_frames import Frames
 from twinmill.data.log import RobotLog
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import Track, local_line
-from twinmill.fitting.floor import NoiseFloor
+from twinmill.estimation.opened import NoiseFloor
 from twinmill.predict.detections import Detections
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.regimes import HORIZON, regime_masks

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learns which physical effect a model lacks."""
+"""From logs to a better model: `inference` on one robot, several, or tables."""

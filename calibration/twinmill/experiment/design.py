@@ -13,7 +13,8 @@ from twinmill.data.measurement import SHORTEST_LOG_S, Measurement
 from twinmill.data.steady_table import SteadyTable
 from twinmill.data.track import Track
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.result import Diagnosis
+from twinmill.diagnosis.fleet import Fleet
+from twinmill.diagnosis.infer import Inference
 from twinmill.experiment.hypotheses import Hypotheses, candidate_effects, hypotheses_of, question
 from twinmill.experiment.information import CandidateEffect, FisherInformation
 from twinmill.experiment.moves import Axis, Move, duty_axes, family, twist_axes
@@ -21,8 +22,6 @@ from twinmill.experiment.played import LEAD_S, Played, Rows, rows_of
 from twinmill.experiment.power import power
 from twinmill.experiment.relevance import relevance
 from twinmill.fitting.fit import base_names
-from twinmill.inference.infer import Inference, infer
-from twinmill.inference.keeping import by_probabilities
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import base_parameters, catalogue_of
 from twinmill.predict.modelled_log import ModelledLog
@@ -37,7 +36,7 @@ CENTRE = np.zeros(3)
 DRIVES = ("duty", "twist")  # of robots that play scripts
 NO_LOG = (
     "only steady-state tables were given; the next run is designed for the noise and the clocks "
-    "of a log, so give one of any drive besides."
+    "of a log, so give one of any drive in their place."
 )
 
 
@@ -137,8 +136,6 @@ def plan_run(
 ) -> Plan:
     """Diagnoses logs, and designs the run that best names what they leave open.
 
-    One robot's poses are judged by probabilities.
-
     Args:
         measurements: the logs so far.
         model_file: that they are diagnosed with.
@@ -150,16 +147,12 @@ def plan_run(
         ValueError: no script can be within these limits, or none shows what is in question.
     """
     check(measurements, model_file, limits)
-    found: Diagnosis | Inference
-    if own or by_probabilities(measurements):
-        found = infer(measurements, model_file, own, progress)
-    else:
-        found = diagnose(measurements, model_file, progress)
+    found = diagnose(measurements, model_file, own, progress)
     return design(found, model_file, limits, progress)
 
 
 def design(
-    found: Diagnosis | Inference,
+    found: Inference | Fleet,
     model_file: ModelFile,
     limits: Limits,
     progress: Callable[[str], None],

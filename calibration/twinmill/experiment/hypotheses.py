@@ -8,20 +8,17 @@ from typing import Any
 import numpy as np
 import twinmill_native as native
 
-from twinmill.diagnosis.finding import Ranked
-from twinmill.diagnosis.result import Diagnosis
-from twinmill.diagnosis.trials import without_effect
+from twinmill.diagnosis.fleet import Fleet
+from twinmill.diagnosis.infer import Inference
+from twinmill.estimation.opened import Opened
 from twinmill.experiment.candidates import Candidate, candidates
 from twinmill.experiment.information import CandidateEffect
-from twinmill.experiment.screen import screen
-from twinmill.fitting.opening import Opened
-from twinmill.inference.infer import Inference
+from twinmill.experiment.screen import excesses
 from twinmill.model.parameters import (
     Parameter,
     all_effect_parameters,
     beginning_at_a_moment,
     catalogue_of,
-    key_of,
 )
 from twinmill.predict.modelled_log import ModelledLog
 
@@ -45,7 +42,6 @@ class Hypotheses:
     Attributes:
         alike: effects that the diagnosis could not tell apart.
         named: effects that it named; in question if another could imitate one of them after all.
-        hidden: effects that would not show.
         closest: the two most probable, for want of other questions.
         state: of the diagnosis, the effects alike or named taken out and the rest refitted; free
             is all of the base that the next run may show.
@@ -54,19 +50,18 @@ class Hypotheses:
 
     alike: list[str]
     named: list[str]
-    hidden: list[str]
     closest: list[str]
     state: State
     fitted: dict[str, dict[str, float]]
 
 
-def hypotheses_of(found: Diagnosis | Inference, base: list[Parameter]) -> Hypotheses:
-    """Open questions of a diagnosis; `base`: of the model, also ones these logs cannot tell."""
-    return _inferred(found, base) if isinstance(found, Inference) else _diagnosed(found, base)
+def hypotheses_of(found: Inference | Fleet, base: list[Parameter]) -> Hypotheses:
+    """Effects that are neither sure nor ruled out are alike; else those named are in question.
 
-
-def _inferred(found: Inference, base: list[Parameter]) -> Hypotheses:
-    """Effects that are neither sure nor ruled out are alike; else those named are in question."""
+    Args:
+        found: diagnosis of the logs so far.
+        base: of the model, also what these logs cannot tell.
+    """
     answer, once = found.answer, beginning_at_a_moment()  # another run cannot show the latter
     unsure = [name for name in answer.open if name not in once]
     sure = [f.effect for f in answer.findings if f.certainty == "sure" and f.effect not in once]
@@ -74,24 +69,10 @@ def _inferred(found: Inference, base: list[Parameter]) -> Hypotheses:
     return Hypotheses(
         alike,
         [] if alike else [*sure, *unsure],
-        [],
         [*answer.effects][:2],
         _state(found.opened, found.opened[0].model, base),
         {f.effect: {name: v for name, (v, _) in f.numbers.items()} for f in answer.findings},
     )
-
-
-def _diagnosed(diagnosis: Diagnosis, base: list[Parameter]) -> Hypotheses:
-    ranking = diagnosis.ranking
-    top = next((r.group for r in ranking if r.group is not None), None)
-    alike = [r.effect for r in ranking if r.group == top and top is not None]
-    named = [] if alike else diagnosis.motion
-    once = beginning_at_a_moment()  # in one run: another run cannot show them
-    hidden = [effect for effect, _ in diagnosis.not_identifiable if effect not in once]
-    closest = [r.effect for r in ranking[:2]]
-    state = _without(diagnosis, [*alike, *named], base)
-    told = [r for r in ranking if r.effect in (*alike, *named)]
-    return Hypotheses(alike, named, hidden, closest, state, _values(told))
 
 
 def question(
@@ -115,9 +96,6 @@ def question(
     if doubtful:
         doubtful = list(dict.fromkeys(doubtful))
         return doubtful, f"These logs hardly tell {_from(doubtful)}."
-    if asked.hidden:
-        shown = [n for n in asked.hidden if n in names] or asked.hidden
-        return shown, f"These logs cannot show {', '.join(shown)}."
     if len(asked.closest) > 1:
         first, second = asked.closest
         return (
@@ -148,13 +126,10 @@ def candidate_effects(
     shown, _ = candidates([*logs, planned])
     without = [s.white_errors() for s in logs]
     found = [(candidate, candidate.columns(logs, without)) for candidate, _ in shown]
-    tested = screen(logs, state.free, found).found
     cards = catalogue_of(logs[0].model)
     return [
-        CandidateEffect(
-            t.candidate, _whole(cards[t.candidate.effect], asked.fitted), max(t.excess, usual**2)
-        )
-        for t in tested
+        CandidateEffect(c, _whole(cards[c.effect], asked.fitted), max(excess, usual**2))
+        for (c, _), excess in zip(found, excesses(logs, state.free, found), strict=True)
     ]
 
 
@@ -172,14 +147,6 @@ def _whole(card: dict[str, Any], fitted: dict[str, dict[str, float]]) -> Candida
     )
 
 
-def _without(diagnosis: Diagnosis, names: list[str], base: list[Parameter]) -> State:
-    """The diagnosis' model without these effects, the rest refitted; its logs alone."""
-    last = diagnosis.search.last
-    for name in names:
-        last = without_effect(last, name) or last
-    return _state(diagnosis.opened, last.state.model, base)
-
-
 def _state(opened: Sequence[Opened], model: native.Model, base: list[Parameter]) -> State:
     logs = [
         (log.with_model(model), o.floor.rms)
@@ -188,11 +155,6 @@ def _state(opened: Sequence[Opened], model: native.Model, base: list[Parameter])
     ]
     free = [p.at(model.get(p.name)) for p in [*base, *all_effect_parameters(model)]]
     return State([log for log, _ in logs], free, [rms for _, rms in logs])
-
-
-def _values(ranked: list[Ranked]) -> dict[str, dict[str, float]]:
-    """Fitted parameters by effect and short name."""
-    return {r.effect: {key_of(e.name): e.value for e in r.parameters} for r in ranked}
 
 
 def _from(names: list[str]) -> str:

@@ -126,7 +126,7 @@ class Played:
             segment=self.part,
             heading_smooth=pose[:, 2],
             rest=np.zeros((0, 2)),
-            timing=Timing(old.timing.pose_period_s, old.timing.command_period_s, 0.0, 0.0),
+            timing=Timing(old.timing.pose_period_s, old.timing.command_period_s, 0.0),
             notes=[],
         )
         seen = Measurement("planned", "", track, [], 0)

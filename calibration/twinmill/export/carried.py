@@ -167,7 +167,8 @@ class RobotModel:
     def gains_left(self, where: str) -> list[Left]:
         """How far the real robot goes of what it is told, where wheels roll as they turn."""
         words = {"ahead": "ahead", "sideways": "sideways", "turning": "in turns"}
-        told = [f"{g:.3g} times as far {words[way]}" for way, g in self.gains().items() if g != 1]
+        gains = {way: f"{g:.3g}" for way, g in self.gains().items()}
+        told = [f"{g} times as far {words[way]}" for way, g in gains.items() if g != "1"]
         why = f"{where} the robot moves as told; the real one moves {', '.join(told)}"
         return [Left("gains of speed and turning", why)] if told else []
 

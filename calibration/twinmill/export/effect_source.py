@@ -13,7 +13,7 @@ import twinmill_native as native
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from twinmill.arguments import option
-from twinmill.diagnosis.trials import REFIT
+from twinmill.diagnosis.fleet import REFIT
 from twinmill.export.formula_cpp import in_cpp
 from twinmill.fitting.add import OWN_GAINS
 from twinmill.model.model_file import ModelError, ModelFile, write_whole

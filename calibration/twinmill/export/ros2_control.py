@@ -60,11 +60,11 @@ def _base_left(robot: RobotModel) -> list[Left]:
     if missing := [way for way in _axes(robot).values() if way not in known]:
         so = f"the controller has no limit of speed ({', '.join(missing)})"
         left.append(top_speed_left(robot, so))
-    forward, sideways = robot.get("base.forward_gain"), robot.get("base.sideways_gain")
-    if sideways != forward and robot.model.wheel_kind == "mecanum":
+    share = f"{robot.get('base.sideways_gain') / robot.get('base.forward_gain'):.3g}"
+    if share != "1" and robot.model.wheel_kind == "mecanum":
         why = (
             "ros2_control knows one wheel radius; sideways the real robot goes "
-            f"{sideways / forward:.3g} times as far as told"
+            f"{share} times as far as told"
         )
         left.append(Left("base.sideways_gain", why))
     return left

@@ -11,14 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomlkit
 import twinmill_native as native
 
 from twinmill.arguments import option
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.estimation.detection_fit import DetectionFit
+from twinmill.estimation.equations import check_states
+from twinmill.estimation.opened import Opened
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.fitting.compare import Comparison, comparison
-from twinmill.fitting.detection_fit import DetectionFit
-from twinmill.fitting.equations import check_states
 from twinmill.fitting.fit import (
     Choice,
     base_names,
@@ -33,7 +36,6 @@ from twinmill.fitting.fit import (
 from twinmill.fitting.formula_start import sized, with_time_constants
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
-    Opened,
     judged,
     lag_is_kept,
     lateness_changes,
@@ -41,7 +43,6 @@ from twinmill.fitting.opening import (
     untold_parts,
     wide_gains,
 )
-from twinmill.fitting.score_fit import ScoreFit
 from twinmill.fitting.starts import Left, projected, starts_of
 from twinmill.model.child_file import Fitted, child_of
 from twinmill.model.model_file import ModelError, ModelFile
@@ -55,6 +56,8 @@ from twinmill.model.parameters import (
     all_effect_parameters,
     base_parameters,
     begun_at,
+    card_of,
+    catalogue_name,
     effect_names,
     effect_parameters,
     is_of_camera,
@@ -212,6 +215,7 @@ def add_to_model(
     command: str,
     texts: dict[str, str] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
     held: Collection[str] = (),
     robot_id: int | None = None,
 ) -> AddResult:
@@ -225,6 +229,7 @@ def add_to_model(
         command: recorded in it.
         texts: the effect's formula and the like, by name.
         priors: mean and standard deviation of its parameters, by name, where they are known.
+        bounds: of its parameters, by name, where they are narrower than the catalogue's.
         held: names of quantities that keep their values; beside an effect of the camera all of the
             motion do.
         robot_id: of the robot that alone has it; by default all have.
@@ -239,6 +244,9 @@ def add_to_model(
             raise ValueError(f"{effect}: is of the camera, and is added to all robots alike.")
         return _add_to_camera(effect, measurements, model_file, path, command=command, held=held)
     richer, name, fresh = with_effect(model_file.model, effect, texts or {}, robot_id)
+    if bounds:
+        richer = _narrowed(model_file, richer, bounds)
+        fresh = effect_parameters(richer, name, fresh=True)
     opened = open_measurements(measurements, model_file)
     logs = {m.log_name: m.log_sha256 for m in measurements}
     told = model_file.known_from_other_logs(logs.values())
@@ -385,6 +393,23 @@ def with_effect(
             f"it can be fitted; write one before it, as in '{numbers_of(texts)[0]}*({text})'."
         )
     return richer, name, fresh
+
+
+def _narrowed(
+    file: ModelFile, richer: native.Model, bounds: Mapping[str, tuple[float, float]]
+) -> native.Model:
+    """The model of a file and its newest effect, that one's numbers within these bounds."""
+    name = effect_names(richer)[-1]
+    texts = {key: text for key, text in richer.texts[-1].items() if text}
+    table: dict[str, Any] = {"name": catalogue_name(name), **texts, "bounds": {}}
+    for p in card_of(richer, name)["parameters"]:
+        least, most = bounds.get(p["name"], (p["min"], p["max"]))
+        ends = [max(p["min"], least), min(p["max"], most)]
+        table["bounds"][p["name"]] = ends
+        table[p["name"]] = float(np.clip(richer.get(f"{name}.{p['name']}"), *ends))
+    document = tomlkit.parse(file.text)
+    document.setdefault("effect", tomlkit.aot()).append(tomlkit.item(table))
+    return ModelFile.of(file.path, tomlkit.dumps(document)).model
 
 
 def begun_at_best(

@@ -11,9 +11,9 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement, unsteady
 from twinmill.data.steady_table import SteadyTable
-from twinmill.fitting.equations import idle, said_of_unseen, unseen
-from twinmill.fitting.floor import NoiseFloor
-from twinmill.fitting.opening import Opened, open_measurements
+from twinmill.estimation.equations import idle, said_of_unseen, unseen
+from twinmill.estimation.opened import NoiseFloor, Opened
+from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     CLOCK,
@@ -32,7 +32,7 @@ from twinmill.predict.steady_errors import SteadyComparison, compare_steady
 from twinmill.predict.steady_states import SteadyStates
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
 
-# Scores: stop; something is missing; the smooth response is not good enough, or data leaked.
+# Scores: stop; something is missing; the best model found is not good enough, or data leaked.
 GOOD, MISSING, SUSPECT = 1.15, 1.3, 0.9
 LACKING = "Missing: "  # how a sentence on what a model lacks begins
 TELLING = 0.1  # of the most uneven wheel; the angle of one that is less so is hardly told
@@ -128,6 +128,7 @@ class RobotComparison:
             "robot_id": self.robot_id,
             "log": self.measurement.log_name,
             "score": self.score,
+            "score_by_chance": list(self.floor.by_chance),
             "floor_kind": self.floor.kind,
             "noise": self.modelled.known_noise.to_json(),
             "errors": self.error_rows(),
@@ -208,7 +209,7 @@ class Comparison:
         named = [f"{r.measurement.label} (score {r.score:.3g})" for r in missed[:NAMED]]
         more = len(missed) - len(named)
         named += [f"{more} more"] if more else []
-        rest = of_others(len(others), _meaning(total_score(others), nothing))
+        rest = _of_others(len(others), _meaning(total_score(others), nothing))
         return f"Missed: {', '.join(named)}. {rest}"
 
     def error_rows(self) -> list[dict[str, Any]]:
@@ -249,12 +250,9 @@ def _together(rows: Sequence[tuple[int, dict[str, Any]]]) -> dict[str, Any]:
     return first | dict(zip(("rms", "floor", "ratio"), means.tolist(), strict=True))
 
 
-def of_others(count: int, sentence: str) -> str:
+def _of_others(count: int, sentence: str) -> str:
     """A sentence on all robots but those that were named before."""
-    one = count == 1
-    if sentence.startswith(LACKING):
-        return f"{'The other lacks' if one else 'All others lack'} {sentence.removeprefix(LACKING)}"
-    return f"{'The other' if one else 'All others'}: {sentence[0].lower()}{sentence[1:]}"
+    return f"{'The other' if count == 1 else 'All others'}: {sentence[0].lower()}{sentence[1:]}"
 
 
 def _meaning(score: float, nothing: str) -> str:

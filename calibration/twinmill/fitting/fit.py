@@ -13,11 +13,13 @@ import twinmill_native as native
 from twinmill.chance import t_quantile
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.estimation.opened import Opened
+from twinmill.estimation.refit import acting_gains
+from twinmill.estimation.score_fit import ScoreFit
+from twinmill.estimation.settings import FIT_SETTINGS, FitSettings
 from twinmill.fitting.compare import Comparison, RobotComparison, comparison
-from twinmill.fitting.floor import acting_gains
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import (
-    Opened,
     judged,
     lag_is_kept,
     lateness_changes,
@@ -25,8 +27,6 @@ from twinmill.fitting.opening import (
     open_measurements,
 )
 from twinmill.fitting.residuals import Residuals, residuals_of
-from twinmill.fitting.score_fit import ScoreFit
-from twinmill.fitting.settings import FIT_SETTINGS, FitSettings
 from twinmill.model.covariance import Covariance
 from twinmill.model.model_file import ModelError, ModelFile, quantity_names
 from twinmill.model.parameters import (

@@ -11,9 +11,10 @@ from dataclasses import replace
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fitting.equations import finite
-from twinmill.fitting.opening import Judged, Opened, judged
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.estimation.equations import finite
+from twinmill.estimation.opened import Opened
+from twinmill.estimation.score_fit import ScoreFit
+from twinmill.fitting.opening import Judged, judged
 from twinmill.model.parameters import EFFECT_STEP, UNKNOWN, Parameter, words
 from twinmill.predict.datasets import ErrorDataset
 
@@ -28,7 +29,8 @@ def with_time_constants(
 ) -> list[Parameter]:
     """A formula's numbers, those of its rates begun where the others then explain most.
 
-    As they were where there is no such number, or none of the starts keeps the state finite.
+    As they were where there is no such number, or none of the starts is within its bounds and keeps
+    the state finite.
 
     Args:
         fresh: all numbers of the formula.
@@ -40,7 +42,7 @@ def with_time_constants(
     others = [p for p in fresh if p not in timed]
     known = judged(opened)
     best, least = None, np.inf
-    for value in _starts() if timed else ():
+    for value in _starts(timed) if timed else ():
         begun = [_begun_at(p, value) for p in timed]
         cost = _cost(known, begun, others)
         if cost < least:
@@ -48,10 +50,11 @@ def with_time_constants(
     return [best.get(p.name, p) for p in fresh] if best else list(fresh)
 
 
-def _starts() -> list[float]:
-    """Rates and times, of both signs."""
+def _starts(timed: Sequence[Parameter]) -> list[float]:
+    """Rates and times, of both signs, within the bounds of all these numbers."""
     sizes = sorted({*TIMES_S, *(1 / t for t in TIMES_S)})
-    return [sign * size for size in sizes for sign in (1.0, -1.0)]
+    both = [sign * size for size in sizes for sign in (1.0, -1.0)]
+    return [value for value in both if all(p.min <= value <= p.max for p in timed)]
 
 
 def _begun_at(p: Parameter, value: float) -> Parameter:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from twinmill.fitting.detection_fit import DetectionFit
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.estimation.detection_fit import DetectionFit
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.predict.datasets import Trajectory, total_score
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 

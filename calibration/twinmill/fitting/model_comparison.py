@@ -15,10 +15,10 @@ from scipy import optimize, stats
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.steady_table import SteadyTable
+from twinmill.estimation.score_fit import LEAST_SQUARE, ScoreFit
 from twinmill.fitting.fit import base_names, effects_free, fitted
 from twinmill.fitting.heldout import HeldOut
 from twinmill.fitting.opening import judged, open_measurements
-from twinmill.fitting.score_fit import LEAST_SQUARE, ScoreFit
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import base_parameters
 from twinmill.predict.datasets import PARTS

@@ -6,21 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from twinmill.arguments import option
-from twinmill.data.steady_table import SteadyTable
-from twinmill.fitting.opening import Opened
+from twinmill.data.steady_table import LACKS, SteadyTable
+from twinmill.estimation.opened import Opened
 from twinmill.model.parameters import beginning_at_a_moment, catalogue, making_late, needing
 
-# What a measurement must have for an effect to show, and what to say where it has not.
-LACKS = {
-    "changes": "acts only while the speed changes, and a steady table has no starts and stops",
-    "clocks": "a steady table has no clocks",
-    "poses": "a steady table has no poses",
-    "heading": "a steady table has no poses",
-    "room": "a steady table does not say where and in which direction of the room the robot drove",
-    "battery": "a steady table does not say how full the battery was",
-    "history": "a steady table does not say how long the robot had been driving",
-    "wheel_angle": "a steady table gives means over many turns of the wheels",
-}
 NO_HEADING = "the heading was not recorded, and what the robot holds is found"
 ONE_LOG = "it begins at a moment of one run, and these are several; diagnose one robot's log alone"
 CONTACTS = "predictions of one robot have no contacts; `twinmill swarm compare` looks at swarms"

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.fitting.compare import RobotComparison
-from twinmill.fitting.score_fit import ScoreFit
 from twinmill.predict import steady_states, windows
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.steady_errors import SteadyComparison

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 import twinmill_native as native
 
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.model.parameters import (
     LEVER_EFFECT,
     Parameter,
@@ -32,6 +32,7 @@ RADII = (0.12, 0.2, 0.35)  # of a patch, as a share of the longer side ...
 LEAST_RADIUS_M = 0.15  # ... and at least
 LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual one
 EVERY_S = 2.0  # between moments ...
+FINER = 10  # times which begin and end are looked for anew about those of the grid
 MOST_MOMENTS = 100  # ... of which there are no more
 SHORTEST_S = 4.0  # of what lasts for a while; what is shorter is a single moment
 NEVER_S = 1e5  # later than any log ends
@@ -201,8 +202,6 @@ def starts_of(
         return Whiles.of(candidate, rows) if lasts_for_a_while(name) else _moments(candidate, rows)
     if with_role(name, "place"):
         return _places(candidate, rows) if candidate.logs else None
-    if with_role(name, "radius"):
-        return Told.of_radius(candidate) if candidate.logs else None
     if name == LEVER_EFFECT:
         return Told.of_lever(candidate)
     return Grid.of(candidate, rows) if with_role(name, "limit") else None
@@ -213,13 +212,6 @@ class Told:
     """A start that the data sets tell by themselves."""
 
     start: dict[str, float]
-
-    @classmethod
-    def of_radius(cls, candidate: Candidate) -> "Told":
-        """Value for wheels whose radius the logs tell; the median of those that do."""
-        told = [d.radius_ratio for d in candidate.logs if d.radius_ratio != 1.0]
-        ratio = float(np.median(told)) if told else 1.0
-        return cls(dict.fromkeys(candidate.named("radius"), ratio))
 
     @classmethod
     def of_lever(cls, candidate: Candidate) -> "Told | None":
@@ -295,38 +287,46 @@ class Whiles:
     Attributes:
         keys: full names of begin and end.
         at_s: (T,) moments, s since the first command.
-        changes, shares: see Switched; of what never ends.
+        changes: see Switched; of what never ends.
+        datasets: of which they are.
     """
 
     keys: list[str]
     at_s: np.ndarray
     changes: list[np.ndarray]
-    shares: list[np.ndarray]
+    datasets: Sequence[Dataset]
 
     @classmethod
     def of(cls, candidate: Candidate, rows: Sequence[np.ndarray]) -> "Whiles":
         """Trial stretches of an effect that begins and ends."""
         begin, end = candidate.named("moment")
-        at_s = _grid_s(candidate)
         changes = _always_on(candidate, rows, {begin: 0.0, end: NEVER_S})
-        return cls([begin, end], at_s, changes, [_since(d, at_s) for d in candidate.datasets])
+        return cls([begin, end], _grid_s(candidate), changes, candidate.datasets)
 
     def best(self, left: Left) -> dict[str, float]:
-        """See Starts."""
-        count = len(self.at_s)
+        """See Starts; a robot may stand at a moment of the grid, where no fit gets on from."""
+        every_s = (self.at_s[-1] - self.at_s[0]) / (len(self.at_s) - 1)
+        beside_s = np.linspace(-every_s, every_s, 2 * FINER + 1)
+        found_s = self._among(self.at_s, left)
+        fine_s = np.unique(found_s[:, None] + beside_s)
+        return dict(zip(self.keys, self._among(fine_s, left).tolist(), strict=True))
+
+    def _among(self, at_s: np.ndarray, left: Left) -> np.ndarray:
+        """(2,) begin and end of these moments (T,) that take most of the rest."""
+        count = len(at_s)
         columns = (
-            (c * _of_rows(s)[:, None]).reshape(1, -1, c.shape[1])
-            for c, s in zip(self.changes, self.shares, strict=True)
+            (c * _of_rows(_since(d, at_s))[:, None]).reshape(1, -1, c.shape[1])
+            for c, d in zip(self.changes, self.datasets, strict=True)
         )
         moment, gram = left.products(columns)
         moment = moment.reshape(count, -1)
         gram = gram.reshape(count, moment.shape[1], count, -1).swapaxes(1, 2)
         a, b = np.triu_indices(count, 1)
-        long = self.at_s[b] - self.at_s[a] >= min(SHORTEST_S, self.at_s[-1] - self.at_s[0])
+        long = at_s[b] - at_s[a] >= min(SHORTEST_S, at_s[-1] - at_s[0])
         a, b = a[long], b[long]
         between = gram[a, a] + gram[b, b] - gram[a, b] - gram[b, a]
         k = int(np.argmax(_gains(moment[a] - moment[b], between)))
-        return dict(zip(self.keys, (float(self.at_s[a[k]]), float(self.at_s[b[k]])), strict=True))
+        return at_s[[a[k], b[k]]]
 
 
 def _always_on(

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-from twinmill.formulas.forms import A, C, D, Form, L
+from twinmill.formulas.forms import C, D, Form, L
 
 
 @dataclass(frozen=True)
@@ -60,10 +60,6 @@ NAMES = {
     "course": PLAIN,
     "t": Unit(s=ONE),
     "moves": PLAIN,
-    "u": PLAIN,
-    "left": PLAIN,
-    "front": PLAIN,
-    "lever": Unit(ONE),
     "target": Unit(ONE, -ONE),
 }
 ADDS_TO = {
@@ -96,12 +92,7 @@ def units_of(form: Form) -> list[str]:
         ValueError: the form adds or compares what differs in unit, or its rate is not one.
     """
     to = ADDS_TO[form.adds_to]
-    names = {
-        **NAMES,
-        "c": CONSTANTS[form.unit],
-        "l": NAMES["x"],
-        "u": CONSTANTS[form.command_unit],
-    }
+    names = {**NAMES, "c": CONSTANTS[form.unit], "l": NAMES["x"]}
     if form.state and not form.state.goal:
         names["s"] = _unit(form.state.rate, names) * NAMES["t"]
     elif form.state and form.state.swings:
@@ -118,7 +109,5 @@ def units_of(form: Form) -> list[str]:
 
 
 def _unit(text: str, names: dict[str, Unit]) -> Unit:
-    plain = text.replace(C, "c").replace(D, "1.0").replace(A, "1.0").replace(L, "l")
-    if "?" in plain:  # of one wheel, and 0 of the others
-        plain = plain.partition("?")[2].rpartition(":")[0].strip()
+    plain = text.replace(C, "c").replace(D, "1.0").replace(L, "l")
     return eval(plain, {"__builtins__": {}, **FUNCTIONS}, names) * PLAIN

@@ -190,7 +190,7 @@ def _conditioned(
         labels=tuple(labels[k] for k in kept),
         mean=mean[kept],
         cov=cov[np.ix_(kept, kept)],
-        kernels=tuple(size.items()),
+        kernels=tuple((k.name, size[k.name]) for k in there if not k.log_share),
         wander=wander,
         rate=grown.rate,
         usual=p.motion.usual,

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """From beliefs to an answer: verdict, findings with their certainty, what the rest depends on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -12,8 +12,11 @@ from twinmill.inference.discrepancy import NODES
 from twinmill.inference.posterior import Belief, beliefs
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import Numbers, Table
-from twinmill.model.parameters import catalogue, catalogue_name, instance_of
+from twinmill.model.parameters import WHERE_OR_WHEN, catalogue, catalogue_name, instance_of
 
+Set = TypeVar("Set", tuple[str, ...], frozenset[str])  # of effects
+
+LIKELY = 0.5  # probability from which something is said: likelier than not
 PASSES: tuple[Verdict, Verdict] = "model_adequate", "refit_enough"
 LARGEST_GROUP = 4  # names: more help nobody
 OF_SIZE = PRIORS.form / np.sqrt(NODES)  # error of an effect's size where its formula is off
@@ -38,7 +41,7 @@ class Named:
             model with the set of effects that is told, over the excess: what the base, refitted
             without a new effect, leaves beyond the noise's own squares. Errors are counted in
             standard deviations of the noise. At most 1.
-        numbers: parameter -> (value, standard deviation).
+        numbers: parameter -> (value, standard deviation); NaN where that is not known.
     """
 
     effect: str
@@ -82,8 +85,6 @@ class Answer:
             same excess as the share of an effect. Effects and dependences that change the same
             motion overlap, so that these shares do not add up to 1.
         added: the likeliest set of effects of the catalogue that are missing, each kind once.
-        numbers: of the likeliest model that has these.
-        refit: of the base with nothing that is missing.
     """
 
     verdict: Verdict
@@ -95,10 +96,8 @@ class Answer:
     depends_on: dict[str, float]
     share: float
     added: tuple[str, ...]
-    numbers: Numbers
-    refit: Numbers
 
-    def with_stale(self, chance: float) -> "Answer":
+    def with_stale(self, chance: float) -> Self:
         """With another probability that the base's numbers are stale, and the verdict by it."""
         verdict = self.verdict
         if verdict in PASSES:
@@ -124,7 +123,7 @@ class Answer:
             "verdict": self.verdict,
             "findings": findings,
             "found": [f.effect for f in self.findings],
-            "ranking": self._ranking(findings),
+            "ranking": ranking(self.effects, self.findings),
             "confusable_with": [*group[1:]],
             "probability": {
                 "nothing": self.nothing,
@@ -141,50 +140,69 @@ class Answer:
             "unexplained": {"depends_on": list(self.depends_on), "share": self.share},
         }
 
-    def _ranking(self, findings: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """All effects that were fitted, likeliest first; a p value is of another statistics."""
-        of_finding = {f["effect"]: f for f in findings}
-        groups = [f.group for f in self.findings if f.certainty == "group"]
-        rows = []
-        for name, probability in self.effects.items():
-            found = of_finding.get(name)
-            rows.append(
-                {
-                    "effect": name,
-                    "probability": probability,
-                    "score_heldout": None,
-                    "share_explained": found["share"] if found else None,
-                    "p_value": None,
-                    "parameters": found["parameters"] if found else [],
-                    "group": next((k for k, g in enumerate(groups, 1) if name in g), None),
-                }
-            )
-        return rows
+
+def ranking(
+    effects: dict[str, float], findings: list[Named], first: int = 1
+) -> list[dict[str, Any]]:
+    """All effects that were fitted, likeliest first; a p value is of another statistics.
+
+    Args:
+        effects: probability of each.
+        findings: those that are told.
+        first: number of the first group.
+    """
+    of_finding = {f.effect: f.to_json() for f in findings}
+    groups = [f.group for f in findings if f.certainty == "group"]
+    rows = []
+    for name, probability in effects.items():
+        found = of_finding.get(name)
+        rows.append(
+            {
+                "effect": name,
+                "probability": probability,
+                "score_heldout": None,
+                "share_explained": found["share"] if found else None,
+                "p_value": None,
+                "parameters": found["parameters"] if found else [],
+                "group": next((k for k, g in enumerate(groups, first) if name in g), None),
+            }
+        )
+    return rows
 
 
-def answer(table: Table) -> Answer:
-    """The answer with the least to explain away: the likeliest verdict, then the likeliest set."""
-    every = beliefs(table)
+@dataclass(frozen=True)
+class RobotAnswer(Answer):
+    """Verdict of one robot's log on a model, with the numbers of two of its models.
+
+    Attributes:
+        numbers: of the likeliest model that has what is added.
+        refit: of the base with nothing that is missing.
+    """
+
+    numbers: Numbers
+    refit: Numbers
+
+
+def answer(table: Table, every: list[Belief] | None = None) -> RobotAnswer:
+    """The answer with the least to explain away: the likeliest verdict, then the likeliest set.
+
+    Args:
+        table: evidence of all hypotheses.
+        every: their probabilities; None: by this table alone.
+    """
+    every = beliefs(table) if every is None else every
     nothing = sum(b.probability for b in every if b.nothing)
     outside = sum(b.probability for b in every if b.outside)
     something = nothing <= 1 - PRIORS.sure
     best = _likeliest(every, lambda b: tuple(sorted(b.fitted))) if something else ()
-    named = [_named(name, best, every, table) for name in _by_worth(best, table)]
-    told = [f for f in named if f.probability >= PRIORS.member]
-    findings = sorted(told, key=lambda f: -min(f.probability, PRIORS.sure))
+    findings = told([_named(name, best, every, table) for name in _by_worth(best, table)])
     stale = sum(b.probability for b in every if b.entry.stale)
-    if not something:
-        refit = sum(b.probability for b in every if b.nothing and b.entry.stale)
-        verdict = PASSES[refit > nothing / 2]
-        verdict = verdict if nothing >= 0.5 else "cannot_tell"
-    elif outside >= 0.5 or not findings:
-        verdict = "outside_catalogue"
-    else:
-        verdict = "ambiguous" if findings[0].certainty == "group" else "effect_missing"
+    refit = sum(b.probability for b in every if b.nothing and b.entry.stale) > nothing / 2
+    verdict = verdict_of(nothing, outside, findings, refit=refit)
     words, share = _rest(best, every, table) if something else ({}, 0.0)
     added = _likeliest(every, lambda b: tuple(sorted(b.effects)))
     own = max((b for b in every if tuple(sorted(b.effects)) == added), key=lambda b: b.probability)
-    return Answer(
+    return RobotAnswer(
         verdict,
         findings,
         nothing,
@@ -199,6 +217,28 @@ def answer(table: Table) -> Answer:
     )
 
 
+def told(named: list[Named]) -> list[Named]:
+    """Effects that are worth a word: those that are sure in the order given, then the likeliest."""
+    likely = [f for f in named if f.probability >= PRIORS.member]
+    return sorted(likely, key=lambda f: -min(f.probability, PRIORS.sure))
+
+
+def verdict_of(nothing: float, outside: float, findings: list[Named], *, refit: bool) -> Verdict:
+    """The verdict by the probabilities that nothing is missing, or nothing of the catalogue.
+
+    Args:
+        nothing: the first.
+        outside: the second.
+        findings: effects that are told.
+        refit: the base's numbers are stale if nothing is missing.
+    """
+    if nothing > 1 - PRIORS.sure:
+        return PASSES[refit] if nothing >= 0.5 else "cannot_tell"
+    if outside >= 0.5 or not findings:
+        return "outside_catalogue"
+    return "ambiguous" if findings[0].certainty == "group" else "effect_missing"
+
+
 def _of_each(every: list[Belief]) -> dict[str, float]:
     names = dict.fromkeys(name for b in every for name in b.effects)
     p = {name: sum(b.probability for b in every if name in b.effects) for name in names}
@@ -206,10 +246,16 @@ def _of_each(every: list[Belief]) -> dict[str, float]:
 
 
 def _likeliest(every: list[Belief], key: Callable[[Belief], tuple[str, ...]]) -> tuple[str, ...]:
-    total: dict[tuple[str, ...], float] = {}
-    for b in every:
-        total[key(b)] = total.get(key(b), 0.0) + b.probability
+    total = summed((key(b), b.probability) for b in every)
     return max(total, key=total.__getitem__)
+
+
+def summed(rows: Iterable[tuple[Set, float]]) -> dict[Set, float]:
+    """Probability of each of the sets that rows are of, in their order."""
+    total: dict[Set, float] = {}
+    for key, p in rows:
+        total[key] = total.get(key, 0.0) + p
+    return total
 
 
 def _by_worth(best: tuple[str, ...], table: Table) -> list[str]:
@@ -222,25 +268,41 @@ def _by_worth(best: tuple[str, ...], table: Table) -> list[str]:
 
 
 def _named(name: str, best: tuple[str, ...], every: list[Belief], table: Table) -> Named:
-    p = sum(b.probability for b in every if name in b.effects)
-    rest = set(best) - {name}
+    sets = [(frozenset(b.effects), b.probability) for b in every]
+    return Named(
+        name,
+        *certain_of(name, best, sets),
+        _share(name, best, every, table),
+        _averaged(name, every, table),
+    )
+
+
+def certain_of(
+    name: str, best: Collection[str], sets: Iterable[tuple[frozenset[str], float]]
+) -> tuple[float, tuple[str, ...], float, Certainty]:
+    """Probability of an effect, its group with that of one of the group, and its certainty.
+
+    Args:
+        name: of the effect.
+        best: set that is told, which has it.
+        sets: of missing effects, with their probabilities.
+    """
+    sets = list(sets)
+    p = sum(chance for effects, chance in sets if name in effects)
+    rest = frozenset(best) - {name}
     instead: dict[str, float] = {}
-    for b in every:
-        if name not in b.effects and rest <= set(b.effects):
-            for other in set(b.effects) - rest:
-                instead[other] = instead.get(other, 0.0) + b.probability
+    for effects, chance in sets:
+        if name not in effects and rest <= effects:
+            for other in effects - rest:
+                instead[other] = instead.get(other, 0.0) + chance
     likely = sorted(
         (n for n, v in instead.items() if v >= PRIORS.member), key=lambda n: -instead[n]
     )
     group = (name, *likely)[:LARGEST_GROUP]
-    total = sum(b.probability for b in every if set(group) & set(b.effects))
-    certainty: Certainty = "doubtful"
+    total = sum(chance for effects, chance in sets if effects & set(group))
     if p >= PRIORS.sure:
-        certainty, group = "sure", (name,)
-    elif total >= PRIORS.sure and len(group) > 1:
-        certainty = "group"
-    share = _share(name, best, every, table)
-    return Named(name, p, group, total, certainty, share, _averaged(name, every, table))
+        return p, (name,), total, "sure"
+    return p, group, total, "group" if total >= PRIORS.sure and len(group) > 1 else "doubtful"
 
 
 def _share(name: str, best: tuple[str, ...], every: list[Belief], table: Table) -> float:
@@ -274,7 +336,15 @@ def _averaged(name: str, every: list[Belief], table: Table) -> dict[str, tuple[f
         mean = float(shares @ values)
         spread = float(np.hypot(np.sqrt(shares @ (stds**2 + (values - mean) ** 2)), OF_SIZE * mean))
         found[label.split(".", 1)[1]] = mean, spread
-    return found
+    likely = table.numbers[sets[int(np.argmax(shares))]].model
+    return _where(name, instance_of(own[0]), likely) | found
+
+
+def _where(name: str, instance: str, model: Any) -> dict[str, tuple[float, float]]:
+    """Numbers that say where or when an effect acts, as fitted; their errors are not known."""
+    cards = catalogue().get(name, {}).get("parameters", ())
+    keys = [p["name"] for p in cards if p["role"] in (*WHERE_OR_WHEN, "limit")]
+    return {key: (float(model.get(f"{instance}.{key}")), float("nan")) for key in keys}
 
 
 def _rest(

@@ -10,6 +10,7 @@ import numpy as np
 from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import WHERE_OR_WHEN, Parameter
 
+FAR = 10.0  # standard deviation of unusual sizes over that of usual ones: a tracked point on a mast
 LIMITS = np.geomspace(0.25, 8.0, 16)  # times the usual limit: each a fifth more than the last
 
 

@@ -7,7 +7,7 @@ each has, so that a size of one is a gain error of one (Rasmussen and Williams 2
 A kernel's size is integrated over SIZES.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,12 +42,14 @@ class Kernel:
         columns: (K, W, 3) in m and rad, for a gain of one, scaled by the share of the variance.
         lasting: the function holds for other logs, too (of speed, heading, past); else only its
             size does (of time, place).
+        log_share: of its prior odds, less than those of the other forms if it is one of many.
     """
 
     depends_on: str
     name: str
     columns: np.ndarray = field(repr=False)
     lasting: bool
+    log_share: float = 0.0
 
 
 def in_another_log(own: np.ndarray) -> np.ndarray:
@@ -62,8 +64,13 @@ def in_another_log(own: np.ndarray) -> np.ndarray:
     return own @ np.diff(below, axis=2).mean(axis=1)
 
 
-def kernels(m: Motion) -> list[Kernel]:
-    """All forms of dependences that compete, of the motion of one log."""
+def kernels(m: Motion, among: Collection[str] | None = None) -> list[Kernel]:
+    """All forms of dependences that compete, of the motion of one log.
+
+    Args:
+        m: the motion.
+        among: dependences that it can show; None for all.
+    """
     found = []
     families = {
         TIME: (_of_time, False),
@@ -74,6 +81,8 @@ def kernels(m: Motion) -> list[Kernel]:
         "past": (_of_past, True),
     }
     for word, (family, lasting) in families.items():
+        if among is not None and word not in among:
+            continue
         for name, columns, share in family(m):
             scaled = columns * np.sqrt(np.broadcast_to(share, len(columns)))[:, None, None]
             # all columns stay, those of no use in this log too: another log's have the same places
@@ -98,19 +107,30 @@ def forms_of(change: np.ndarray, m: Motion) -> tuple[np.ndarray, ...]:
         change: (W, 3) of the prediction by the effect, m and rad.
         m: the motion.
     """
-    travel = np.hypot(m.moved[:, 0], m.moved[:, 1])
     in_time, of_time = waves(m.t_s, 6.0, 3.0)
     in_place, of_place = _over_floor(m, 6)
     forms = (
-        hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES),
-        hats(travel, m.top[3], NODES),
-        hats(np.abs(m.moved[:, 2]), m.top[4], NODES),
+        *forms_of_speed(m),
         np.sqrt(of_time)[:, None] * in_time,
         np.sqrt(of_place)[:, None] * in_place,
         np.sqrt(np.repeat(OF_ORDERS, 2) / 2)[:, None] * harmonics(m.heading, ORDERS),
     )
     late = np.array([_later(change, n) for n in range(1, LATEST + 1)])
     each = *(f[:, :, None] * change for f in forms), np.sqrt(FADING[1:, None, None]) * late
+    return without_size(each, change)
+
+
+def forms_of_speed(m: Motion) -> tuple[np.ndarray, ...]:
+    """(K, W) smooth functions of how fast the robot is along its fastest axis, travels, turns."""
+    return (
+        hats((np.abs(m.moved) / m.top[:3]).max(axis=1), 1.0, NODES),
+        hats(np.hypot(m.moved[:, 0], m.moved[:, 1]), m.top[3], NODES),
+        hats(np.abs(m.moved[:, 2]), m.top[4], NODES),
+    )
+
+
+def without_size(each: Iterable[np.ndarray], change: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Arrays (K, W, C) without the part that is (W, C) the change itself."""
     unit = change / max(np.sqrt(np.sum(change**2)), 1e-300)
     return tuple(c - np.tensordot(c, unit, 2)[:, None, None] * unit for c in each)
 
@@ -121,48 +141,48 @@ Form = tuple[str, np.ndarray, np.ndarray | float]
 def _of_time(m: Motion) -> Iterator[Form]:
     for name, shortest_s, smooth_s in (("slow", 12.0, 8.0), ("quick", 3.0, 1.5)):
         w, share = waves(m.t_s, shortest_s, smooth_s, most=120)  # those of a log of three minutes
-        yield f"{name} gain", _gains(m, w, "all"), share
-        yield f"{name} gain of travel", _gains(m, w, "travel"), share
-        yield f"{name} gain of turns", _gains(m, w, "turn"), share
+        yield f"{name} gain", gains(m, w, "all"), share
+        yield f"{name} gain of travel", gains(m, w, "travel"), share
+        yield f"{name} gain of turns", gains(m, w, "turn"), share
         if name == "slow":
-            yield f"{name} way aside", _aside(m, w), share
+            yield f"{name} way aside", way_aside(m, w), share
     w, share = waves(m.t_s, 8.0, 4.0)
-    yield "push", _pushes(m, w, "room"), np.tile(share, 2)
-    yield "turning", _pushes(m, w, "turn"), share
+    yield "push", pushes(m, w, "room"), np.tile(share, 2)
+    yield "turning", pushes(m, w, "turn"), share
 
 
 def _of_place(m: Motion) -> Iterator[Form]:
     w, share = _over_floor(m, 6)
-    yield "gain of travel", _gains(m, w, "travel"), share
-    yield "gain of all", _gains(m, w, "all"), share
-    yield "gain of turns", _gains(m, w, "turn"), share
-    yield "push", _pushes(m, w, "room"), np.tile(share, 2)
-    yield "push of the body", _pushes(m, w, "body"), np.tile(share, 2)
-    yield "turning", _pushes(m, w, "turn"), share
-    yield "way aside", _aside(m, w), share
+    yield "gain of travel", gains(m, w, "travel"), share
+    yield "gain of all", gains(m, w, "all"), share
+    yield "gain of turns", gains(m, w, "turn"), share
+    yield "push", pushes(m, w, "room"), np.tile(share, 2)
+    yield "push of the body", pushes(m, w, "body"), np.tile(share, 2)
+    yield "turning", pushes(m, w, "turn"), share
+    yield "way aside", way_aside(m, w), share
     (wx, share_x), (wy, share_y) = (waves(p, 0.4, 0.12) for p in m.place.T)
     both = np.concatenate([share_x, share_y]) / 2
     strips = np.concatenate([wx, wy])
-    yield "strips both ways", _gains(m, strips, "travel"), both
-    yield "strips both ways, of all", _gains(m, strips, "all"), both
-    yield "push of the body by strips", _pushes(m, strips, "body"), np.tile(both, 2)
-    yield "turning by strips", _pushes(m, strips, "turn"), both
-    yield "strips along x", _gains(m, wx, "travel"), share_x
-    yield "strips along y", _gains(m, wy, "travel"), share_y
+    yield "strips both ways", gains(m, strips, "travel"), both
+    yield "strips both ways, of all", gains(m, strips, "all"), both
+    yield "push of the body by strips", pushes(m, strips, "body"), np.tile(both, 2)
+    yield "turning by strips", pushes(m, strips, "turn"), both
+    yield "strips along x", gains(m, wx, "travel"), share_x
+    yield "strips along y", gains(m, wy, "travel"), share_y
 
 
 def _of_heading(m: Motion) -> Iterator[Form]:
     low, high = harmonics(m.heading, (1, 2)), harmonics(m.heading, (3, 4))
-    yield "gain of travel", _gains(m, low, "travel"), 1 / 4
-    yield "gain of turns", _gains(m, low, "turn"), 1 / 4
+    yield "gain of travel", gains(m, low, "travel"), 1 / 4
+    yield "gain of turns", gains(m, low, "turn"), 1 / 4
     yield "compass, twice a turn", _compass(m, (2,)), 1 / 2
     yield "compass", _compass(m, (1, 2, 3)), np.repeat((0.5, 0.25, 0.1), 2)
-    yield "push of the body", _pushes(m, low, "body"), 1 / 4
-    yield "turning", _pushes(m, low, "turn"), 1 / 4
-    yield "gain, up to four times a turn", _gains(m, np.concatenate([low, high]), "all"), 1 / 8
+    yield "push of the body", pushes(m, low, "body"), 1 / 4
+    yield "turning", pushes(m, low, "turn"), 1 / 4
+    yield "gain, up to four times a turn", gains(m, np.concatenate([low, high]), "all"), 1 / 8
     course = m.heading + np.arctan2(m.moved[:, 1], m.moved[:, 0])
-    yield "gain by course", _gains(m, harmonics(course, (1, 2, 4)), "travel"), 1 / 6
-    yield "way aside by course", _aside(m, harmonics(course, (1, 2, 4))), 1 / 6
+    yield "gain by course", gains(m, harmonics(course, (1, 2, 4)), "travel"), 1 / 6
+    yield "way aside by course", way_aside(m, harmonics(course, (1, 2, 4))), 1 / 6
 
 
 def _of_speed(m: Motion) -> Iterator[Form]:
@@ -183,8 +203,8 @@ def _of_speed(m: Motion) -> Iterator[Form]:
     ]
     yield "curve that differs backwards", np.concatenate(signed), 1 / 4
     fast = hats(speed, m.top[3], NODES)[1:]
-    yield "push of the body", _pushes(m, fast, "body"), 1 / 4
-    yield "turning", _pushes(m, fast, "turn"), 1 / 4
+    yield "push of the body", pushes(m, fast, "body"), 1 / 4
+    yield "turning", pushes(m, fast, "turn"), 1 / 4
 
 
 def _of_coupling(m: Motion) -> Iterator[Form]:
@@ -229,7 +249,7 @@ def _of_past(m: Motion) -> Iterator[Form]:
     ]
     own = [b[:, None] * m.moved * axes[k % 3] for k, b in enumerate(back)]
     yield "after turning back", np.array(own), 1 / 2
-    yield "turning after turning back", _pushes(m, np.array(back), "turn"), 1 / 6
+    yield "turning after turning back", pushes(m, np.array(back), "turn"), 1 / 6
 
 
 def _terms(terms: Sequence[tuple[np.ndarray, int]], usual: np.ndarray) -> np.ndarray:
@@ -257,18 +277,18 @@ def _later(values: np.ndarray, steps: int) -> np.ndarray:
     return moved
 
 
-def _gains(m: Motion, waves: np.ndarray, which: str) -> np.ndarray:
+def gains(m: Motion, waves: np.ndarray, which: str) -> np.ndarray:
     """(K, W, 3) displacements scaled by (K, W) waves: of travel, turns, or all alike."""
     on = {"travel": (1, 1, 0), "turn": (0, 0, 1), "all": (1, 1, 1)}[which]
     return waves[:, :, None] * (m.moved * on)
 
 
-def _aside(m: Motion, waves: np.ndarray) -> np.ndarray:
+def way_aside(m: Motion, waves: np.ndarray) -> np.ndarray:
     """(K, W, 3) displacements led aside by (K, W) waves: a heading that is off does the same."""
     return waves[:, :, None] * np.column_stack([-m.moved[:, 1], m.moved[:, 0], 0 * m.t_s])
 
 
-def _pushes(m: Motion, waves: np.ndarray, frame: str) -> np.ndarray:
+def pushes(m: Motion, waves: np.ndarray, frame: str) -> np.ndarray:
     """(K', W, 3) displacements while the robot moves: along the room, the body, or a turn."""
     c, s, zero = np.cos(m.heading), np.sin(m.heading), np.zeros(len(m.heading))
     ways = {

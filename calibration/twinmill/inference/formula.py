@@ -9,7 +9,7 @@ functions have: shares of the motion.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,10 +20,8 @@ from twinmill.formulas.forms import (
     MOST_NUMBERS,
     ROOM,
     Form,
-    joined,
     names_of,
     own_forms,
-    with_rates,
 )
 from twinmill.formulas.forms import STARTS as REST
 from twinmill.formulas.term import CHANGE, COUPLING, PAST, PLACE, TIME, WAY, times
@@ -31,7 +29,7 @@ from twinmill.formulas.units import units_of
 from twinmill.inference.discrepancy import CHANCE, SIZES
 from twinmill.inference.discrepancy import TIME as OF_TIME
 from twinmill.inference.evidence import Linear, gains_by_size
-from twinmill.inference.search import Evidence, Search
+from twinmill.inference.search import Evidence, Search, evidence
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion
 from twinmill.model.parameters import drives_sideways, newest_instance
@@ -46,7 +44,7 @@ GROUPS = {  # of forms, by the word of an answer
     "past": (PAST, CHANGE, REST),
 }
 PAIRS = tuple((f"cos({times(n, 'theta')})", f"sin({times(n, 'theta')})") for n in (1, 2))
-BESIDE = (  # forms that the older engine has in its library of single terms
+BESIDE = (  # forms beside those that follow from a motion
     Form("motion", ("t",), TIME),
     Form("omega_radps", ("t*omega",), TIME),
     Form("motion", ("x", "y"), PLACE),
@@ -96,7 +94,7 @@ class Formula:
     @property
     def texts(self) -> dict[str, str]:
         """Texts of the effect `equation`."""
-        return joined([self.form])
+        return self.form.equation
 
     @property
     def units(self) -> list[str]:
@@ -116,7 +114,7 @@ class Formula:
     @property
     def text(self) -> str:
         """With its numbers in place of their names."""
-        told = with_rates([self.form], [f"{value:.3g}" for value in self.values])
+        told = self.form.told([f"{value:.3g}" for value in self.values])
         return f"{self.form.adds_to} += {told}"
 
     @property
@@ -162,6 +160,7 @@ def formula_of(
     """
     if not words or words[0] not in GROUPS:
         return None
+    own = _where_they_hold(search, own, words)
     fitting = _Fitting(search, own, _beside(search, own, words[1:]), motion)
     forms = _forms(words[0], motion, own.hypothesis.model)
     tried = [t for form in forms if (t := fitting.tried(form)) is not None]
@@ -176,6 +175,17 @@ def formula_of(
     odds = np.log(PRIORS.alike / (1 - PRIORS.alike)) + listed - fitting.smooth(words[0])
     values, stds = fitting.numbers(best)
     return Formula(words[0], best.form, values, stds, float(expit(odds)))
+
+
+def _where_they_hold(search: Search, own: Evidence, words: Sequence[str]) -> Evidence:
+    """A set of effects, linear about the numbers that it has beside some dependences.
+
+    Alone it may have numbers that stand in for them, where an equation changes something else.
+    """
+    h, fitter = own.hypothesis, search.view.fitter
+    value, _ = h.posterior(_beside(search, own, words))
+    there = fitter.at(replace(h, value=np.clip(value, h.low, h.high)))
+    return evidence(there, search.view, there.linear(fitter))
 
 
 def _beside(search: Search, own: Evidence, words: Sequence[str]) -> Linear:
@@ -193,7 +203,7 @@ def _forms(word: str, m: Motion, model: Any) -> list[Form]:
     """Forms that depend on it."""
     names = names_of(m.moved / m.step_s[:, None], m.place, m.heading, m.t_s - m.t_s[0])
     sideways = drives_sideways(model)
-    every = [*BESIDE, *own_forms(names, 0.0, sideways, bool(model.wheels()))]
+    every = [*BESIDE, *own_forms(names, sideways, bool(model.wheels()))]
     return [f for f in every if f.group in GROUPS[word] and (sideways or f.adds_to != "vy_mps")]
 
 
@@ -245,7 +255,7 @@ class _Fitting:
     def _changes(self, form: Form) -> np.ndarray:
         """(k, W, 3) change of the prediction with each number of a form."""
         model = self.own.hypothesis.model.copy()
-        model.add_effect("equation", joined([form]))
+        model.add_effect("equation", form.equation)
         instance, count = newest_instance(model, "equation"), len(form.shapes)
         names = [f"{instance}.p{k}" for k in range(count)]
         points = np.concatenate([np.zeros((1, count)), PROBE * np.eye(count)])

@@ -8,6 +8,7 @@ import numpy as np
 import twinmill_native as native
 from scipy.linalg import block_diag
 
+from twinmill.inference.curve import straight
 from twinmill.inference.duties import TABLE
 from twinmill.inference.formula import Formula
 from twinmill.inference.table import Numbers
@@ -15,6 +16,7 @@ from twinmill.model.covariance import Covariance
 from twinmill.model.parameters import (
     ParameterEstimate,
     catalogue_name,
+    duty_table,
     effect_names,
     instance_of,
     key_of,
@@ -40,19 +42,25 @@ class FoundModel:
 
 
 def found_model(given: native.Model, numbers: Numbers, let_in: Collection[str]) -> FoundModel:
-    """Estimates of the given model's own quantities: of a refined table every second node is one.
+    """Estimates of a model's own quantities: of a refined table all, or every second node is one.
+
+    In the second case the others lie on straight lines between these.
 
     Args:
-        given: the robot's model, which stays as it is.
+        given: the robot's model, whose table is refined or not; it stays as it is.
         numbers: of a hypothesis.
         let_in: kinds of effects that the model gets; others of the hypothesis stay out.
     """
+    table = sum(label.startswith(TABLE) for label in numbers.labels)
+    apart = table // max(len(duty_table(given)), 1)
+    if apart > 1:
+        numbers = straight(numbers)
     model, name_of = _with_effects(given, numbers, let_in)
     entries = {v["name"]: v for v in model.values()}
     names_at = [
         (k, name)
         for k, label in enumerate(numbers.labels)
-        if (name := _name(label, name_of, model.drive)) in entries
+        if (name := _name(label, name_of, apart)) in entries
     ]
     at, names = [k for k, _ in names_at], tuple(name for _, name in names_at)
     mean, cov = numbers.alone @ numbers.mean, numbers.alone @ numbers.cov @ numbers.alone.T
@@ -112,11 +120,17 @@ def _with_effects(
     return model, name_of
 
 
-def _name(label: str, name_of: dict[str, str], drive: str) -> str:
-    """Name in the given model of what a hypothesis calls so; empty if it has none."""
+def _name(label: str, name_of: dict[str, str], apart: int) -> str:
+    """Name in the given model of what a hypothesis calls so; empty if it has none.
+
+    Args:
+        label: in the hypothesis.
+        name_of: instances of effects there and here.
+        apart: nodes of the hypothesis's table from one of the model's to the next; 0 without one.
+    """
     if instance_of(label) in name_of:
         return f"{name_of[instance_of(label)]}.{key_of(label)}"
-    if drive == "duty" and label.startswith(TABLE):
+    if apart and label.startswith(TABLE):
         node = int(label.removeprefix(TABLE))
-        return f"{TABLE}{node // 2}" if node % 2 == 0 else ""
+        return "" if node % apart else f"{TABLE}{node // apart}"
     return label

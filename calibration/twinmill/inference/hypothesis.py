@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.special import log_ndtr
 
-from twinmill.inference.candidate import Candidate, size_std
+from twinmill.inference.candidate import FAR, Candidate, is_size, size_std
 from twinmill.inference.evidence import Columns, Linear
 from twinmill.inference.noise import Noise
 from twinmill.inference.prior import Prior
+from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import (
     WHERE_OR_WHEN,
     catalogue_name,
@@ -127,18 +128,9 @@ class Hypothesis(Guess):
         at_mean = self.errors + np.tensordot(self.value - self.mean, self.slopes, 1)
         return at_mean, columns if beside is None else np.concatenate([columns, beside])
 
-    def linear(
-        self, fitter: "Fitter", cov: np.ndarray | None = None, rows: np.ndarray | None = None
-    ) -> Linear:
-        """The linear model about the best numbers.
-
-        Args:
-            fitter: of the log.
-            cov: in the place of the prior's.
-            rows: as of `rows`, if they are known.
-        """
-        rows = self.rows(fitter) if rows is None else rows
-        root = np.linalg.cholesky(self.cov if cov is None else cov)
+    def linear(self, fitter: "Fitter") -> Linear:
+        """The linear model of a log about the best numbers."""
+        rows, root = self.rows(fitter), np.linalg.cholesky(self.cov)
         roots = np.zeros((len(rows), len(root))), root[~self.named]
         roots[0][: self.named.sum()] = root[self.named]
         products, beside = rows @ rows.T, rows @ fitter.always.T
@@ -203,8 +195,21 @@ class Fitter:
         """(K, K) their products."""
         return self.always @ self.always.T
 
-    def fit(self, h: Guess, rounds: int = ROUNDS, kept: np.ndarray = NO_SLOPES) -> Hypothesis:
-        """Levenberg and Marquardt from its numbers; (K, W, 3) first slopes are kept."""
+    def fit(
+        self,
+        h: Guess,
+        rounds: int = ROUNDS,
+        kept: np.ndarray = NO_SLOPES,
+        known: np.ndarray | None = None,
+    ) -> Hypothesis:
+        """Levenberg and Marquardt from its numbers.
+
+        Args:
+            h: with these numbers.
+            rounds: at most.
+            kept: (K, W, 3) first slopes, as they were elsewhere; they stay.
+            known: (N, W, 3) all slopes at its numbers, where they are known.
+        """
         precision = np.linalg.inv(h.cov)
         value, damping = np.clip(h.value, h.low, h.high), 1e-3
         errors, cost = self._cost(h, value, precision)
@@ -220,8 +225,10 @@ class Fitter:
 
         if len(kept):
             take(np.flatnonzero(h.named & ~fresh), kept)
+        slopes = known
         for _ in range(rounds):
-            slopes = self._slopes(replace(h, value=value), kept)
+            if slopes is None:
+                slopes = self._slopes(replace(h, value=value), kept)
             take(np.flatnonzero(h.named & fresh), slopes)
             curved = gram + precision
             pull = white @ self.whiten(errors) - precision @ (value - h.mean)
@@ -235,9 +242,11 @@ class Fitter:
                     value, errors, cost, damping = trial, then, cost_then, damping / 10
                     break
                 damping *= 10
+            if fell > 0:
+                slopes = None
             if fell < SETTLED:
                 break
-        return self.at(replace(h, value=value), errors, kept)
+        return self.at(replace(h, value=value), errors, kept if slopes is None else slopes)
 
     def at(
         self, h: Guess, errors: np.ndarray | None = None, kept: np.ndarray = NO_SLOPES
@@ -247,7 +256,7 @@ class Fitter:
         Args:
             h: with these numbers.
             errors: (W, 3) at them.
-            kept: (K, W, 3) first slopes, as they were elsewhere.
+            kept: (K, W, 3) first slopes, as they were elsewhere, or all.
         """
         model = h.model.copy()
         for name, v in zip(np.array(h.labels)[h.named], h.value[h.named], strict=True):
@@ -258,7 +267,7 @@ class Fitter:
         return Hypothesis(**{**vars(found), "slopes": self._slopes(found, kept), "errors": errors})
 
     def with_effect(
-        self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float
+        self, h: Hypothesis, c: Candidate, start: np.ndarray, grid: float, *, far: bool = False
     ) -> Hypothesis:
         """The hypothesis with an effect more, fitted from a start.
 
@@ -267,7 +276,9 @@ class Fitter:
             c: the effect.
             start: (P,) values of its parameters.
             grid: log evidence of places, whiles or limits, less that of the best.
+            far: its sizes are among those that may be FAR times as large as usual.
         """
+        wide, chance = (FAR, PRIORS.far) if far else (1.0, 1 - PRIORS.far)
         model = h.model.copy()
         model.add_effect(c.name)
         instance, effect = newest_instance(model, c.name), next_of_kind(h.effects, c.name)
@@ -278,7 +289,9 @@ class Fitter:
         free = [p for p, here in zip(c.parameters, local, strict=True) if not here]
         start = start[~local]
         mean = np.where(limit, start, [p.usual for p in free])
-        std = np.where(limit, LIMIT_SPREAD * np.abs(start), [size_std(p) for p in free])
+        std = np.where(
+            limit, LIMIT_SPREAD * np.abs(start), [wide ** is_size(p) * size_std(p) for p in free]
+        )
         count = len(h.mean)
         cov = np.zeros((count + len(free),) * 2)
         cov[:count, :count] = h.cov
@@ -297,7 +310,7 @@ class Fitter:
             one_sided=np.r_[
                 h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
             ],
-            grid={**h.grid, effect: grid},
+            grid={**h.grid, effect: grid + float(np.log(chance))},
         )
         return self.fit(grown, kept=h.slopes)
 

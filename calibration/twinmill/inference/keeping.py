@@ -10,16 +10,6 @@ from twinmill.data.steady_table import SteadyTable
 from twinmill.model.model_file import ModelFile
 
 
-def by_probabilities(measurements: Sequence[Measurement | SteadyTable]) -> bool:
-    """True if these are poses of one robot.
-
-    Several robots are compared with each other, and tables and detections read, by the older engine
-    alone.
-    """
-    robots = {m.track.robot_id if isinstance(m, Measurement) else None for m in measurements}
-    return len(robots) == 1 and None not in robots
-
-
 def is_own(measurements: Sequence[Measurement | SteadyTable], model_file: ModelFile) -> bool:
     """True if one of these logs told what the model always misses."""
     told = {*model_file.fit.get("always", {}).get("logs", ())}
@@ -33,12 +23,12 @@ def with_its_error(
 
     Itself where these are of several robots or tables.
     """
-    if not by_probabilities(measurements):
+    logs = [m for m in measurements if isinstance(m, Measurement)]
+    if len(logs) < len(measurements) or len({m.robot_id for m in logs}) != 1:
         return model_file
     from twinmill.inference.always import always_of  # slow to import, for who fits alone
     from twinmill.inference.kept import as_table
 
-    logs = [m for m in measurements if isinstance(m, Measurement)]
     document = tomlkit.parse(model_file.text)
     found = as_table(always_of(logs, model_file), [m.log_sha256 for m in logs])
     document.setdefault("fit", tomlkit.table())["always"] = found

@@ -143,7 +143,7 @@ def find(linear: Linear, bank: Bank, gram: np.ndarray, worth: float) -> Found:
     }
     gains, on = [0.0], []
     done: list[tuple[np.ndarray, np.ndarray]] = []
-    for _ in range(MOST):
+    for _ in range(MOST if len(near) > 1 else 0):
         each = [
             (*_best(near, push, length, way), length, way)
             for length in near

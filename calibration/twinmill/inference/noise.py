@@ -25,6 +25,7 @@ from twinmill.inference.evidence import log_evidence
 from twinmill.inference.settings import PRIORS
 
 MEMORY_S = (0.02, 2.0)  # shorter is white over a step, longer is a dependence on time
+FINEST = 1e-5  # m or rad: below it are numerical errors of simulations, as of the noise floor
 LEAST = 5e-5, 1e-4  # sensor in m or rad, drive in m/s or rad/s: a tenth of a good capture's
 NUDGE = 0.1  # of logarithms, in the differences that tell how well they are known
 DRIFT = PRIORS.sheet  # of the logarithms, between two logs of a robot: as of a discrepancy
@@ -73,6 +74,7 @@ class Noise:
         memory_s: (C,) of the disturbance.
         course: the steps.
         weight: (C, W) of each step's error; None for ones.
+        finest: least `sensor`.
     """
 
     sensor: np.ndarray
@@ -81,6 +83,7 @@ class Noise:
     memory_s: np.ndarray
     course: Course
     weight: np.ndarray | None = None
+    finest: float = 0.0
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:
         """(..., C W) white errors or columns of (..., W, C), channel after channel."""
@@ -97,7 +100,11 @@ class Noise:
         """A noise of the same steps with (4, C) other logarithms."""
         sensor, drive, gain, memory = np.exp(logs)
         return replace(
-            self, sensor=sensor, drive=drive, gain=gain, memory_s=np.clip(memory, *MEMORY_S)
+            self,
+            sensor=np.maximum(sensor, self.finest),
+            drive=drive,
+            gain=gain,
+            memory_s=np.clip(memory, *MEMORY_S),
         )
 
     @property
@@ -206,6 +213,7 @@ def first_noise(course: Course, recorded: dict[str, float]) -> Noise:
         half,
         np.clip(memory, 1.5 * MEMORY_S[0], MEMORY_S[1]),
         course,
+        finest=FINEST,
     )
 
 

@@ -8,19 +8,23 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
+from twinmill.estimation.opened import coarse_floor, opened_over
 from twinmill.inference import candidates, discrepancy, moments
 from twinmill.inference.candidate import Candidate
+from twinmill.inference.differ import SPREAD
 from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.duties import refined
 from twinmill.inference.hypothesis import Fitter, Guess, Hypothesis
-from twinmill.inference.noise import Course, Noise, Usual, first_noise
+from twinmill.inference.noise import FINEST, Course, Noise, Usual, first_noise
 from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
 from twinmill.inference.problem import Kinds, Missed, Problem, flexible_noise
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.steps import Motion, Steps, StepsOfLog, motion_of
+from twinmill.inference.swings import swing
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     CLOCK,
+    HEADING,
     LAG,
     WHERE_OR_WHEN,
     beginning_at_a_moment,
@@ -28,12 +32,14 @@ from twinmill.model.parameters import (
     effect_names,
     is_local,
     newest_instance,
+    of_each_log,
 )
 
 CLOCK_GRID_S = np.arange(-1.0, 1.01, 0.05)  # half of the shortest time between two commands
 FINE_GRID_S = np.arange(-0.05, 0.0501, 0.002)  # about that, where logs are set side by side
 CLOCK_REACH_S = 0.3  # about the best of the grid
 NO_LAG_S = 1e-3
+SPREAD_OF_KIND = "idiosyncrasy.theta_a1_std"  # as a model file may state it; 0: it does not
 UNSEEN = 0.01  # variance of a column over that of noise: it moves the evidence by a 200th
 TOLD_BY = {  # what a thing depends on that is mistaken for an effect, by what its card needs
     "steady_speed": ("speed", "coupling of turns"),
@@ -112,6 +118,7 @@ def problem_of(
     sheet: bool = False,
     *,
     without: Collection[str] = (),
+    of_a_kind: bool = False,
 ) -> PlanarProblem:
     """Prepares the logs of a robot.
 
@@ -121,6 +128,7 @@ def problem_of(
         always: what the model misses in the log that it was fitted to.
         sheet: nothing of the base is known but a data sheet.
         without: effects that do not compete.
+        of_a_kind: the base is that of several robots, whose numbers differ.
     """
     measurements = [m.punctual() for m in measurements]
     whole = model_file.model
@@ -138,7 +146,7 @@ def problem_of(
         model.set(CLOCK, 0.0)
     declared = one_clock or model.clock_same
     same_clock = (known or declared) and all(m.lateness is None for m in measurements)
-    logs = [StepsOfLog(m) for m in measurements]
+    logs = [StepsOfLog(m, own=own) for m, own in _of_each_log(measurements, model_file)]
     prior = base_prior(
         model,
         model_file,
@@ -167,10 +175,12 @@ def problem_of(
             *_missed_by_kernels(prior, always, found),
         ]
         prior = prior.with_columns(_seen(_missed_by_formulas(changes, motion), noise))
+    if of_a_kind:
+        prior = prior.of_a_kind(model.get(SPREAD_OF_KIND) or SPREAD)
     base = Fitter(steps, noise, prior.columns).fit(Guess.of_base(model, prior))
     every = candidates.candidates(model, [m.track for m in measurements], same_clock, declared)
     names = [name for name in every if name not in without]
-    rate = always.rate if always and always.rate.there > 0.5 else None  # likelier than not
+    rate = always.rate if always else None
     wander = {k: discrepancy.in_another_log(p) for k, p in always.wander.items()} if always else {}
     rough = PlanarProblem(
         steps,
@@ -189,8 +199,26 @@ def problem_of(
         same_clock,
     )
     noise = flexible_noise(rough)
-    base = Fitter(steps, noise, prior.columns).fit(base)
-    return replace(rough, noise=noise, base=base)
+    fitter = Fitter(steps, noise, prior.columns)
+    base = fitter.fit(base)
+    swings = swing(motion, base, fitter)
+    return replace(rough, noise=noise, base=base, kernels=[*found, *([swings] if swings else [])])
+
+
+def _of_each_log(
+    measurements: Sequence[Measurement], model_file: ModelFile
+) -> list[tuple[Measurement, dict[str, float]]]:
+    """Each log with what no other log tells.
+
+    Wheels' angles at its start, phases of formulas, and a heading that was held and not recorded.
+    """
+    held = [HEADING] if any(not m.track.has_heading for m in measurements) else []
+    if not (held or of_each_log(model_file.model)):
+        return [(m, {}) for m in measurements]
+    found = [opened_over(m, model_file, k, coarse_floor) for k, m in enumerate(measurements)]
+    names = [[*held, *(p.name for p in of_each_log(o.model))] for o in found]
+    values = [{n: o.model.get(n) for n in own} for o, own in zip(found, names, strict=True)]
+    return [*zip(measurements, values, strict=True)]
 
 
 def _changes(steps: Steps, model: native.Model, effects: Sequence[str]) -> np.ndarray:
@@ -253,7 +281,8 @@ def _with_clock(
     if len(logs) > 1:
         each = [_least_s(model, log, at + FINE_GRID_S) for log, at in zip(logs, each, strict=True)]
         best = each[0]
-        logs = [StepsOfLog(log.measurement, at - best) for log, at in zip(logs, each, strict=True)]
+        late = zip(logs, each, strict=True)
+        logs = [StepsOfLog(log.measurement, at - best, log.own) for log, at in late]
     k = prior.names.index(CLOCK)
     mean, low, high = prior.mean.copy(), prior.low.copy(), prior.high.copy()
     mean[k], low[k], high[k] = best, best - CLOCK_REACH_S, best + CLOCK_REACH_S
@@ -285,5 +314,5 @@ def _begin_noise(
     course = Course(float(np.median(steps.step_s)), steps.stretches, motion.pace)
     if always is not None:
         sensor, drive, gain, memory_s = np.exp(always.noise.logs)
-        return Noise(sensor, drive, gain, memory_s, course)
+        return Noise(sensor, drive, gain, memory_s, course, finest=FINEST)
     return first_noise(course, model_file.recorded_noise)

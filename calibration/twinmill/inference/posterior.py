@@ -31,8 +31,9 @@ class Belief:
             lacked, which is no news.
         mimicked: effects in whose place one unnamed thing is; empty if none is.
         entry: of the table.
-        stale: the base is known no better than a data sheet.
         words: dependences.
+        always: effects that the base always lacked, which its model has.
+        log_own: Bayes factor of these in the base's own log, which `probability` holds.
         probability: of it.
     """
 
@@ -40,6 +41,8 @@ class Belief:
     mimicked: tuple[str, ...]
     words: tuple[str, ...]
     entry: Entry
+    always: tuple[str, ...]
+    log_own: float
     probability: float
 
     @property
@@ -59,16 +62,27 @@ class Belief:
 
 
 def beliefs(table: Table) -> list[Belief]:
-    """All hypotheses with their probabilities, which add up to one.
-
-    Which thing is missing follows from the evidence. That anything is missing is averaged over
-    blocks of time that are drawn again and again (Bayesian bootstrap; pseudo-BMA+ of Yao et al.
-    2018, Bayesian Analysis 13): what few blocks speak for, or some against, is not sure.
-    """
+    """All hypotheses with their probabilities, which add up to one."""
     rows = [row for entry in table.entries for row in _rows(entry, table)]
     logs = np.array([row.log for row in rows])
     nothing = np.array([set(r.entry.effects) == set(r.no_news) and not r.entry.words for r in rows])
     blocks = np.array([row.entry.blocks for row in rows])
+    p = probabilities(logs, blocks, nothing)
+    return [_belief(row, float(v), table) for row, v in zip(rows, p, strict=True)]
+
+
+def probabilities(logs: np.ndarray, blocks: np.ndarray, nothing: np.ndarray) -> np.ndarray:
+    """(H,) probabilities of hypotheses.
+
+    Which thing is missing follows from the evidence. That anything is missing is averaged over
+    blocks of time that are drawn again and again (Bayesian bootstrap; pseudo-BMA+ of Yao et al.
+    2018, Bayesian Analysis 13): what few blocks speak for, or some against, is not sure.
+
+    Args:
+        logs: (H,) log posterior, up to a constant.
+        blocks: (H, B) log density of each block, which `logs` hold.
+        nothing: (H,) bool, nothing is missing.
+    """
     rest = logs - blocks.sum(axis=1)
     count = blocks.shape[1]
     drawn = np.random.default_rng(0).dirichlet(np.ones(count), DRAWS) * count
@@ -76,7 +90,7 @@ def beliefs(table: Table) -> list[Belief]:
     p = np.exp(each - logsumexp(each, axis=0)).mean(axis=1)
     some = np.exp(logs - logsumexp(logs[~nothing]))
     p[~nothing] = some[~nothing] * (1 - p[nothing].sum())
-    return [_belief(row, float(v), table) for row, v in zip(rows, p, strict=True)]
+    return p
 
 
 @dataclass(frozen=True)
@@ -87,6 +101,8 @@ class _Row:
     log: float
     mimicked: tuple[str, ...] = ()
     no_news: tuple[str, ...] = ()
+    always: tuple[str, ...] = ()
+    log_own: float = 0.0
 
 
 def _belief(row: _Row, probability: float, table: Table) -> Belief:
@@ -106,7 +122,7 @@ def _belief(row: _Row, probability: float, table: Table) -> Belief:
     words = (TIME, *entry.words) if again else entry.words
     real = once(n for n in entry.effects if n not in (*row.mimicked, *row.no_news))
     like = tuple(n for n in once(row.mimicked) if n not in real)
-    return Belief(real, like, words, entry, probability)
+    return Belief(real, like, words, entry, once(row.always), row.log_own, probability)
 
 
 def _rows(entry: Entry, table: Table) -> list[_Row]:
@@ -123,7 +139,8 @@ def _rows(entry: Entry, table: Table) -> list[_Row]:
         like = float(np.log(kin).sum())
         rest = log_prior_of_effects(len(others), len(table.candidates))
         log = float(stale + other + like + rest + entry.log_evidence + known.log_odds)
-        rows.append(_Row(entry, log, no_news=(*known.always, *known.formal)))
+        no_news = (*known.always, *known.formal)
+        rows.append(_Row(entry, log, no_news=no_news, always=known.always, log_own=known.log_own))
     for names, log_evidence in zip(subsets(entry.effects), entry.log_mimicked, strict=True):
         if np.isfinite(log_evidence):
             # the first word is no further thing, but the part that the effects' forms do not take

@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Knowledge of a base model before a log is seen: a joint normal distribution."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import twinmill_native as native
 from scipy.linalg import block_diag
 
-from twinmill.inference.candidate import size_std
+from twinmill.inference.candidate import FAR, size_std
 from twinmill.inference.discrepancy import Kernel, dependence_of
-from twinmill.inference.duties import refined
+from twinmill.inference.duties import TABLE, refined
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Usual
 from twinmill.inference.settings import PRIORS
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
+    BASE_GAINS,
     CLOCK,
     CLOCK_RATE,
     LAG,
@@ -90,6 +91,8 @@ class Prior:
         sheet: (P,) how much less well than others each is known from a data sheet alone; 0 where
             no data sheet tells it.
         known: other logs told the base; in its own log its numbers are what they are fitted to.
+        off: (P, Q) root of the covariance by which a data sheet's numbers are off; None where each
+            is by itself, as `sheet` says.
     """
 
     names: list[str]
@@ -101,14 +104,38 @@ class Prior:
     columns: np.ndarray = field(repr=False)
     sheet: np.ndarray
     known: bool = True
+    off: np.ndarray | None = None
 
     @property
     def stale(self) -> np.ndarray:
         """(P + K, P + K) covariance of a base of which nothing is known but a data sheet."""
-        cov = self.cov.copy()
-        for k, share in enumerate(self.sheet):
-            cov[k, k] += (share * PRIORS.sheet * self.mean[k]) ** 2
+        cov, count = self.cov.copy(), len(self.names)
+        off = self.off
+        if off is None:
+            off = np.diag(self.sheet * PRIORS.sheet * self.mean[:count])
+        cov[:count, :count] += off @ off.T
         return cov
+
+    @property
+    def faster(self) -> list[np.ndarray]:
+        """(P + K, P + K) covariance of a base all of whose speeds are off by one factor.
+
+        As by another battery, or by another motor or gear, which are farther off: that has one
+        number where a data sheet has many. None of a base that has no speeds.
+        """
+        table = [name.startswith(TABLE) for name in self.names]
+        speeds = table if any(table) else [name in BASE_GAINS for name in self.names]
+        count, size = len(self.names), PRIORS.sheet * self.mean[: len(self.names)]
+        if not any(speeds):
+            return []
+        off = np.where(speeds, size, 0.0)
+        late = np.where([name == LAG for name in self.names], self.sheet * size, 0.0)
+        found = []
+        for wide in (1.0, FAR):
+            cov = self.cov.copy()
+            cov[:count, :count] += wide**2 * np.outer(off, off) + np.diag(late**2)
+            found.append(cov)
+        return found
 
     def before_any_log(self) -> "Prior":
         """As a fit begins: from a data sheet, whose lag is a guess."""
@@ -117,6 +144,24 @@ class Prior:
             if name == LAG:
                 cov[k, k] += USUAL_STD[LAG] ** 2
         return replace(self, cov=cov, known=False)
+
+    def of_a_kind(self, spread: float) -> "Prior":
+        """Prior of one robot among several of a kind, whose numbers differ.
+
+        Args:
+            spread: relative standard deviation of speeds among them.
+        """
+        cov = self.cov.copy()
+        for k, share in enumerate(self.sheet):
+            cov[k, k] += (share * spread * self.mean[k]) ** 2
+        return replace(self, cov=cov)
+
+    def without(self, names: Collection[str]) -> "Prior":
+        """A prior that has no discrepancy yet, without some quantities."""
+        at = [k for k, name in enumerate(self.names) if name not in names]
+        own = {f: getattr(self, f)[at] for f in ("mean", "step", "low", "high", "sheet")}
+        kept = [self.names[k] for k in at]
+        return replace(self, names=kept, cov=self.cov[np.ix_(at, at)], **own)
 
     def with_columns(self, columns: np.ndarray) -> "Prior":
         """With a discrepancy more, (K, W, C), whose weights have a standard normal distribution."""

@@ -82,6 +82,7 @@ class View:
         stacked: (sum of K, R) their white columns.
         parts: of each kernel in these.
         grams: of each kernel, (K, K) products.
+        log_shares: (F,) of their prior odds.
         moments: white columns of moments, and their products, as `moments.find` takes them.
         log_sizes: (R,) of the noise, less a share of its log prior.
         block: (R,) number of the block of time of each white row.
@@ -94,6 +95,7 @@ class View:
     stacked: Bank
     parts: list[slice]
     grams: list[np.ndarray]
+    log_shares: np.ndarray
     moments: tuple[Bank, np.ndarray]
     log_sizes: np.ndarray
     block: np.ndarray
@@ -164,6 +166,11 @@ class Problem(ABC):
         """
         return None
 
+    @property
+    def has_moments(self) -> bool:
+        """Something may happen at moments: these are logs, and no tables."""
+        return True
+
     @abstractmethod
     def of_moments(self) -> np.ndarray:
         """(B + 1, N, W, C) change by a gain or a push of usual size up to each of the bins."""
@@ -183,6 +190,7 @@ class Problem(ABC):
             Bank(stacked),
             parts,
             [stacked[part] @ stacked[part].T for part in parts],
+            np.array([kernel.log_share for kernel in self.kernels]),
             (Bank(at_moments), flat @ flat.T),
             noise.log_sizes(self.steps.observed)
             - self.usual.log_density(noise) / (channels * len(self.steps)),
@@ -224,15 +232,20 @@ class Problem(ABC):
 
 def flexible_noise(p: Problem) -> Noise:
     """The noise that all effects and all dependences together leave; far errors weigh less."""
+    errors, columns = flexible(p)
+    noise = fit_noise(errors, columns, p.noise, p.usual)
+    white = noise.whiten(columns)
+    y = noise.whiten(errors)
+    left = Linear.of(y, white).residuals.reshape(len(p.steps.observed), -1)
+    return replace(noise, weight=weights_of(left))
+
+
+def flexible(p: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """(W, C) errors of the base as known, and (K, W, C) columns of all that may be beside it."""
     base = p.told(p.base)
     free = [np.tensordot(np.linalg.cholesky(base.cov).T, base.slopes, 1)]
     for c in p.columns(base).values():
         if c.where is None and len(c.columns):
             free.append(PRIORS.size * c.columns)
     free += [FLEXIBLE * k.columns for k in p.kernels]
-    columns = np.concatenate(free)
-    noise = fit_noise(base.errors, columns, p.noise, p.usual)
-    white = noise.whiten(columns)
-    y = noise.whiten(base.errors)
-    left = Linear.of(y, white).residuals.reshape(len(p.steps.observed), -1)
-    return replace(noise, weight=weights_of(left))
+    return base.errors, np.concatenate(free)

@@ -91,7 +91,8 @@ class Search:
         self.view = problem.view(problem.noise)
         self.progress = progress
         self.fitted: dict[tuple[str, ...], Evidence] = {}
-        self.words = (*dict.fromkeys(k.depends_on for k in problem.kernels), MOMENTS)
+        words = dict.fromkeys(k.depends_on for k in problem.kernels)
+        self.words = (*words, MOMENTS) if problem.has_moments else (*words,)
         self._keep(problem.base)
 
     def run(self) -> "Search":
@@ -215,8 +216,10 @@ class Search:
             )
             grid += log_share
         found = fitter.with_effect(h, c, start, grid)
-        if c.where is not None or c.limits is not None:
+        if c.limits is not None:
             return found
+        if c.where is not None:
+            return self._of_any_size(found, told[0], c, grid)
         value = np.array([p.value for p in c.parameters])
         best = found.log_evidence(found.linear(fitter))
         for other in [start, value] if len(value) > 1 else [self._best_size(*told, c)]:
@@ -224,7 +227,24 @@ class Search:
             then = again.log_evidence(again.linear(fitter))
             if then > best:
                 found, best = again, then
-        return found
+        return self._of_any_size(found, told[0], c, grid)
+
+    def _of_any_size(
+        self, found: Hypothesis, told: Hypothesis, c: Candidate, grid: float
+    ) -> Hypothesis:
+        """The newest effect as it was fitted, or with sizes that are unusual if these are likelier.
+
+        A prior of two widths, whose tail is not so thin that no data could tell a lever of a metre.
+        """
+        own = slice(len(told.mean), None)
+        z2 = float(np.sum((found.value - found.mean)[own] ** 2 / np.diag(found.cov)[own]))
+        if z2 < -2 * np.log(PRIORS.far):  # no wider prior can gain its price
+            return found
+        fitter, instance = self.view.fitter, found.instance(found.effects[-1])
+        values = [found.model.get(f"{instance}.{key_of(p.name)}") for p in c.parameters]
+        far = fitter.with_effect(told, c, np.array(values), grid, far=True)
+        both = [h.log_evidence(h.linear(fitter)) for h in (found, far)]
+        return far if both[1] > both[0] else found
 
     def _best_size(self, told: Hypothesis, linear: Linear, c: Candidate) -> np.ndarray:
         """(1,) one of TRIED sizes of an effect of one number: what it leaves is least there.
@@ -282,5 +302,6 @@ def evidence(h: Hypothesis, view: View, linear: Linear, cov: np.ndarray | None =
     own = np.concatenate([cross, inside], axis=1)
     grams = [gram - own[at] @ own[at].T for at, gram in zip(view.parts, view.grams, strict=True)]
     gains, falls = native.gains_by_size(grams, push, SIZES)
+    gains = gains + view.log_shares[:, None]
     alone = h.log_evidence(linear, cov)
     return Evidence(h, linear, alone, gains, falls, span, inside, cross, push, grams)

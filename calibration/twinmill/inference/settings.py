@@ -18,6 +18,9 @@ class Priors(Numbers):
     )
     stale: float = number(0.1, "probability that the base is known no better than a data sheet")
     size: float = number(2.0, "size of an effect, times its card's default strength")
+    far: float = number(
+        0.1, "share of effects whose sizes have a standard deviation ten times that"
+    )
     gain_drift: float = number(0.02, "drift of gains between logs of one robot, relative")
     lag_drift: float = number(0.05, "drift of the motor lag between logs, relative")
     sheet: float = number(

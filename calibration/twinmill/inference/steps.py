@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prediction errors over short steps of a log, and what happened during each step."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 
 import numpy as np
 import twinmill_native as native
@@ -83,19 +84,26 @@ class StepsOfLog:
     Attributes:
         measurement: of the log.
         late_s: offset of its clocks over that of the model.
+        own: quantities that the log has a value of its own of, as its wheels' angles at the start.
+        starts, ends: (W,) poses at which steps start and end.
         measured: (W, 1, 3) displacements in m and rad.
     """
 
-    def __init__(self, measurement: Measurement, late_s: float = 0.0) -> None:
-        self.measurement, self.late_s = measurement, late_s
+    def __init__(
+        self,
+        measurement: Measurement,
+        late_s: float = 0.0,
+        own: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
+        self.measurement, self.late_s, self.own = measurement, late_s, own
         track = measurement.track
-        self._starts, self._ends, self.stretches = _cut(track)
-        start, end = track.pose[self._starts], track.pose[self._ends]
-        self.t_s = (track.pose_t_s[self._starts] + track.pose_t_s[self._ends]) / 2
-        self.step_s = track.pose_t_s[self._ends] - track.pose_t_s[self._starts]
+        self.starts, self.ends, self.stretches = _cut(track)
+        start, end = track.pose[self.starts], track.pose[self.ends]
+        self.t_s = (track.pose_t_s[self.starts] + track.pose_t_s[self.ends]) / 2
+        self.step_s = track.pose_t_s[self.ends] - track.pose_t_s[self.starts]
         self.place = (start[:, :2] + end[:, :2]) / 2
         self.observed = np.array([True, True, track.has_heading])
-        smooth_rad = track.heading_smooth[self._starts]
+        smooth_rad = track.heading_smooth[self.starts]
         self.heading = (start[:, 2] + end[:, 2]) / 2 if track.has_heading else smooth_rad
         self._start = np.column_stack([start[:, :2], smooth_rad])
         measured = np.column_stack([_ahead(end - start, smooth_rad), np.zeros(len(start))])
@@ -110,6 +118,10 @@ class StepsOfLog:
         names = list(names) or [CLOCK]
         values = np.array([[model.get(CLOCK)]]) if values is None else np.atleast_2d(values)
         values = np.array(values, float)
+        if self.own:
+            model = model.copy()
+            for name, value in self.own.items():
+                model.set(name, value)
         if self.late_s and CLOCK in names:
             values[:, names.index(CLOCK)] += self.late_s
         elif self.late_s:
@@ -119,8 +131,8 @@ class StepsOfLog:
         found = native.window_errors(
             model,
             self.measurement.started,
-            self._starts,
-            self._ends[:, None].copy(),
+            self.starts,
+            self.ends[:, None].copy(),
             names,
             values,
             self._start,
@@ -201,11 +213,12 @@ def motion_of(
     """The motion of a log; `scale` (usual, top) is that of the base's own log, if it is known."""
     return Motion(
         moved, instant, steps.t_s, steps.step_s, steps.place, steps.heading,
-        *(scale or _scale(moved)),
+        *(scale or scale_of(moved)),
     )  # fmt: skip
 
 
-def _scale(moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def scale_of(moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) and (5,) `usual` and `top` of a `Motion`."""
     size = np.sqrt((moved**2).mean(axis=0))
     plane = np.hypot(size[0], size[1])
     way = np.hypot(moved[:, 0], moved[:, 1])

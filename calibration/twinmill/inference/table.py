@@ -12,11 +12,12 @@ import numpy as np
 from twinmill.inference import formal, moments
 from twinmill.inference.discrepancy import CHANCE, OF_FORM, SIZES, STEP, TIME
 from twinmill.inference.evidence import Linear, gains_by_size
-from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.moments import MOMENTS, Moment, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Kinds, Problem, View
 from twinmill.inference.search import Evidence, Search, evidence
+from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import (
     catalogue_name,
     effect_names,
@@ -90,12 +91,14 @@ class NoNews:
         formal: those that an error of the others' formulas looks like, or of what the base lacks.
         words: dependences that these share with those.
         log_odds: log evidence over that of effects that are new, the base's own log taken in.
+        log_own: Bayes factor, in that log, of those that the base always lacked.
     """
 
     always: tuple[str, ...]
     formal: tuple[str, ...]
     words: tuple[str, ...]
     log_odds: float
+    log_own: float
 
 
 @dataclass(frozen=True)
@@ -194,12 +197,13 @@ class _Compared:
         """Evidence of a fitted set; if `whole`, also of a stale base, and with two dependences."""
         p, changes = search.problem, _changes(search.problem, h)
         forms = [p.forms(change) for change in changes]
+        stale = _beside_stale_bases(p, h, views[0].fitter) if whole else []
         within = [[h.effects.index(n) for n in subset] for subset in subsets(h.effects)]
         each = [(view.fitter.whiten(changes) ** 2).sum(axis=1) for view in views]
         owns = []
         for view, takes in zip(views, each, strict=True):
             squares = np.array([takes[index].sum() for index in within])
-            own = _Comparison(p, search.words, h, changes, forms, squares, view)
+            own = _Comparison(p, search.words, h, stale, changes, forms, squares, view)
             owns.append((own.entries(whole), own))
         best = max(owns, key=lambda o: max(entry.log_evidence for entry in o[0]))[1]
         return cls([e for own, _ in owns for e in own], owns[0][0], each[0], best)
@@ -282,6 +286,12 @@ class _Beside:
     local: np.ndarray
 
 
+def _log_prior(beside: _Beside) -> float:
+    """Log prior of these, and that the base is stale, or is not."""
+    chance = 1 - PRIORS.stale if beside.cov is None else PRIORS.stale
+    return beside.log_chance + float(np.log(chance))
+
+
 @dataclass(frozen=True)
 class _Comparison:
     """One set of effects under one noise."""
@@ -289,6 +299,7 @@ class _Comparison:
     problem: Problem
     words: tuple[str, ...]
     h: Hypothesis
+    stale: list[Hypothesis]  # the same beside each kind of stale base, where these are compared
     changes: np.ndarray  # (E, W, C) of the prediction by each effect
     forms: list[tuple[np.ndarray, ...]]  # what the formula of each effect may miss
     squares: np.ndarray  # (M,) that each of `subsets` takes
@@ -303,9 +314,8 @@ class _Comparison:
         for other, of_other in others:
             out += [self._alone(other), *self._with_words(other, of_other)]
         if whole:
-            stale, _ = self._moments(self._stale_cov)
-            of_stale = self._evidence(stale)
-            out += [self._alone(stale), *self._with_words(stale, of_stale)]
+            for stale in self._stale_usual:
+                out += [self._alone(stale), *self._with_words(stale, self._evidence(stale))]
             for first in (news, self._likeliest(usual, own)):
                 if first.fall > 0:
                     out += self._with_words(first, self._evidence(first))
@@ -320,10 +330,12 @@ class _Comparison:
         """
         likely = [self._likeliest(b, own) for b, own in self._plain]
         plain = [(b, own.linear) for b, own in self._plain]
-        every = plain + [(b, self._linear(b)) for b in (self._usual_and_news[1], *likely)]
-        linear = max(every, key=lambda b: b[1].log_evidence + b[0].log_chance)[1]
-        mean, spread = self.h.posterior(linear)
-        root, count, x = np.linalg.cholesky(self.h.cov), len(self.h.mean), linear.x
+        more = self._usual_and_news[1], *likely, *self._stale_usual
+        every = plain + [(b, self._linear(b)) for b in more]
+        best, linear = max(every, key=lambda b: b[1].log_evidence + _log_prior(b[0]))
+        mean, spread = self.h.posterior(linear, best.cov)
+        root = np.linalg.cholesky(self.h.cov if best.cov is None else best.cov)
+        count, x = len(self.h.mean), linear.x
         parts = [x[:, self.view.block == b] for b in range(self.view.block.max() + 1)]
         grams = np.array([part @ part.T for part in parts])
         pushes = np.array([part @ linear.y[self.view.block == b] for b, part in enumerate(parts)])
@@ -353,15 +365,15 @@ class _Comparison:
         out = np.diag(named.astype(float))
         if not named.all():
             x, beside = self._rows[: named.sum()], self.view.fitter.always
-            known = np.linalg.inv(self._stale_cov[np.ix_(named, named)])
+            known = np.linalg.inv(_stale_covs(self.problem, self.h)[0][np.ix_(named, named)])
             out[np.ix_(named, ~named)] = np.linalg.solve(x @ x.T + known, x @ beside.T)
         return out
 
     def no_news(self) -> list[NoNews]:
         """Effects that the base always lacked, or that an error of the others' formulas may be."""
         found, sized = [], self.problem.kinds.sized
-        for always, h, linear, log_odds in self._always:
-            found.append(NoNews(always, (), (), log_odds))
+        for always, h, linear, log_odds, log_own in self._always:
+            found.append(NoNews(always, (), (), log_odds, log_own))
             for names in subsets(tuple(n for n in self.h.effects if n not in always)):
                 kin = {n: self._kin(n, names) for n in names if catalogue_name(n) in sized}
                 if len(kin) == len(names) and all(kin.values()):
@@ -369,7 +381,7 @@ class _Comparison:
                     own = formal.log_odds(h, linear, sizes, norms=self._norms)
                     own -= len(names) * float(np.log(len(self.forms[0]) + 1))
                     words = tuple(word for each in kin.values() for word, _ in each)
-                    found.append(NoNews(always, names, words, log_odds + own))
+                    found.append(NoNews(always, names, words, log_odds + own, log_own))
         return [known for known in found if known.always or known.formal]
 
     @cached_property
@@ -405,21 +417,23 @@ class _Comparison:
 
         A fit may end beside the optimum, and another prior's lead to it.
         """
-        starts = (told.value for names, told, _, _ in self._always if names)
+        starts = (told.value for names, told, *_ in self._always if names)
         return next((v for v in starts if self.view.fitter.is_better(self.h, v)), None)
 
     @cached_property
-    def _always(self) -> list[tuple[tuple[str, ...], Hypothesis, Linear, float]]:
+    def _always(self) -> list[tuple[tuple[str, ...], Hypothesis, Linear, float, float]]:
         return [*self._of_always()]
 
-    def _of_always(self) -> Iterator[tuple[tuple[str, ...], Hypothesis, Linear, float]]:
+    def _of_always(self) -> Iterator[tuple[tuple[str, ...], Hypothesis, Linear, float, float]]:
         """Each of `subsets`, and none: with these always there, and log odds against new ones.
+
+        The last is the part of the odds that the base's own log tells.
 
         What may decide is fitted anew: numbers that the base's own log tells can be far from
         these, where the model is another linear one.
         """
         fitter, new = self.view.fitter, self.h.log_evidence(self._known)
-        yield (), self.h, self._known, 0.0
+        yield (), self.h, self._known, 0.0, 0.0
         for names in subsets(self.h.effects):
             if there := self.problem.always_there(self.h, names):
                 told, log_factor = there
@@ -427,7 +441,8 @@ class _Comparison:
                 if log_odds > -BEYOND:
                     told = fitter.fit(told)
                     linear = told.linear(fitter)
-                    yield names, told, linear, told.log_evidence(linear) + log_factor - new
+                    log_odds = told.log_evidence(linear) + log_factor - new
+                    yield names, told, linear, log_odds, log_factor
 
     @cached_property
     def _usual_and_news(self) -> tuple[_Beside, _Beside]:
@@ -444,7 +459,8 @@ class _Comparison:
         bare = self._bare(cov)
         found = moments.find(bare, *self.view.moments, WORTH)
         beside = []
-        for rate, words in ((self.problem.rate, ()), (Rate(), (MOMENTS,))):
+        news = (Rate(), (MOMENTS,)) if self.problem.has_moments else (None, ())
+        for rate, words in ((self.problem.rate, ()), news):
             on = found.on[: found.likeliest(rate)] if rate else ()
             chance = float(found.log_chance(rate)[len(on)]) if rate else 0.0
             white = np.concatenate([np.zeros((0, len(bare.y))), *(m.white for m in on)])
@@ -453,6 +469,13 @@ class _Comparison:
             local = self._price(bare, white, on, chance)
             beside.append(_Beside(words, white, chance, fall, relative, cov, local))
         return beside[0], beside[1]
+
+    @cached_property
+    def _stale_usual(self) -> list[_Beside]:
+        """Usual moments beside each kind of stale base, all as likely."""
+        price = float(np.log(max(len(self.stale), 1)))
+        each = [self._moments(cov)[0] for cov, _ in self._of_stale]
+        return [replace(beside, log_chance=beside.log_chance - price) for beside in each]
 
     def _others(self, usual: _Beside) -> list[_Beside]:
         """Alternatives to usual moments, which are looked for before all else.
@@ -526,27 +549,22 @@ class _Comparison:
         return self._bare(beside.cov).with_columns(beside.white)
 
     def _bare(self, cov: np.ndarray | None) -> Linear:
-        return self._known if cov is None else self._stale
+        if cov is None:
+            return self._known
+        return next(own for of, own in self._of_stale if of is cov)
 
     @cached_property
     def _known(self) -> Linear:
         return self.h.linear(self.view.fitter)
 
     @cached_property
-    def _stale(self) -> Linear:
-        return self.h.linear(self.view.fitter, self._stale_cov, self._rows)
+    def _of_stale(self) -> list[tuple[np.ndarray, Linear]]:
+        return [(h.cov, h.linear(self.view.fitter)) for h in self.stale]
 
     @property
     def _rows(self) -> np.ndarray:
         """Rows as `Hypothesis.rows` has them."""
         return self._known.parts[0].rows[0]
-
-    @cached_property
-    def _stale_cov(self) -> np.ndarray:
-        """(N, N) of the prior, the base's numbers as a data sheet knows them."""
-        cov, count = self.h.cov.copy(), len(self.problem.prior.mean)
-        cov[:count, :count] = self.problem.prior.stale
-        return cov
 
     def _alone(self, beside: _Beside) -> Entry:
         """The entry with no more than what is beside."""
@@ -567,8 +585,8 @@ class _Comparison:
         As far as the robot wanders with time or place by itself it is no news.
         """
         out, usual = [], self.problem.wander
-        for word in self.words[:-1]:
-            if word not in beside.words:
+        for word in self.words:
+            if word not in (MOMENTS, *beside.words):
                 at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
                 names = [self.view.kernels[k].name for k in at]
                 of_each = {beside.words: [usual.get(name, 0 * CHANCE) for name in names],
@@ -674,6 +692,35 @@ def _as_without_moments(entries: list[Entry]) -> list[Entry]:
         else e
         for e in entries
     ]
+
+
+def _beside_stale_bases(p: Problem, h: Hypothesis, fitter: Fitter) -> list[Hypothesis]:
+    """A hypothesis with each kind of stale base, fitted anew.
+
+    From the base's mean, too, as a known one may have gone astray; it has not where it is the best
+    for a stale one as well.
+    """
+    value, found = h.value.copy(), []
+    own = np.flatnonzero(h.named)[: len(p.prior.names)]
+    value[own] = np.clip(h.mean[own], h.low[own], h.high[own])
+    for cov in _stale_covs(p, h):
+        stale = replace(h, cov=cov)
+        best = fitter.fit(stale, known=h.slopes)
+        if fitter.is_better(stale, best.value):
+            other = fitter.fit(replace(stale, value=value))
+            best = other if fitter.is_better(best, other.value) else best
+        found.append(best)
+    return found
+
+
+def _stale_covs(p: Problem, h: Hypothesis) -> list[np.ndarray]:
+    """(N, N) each of the prior, the base's numbers as a data sheet knows them."""
+    found, count = [], len(p.prior.mean)
+    for own in (p.prior.stale, *p.prior.faster):
+        cov = h.cov.copy()
+        cov[:count, :count] = own
+        found.append(cov)
+    return found
 
 
 def _changes(p: Problem, h: Hypothesis) -> np.ndarray:

@@ -7,13 +7,12 @@ what that leaves by a constant velocity, channel by channel; both are linear in 
 so that their standard deviations follow from the posterior (Rasmussen and Williams 2006, eq. 2.11).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from twinmill.inference.answer import Answer
 from twinmill.inference.discrepancy import SIZES, TIME, Kernel
 from twinmill.inference.search import Evidence, Search
 from twinmill.inference.steps import Motion
@@ -53,10 +52,9 @@ class Unnamed:
         return {"form": self.form} | {name: getattr(self, name).tolist() for name in rows}
 
 
-def likeliest(search: Search, found: Answer) -> Evidence | None:
-    """Evidence of the likeliest set of the effects that were found; None if that was not fitted."""
-    wanted = {f.effect for f in found.findings}
-    sets = [s for s in search.likely() if {*map(catalogue_name, s)} == wanted]
+def likeliest(search: Search, kinds: Collection[str]) -> Evidence | None:
+    """Evidence of the likeliest set of effects of some kinds; None if that was not fitted."""
+    sets = [s for s in search.likely() if {*map(catalogue_name, s)} == {*kinds}]
     return search.fitted[sets[0]] if sets else None
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from twinmill.inference.answer import Answer, answer
+from twinmill.inference.answer import RobotAnswer, answer
 from twinmill.inference.search import Evidence, Search
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import table_of
@@ -36,7 +36,7 @@ class JointDiagnosis:
         always: what the model lacks in its own log, too; None where that is not known.
     """
 
-    answer: Answer
+    answer: RobotAnswer
     problem: JointProblem
     fitted: Mapping[tuple[str, ...], Evidence]
     warnings: tuple[str, ...]

@@ -11,6 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from twinmill.foreign_text import first_line
 from twinmill.joints.hook import Held, read_hook
 from twinmill.model.model_file import ModelError
 
@@ -90,7 +91,7 @@ class Mjcf:
         except (OSError, ValueError) as error:
             said = str(error).strip().splitlines()
             raise ModelError(
-                f"{path}: MuJoCo cannot load it ({said[0] if said else error})."
+                f"{first_line(path)}: MuJoCo cannot load it ({said[0] if said else error})."
             ) from (error)
         _check(model, path)
         model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)

@@ -7,6 +7,7 @@ inexact numbers: the difference is the log odds that the motion is expected to g
 after which the fewest questions are expected to be open is the answer.
 """
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -132,8 +133,11 @@ def next_joints(
     stock, t_s = mujoco.MjModel.from_xml_path(str(mjcf.path)), np.arange(0, duration_s, PERIOD_S)
     begin, runs = np.median(plant.series.log.qpos, axis=0), list[Motion]()
     best: tuple[float, Motion, Mapping[Pair, float]] | None = None
+    begin_s = time.monotonic()
     for seed in range(TRIED):
-        progress(f"motion {seed + 1} of {TRIED}")
+        left_s = (time.monotonic() - begin_s) / max(seed, 1) * (TRIED - seed)
+        remaining = f", {left_s:.0f} s left" if seed else ""
+        progress(f"motion {seed + 1} of {TRIED}{remaining}")
         runs.append(one := motion(mjcf, stock, limits, begin, t_s=t_s, seed=seed))
         if not one.exceeds:
             odds = asked.odds(Plant.of(mjcf, series_of(one.log)), pairs)

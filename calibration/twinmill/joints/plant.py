@@ -316,8 +316,8 @@ class Steps:
 
     def _change(self, model: JointModel, other: Mapping[str, float]) -> np.ndarray:
         """(W, J) of the base's errors by numbers and effects."""
-        found, forces = np.zeros((1, 1)), self.plant.begin(self.plant.usual)
-        exact = []
+        found, exact = np.zeros((1, 1)), []
+        forces: Action | None = None
         for name, value in {**model.own("base"), **model.own("clock"), **other}.items():
             if instance_of(name) in ("base", "clock"):
                 found = found + (value - NEUTRAL.get(name, 1.0)) * self._column(model, name)
@@ -325,6 +325,7 @@ class Steps:
             kind = instance.split("#")[0]
             own, effect = model.own(instance, other), model.catalogue[kind]
             if effect.changes == "force":
+                forces = forces or self.plant.begin(self.plant.usual)
                 effect.act(forces, {key_of(n): v for n, v in own.items()})
             elif effect.changes == "linear":
                 for n, value in own.items():
@@ -334,7 +335,7 @@ class Steps:
         if exact:
             found = found + self._exactly(model.catalogue, tuple(exact))
             found = found - self._exactly(model.catalogue, ())
-        if forces.force.any():
+        if forces is not None and forces.force.any():
             found = found - self.plant.momentum_of(forces.force)
         return np.broadcast_to(found, (len(self), len(self.observed)))
 

@@ -2,11 +2,12 @@
 """Model files written anew with what was fitted; the rest of the text stays as it is."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 import tomlkit
 import twinmill_native as native
 
@@ -16,6 +17,7 @@ from twinmill.model.parameters import (
     ParameterEstimate,
     card_of,
     catalogue_name,
+    catalogue_of,
     effect_names,
 )
 
@@ -49,6 +51,7 @@ class Fitted:
         covariance: of the estimates; None where the fit has none.
         shares: of the squared error that each new effect takes away, by its name in the model; a
             refit of the base has its own.
+        duty_pct: nodes of the model's table, where these are not the parent's.
     """
 
     model: native.Model
@@ -63,6 +66,7 @@ class Fitted:
     robots: dict[int, list[ParameterEstimate]] = field(default_factory=dict)
     covariance: Covariance | None = None
     shares: Mapping[str, float] = field(default_factory=dict)
+    duty_pct: tuple[float, ...] = ()
 
 
 def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> ModelFile:
@@ -70,7 +74,11 @@ def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> Mod
     document = tomlkit.parse(parent.text)
     document["parent"] = parent.hash
     document["created_by"] = command
-    _write_moved(document, parent.model, fitted.model)
+    before = parent.model
+    if fitted.duty_pct:
+        write_nodes(document, fitted.duty_pct)
+        before = native.Model.from_toml(tomlkit.dumps(document), str(parent.path))
+    _write_moved(document, before, fitted.model)
     _write_base(document, fitted)
     _write_effects(document, fitted)
     _write_robots(document, fitted)
@@ -105,6 +113,14 @@ def child_of(parent: ModelFile, fitted: Fitted, path: Path, command: str) -> Mod
 
 def _short(value: float) -> float:
     return float(f"{value:.6g}")
+
+
+def write_nodes(document: tomlkit.TOMLDocument, duty_pct: Sequence[float]) -> None:
+    """Other nodes of the duty table, in percent, on its straight lines; errors go."""
+    base = document["base"]
+    speeds = np.interp(duty_pct, base["duty_pct"].unwrap(), base["wheel_speed_mps"].unwrap())
+    base["duty_pct"], base["wheel_speed_mps"] = list(duty_pct), speeds.tolist()
+    base.get("std", {}).pop("wheel_speed_mps", None)
 
 
 def _write_moved(document: tomlkit.TOMLDocument, before: native.Model, after: native.Model) -> None:
@@ -151,6 +167,14 @@ def _write_robots(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
             place[key] = _short(estimate.value)
 
 
+def _own_bounds(model: native.Model, instance: str) -> dict[str, list[float]]:
+    """Bounds of an effect's numbers that are narrower than the catalogue's, by their names."""
+    usual = catalogue_of(model)[catalogue_name(instance)]["parameters"]
+    pairs = zip(card_of(model, instance)["parameters"], usual, strict=False)
+    keys = ("min", "max")
+    return {p["name"]: [p[k] for k in keys] for p, u in pairs if any(p[k] != u[k] for k in keys)}
+
+
 def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
     stds = {e.name: e.std for e in fitted.estimates}
     old = list(document.get("effect", []))
@@ -170,6 +194,8 @@ def _write_effects(document: tomlkit.TOMLDocument, fitted: Fitted) -> None:
             table["std"] = known
             table["fitted_on"] = ", ".join(fitted.logs)
         if i >= len(old):
+            if bounds := _own_bounds(fitted.model, instance):
+                table["bounds"] = bounds
             table["error_before"] = _short(fitted.score_before)
             table["error_after"] = _short(fitted.score_after)
             if instance in fitted.shares:

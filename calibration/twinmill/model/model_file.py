@@ -14,8 +14,8 @@ from typing import Any
 import twinmill_native as native
 
 from twinmill.files import replacing
+from twinmill.foreign_text import first_line
 from twinmill.model.covariance import Covariance
-from twinmill.model.parameters import LAG_EFFECT
 
 UNSURE = 0.05  # share of a speed: one that is told worse may be anything
 
@@ -47,7 +47,7 @@ class ModelFile:
                 f"{name}: is no text, so it is no model file; check the name."
             ) from error
         except (ValueError, OSError) as error:
-            raise ModelError(str(error)) from error
+            raise ModelError(str(error).replace(str(name), first_line(name))) from error
         if "base" not in loaded._document:
             raise ModelError(
                 f"{name}: has no section [base], so it does not say what the commands are nor how "
@@ -118,25 +118,6 @@ class ModelFile:
             if speed_mps > 0 and not std < UNSURE * speed_mps:
                 found[name] = float("inf") if math.isnan(std) else float(std)
         return found
-
-    def lag_std_s(self, log_sha256: Collection[str]) -> float:
-        """How well other logs told the lag; 0 where none did."""
-        if not self.known_from_other_logs(log_sha256):
-            return 0.0
-        document = self._document
-        parts = [document["base"].get("std", {}).get("motor_lag_s", 0.0)]
-        parts += [
-            e.get("std", {}).get("extra_s", 0.0)
-            for e in document.get("effect", [])
-            if e["name"] == LAG_EFFECT
-        ]
-        return math.hypot(*map(float, parts))
-
-    @property
-    def effect_stds(self) -> dict[str, float]:
-        """How well logs told the numbers of the effects, by name; of several alike the last."""
-        effects = self._document.get("effect", [])
-        return {f"{e['name']}.{k}": float(v) for e in effects for k, v in e.get("std", {}).items()}
 
     def fitted_on(self, log_sha256: Collection[str]) -> bool:
         """True if the base was fitted to one of these very logs."""

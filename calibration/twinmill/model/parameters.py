@@ -310,11 +310,6 @@ def late_part(effect: str) -> tuple[str, str] | None:
     return (LATE_PARTS.get(catalogue()[effect]["stage"], "lag"), own[0]) if own else None
 
 
-def makes_late(name: str) -> bool:
-    """True of an effect that makes late, of its quantities and of the base's lag."""
-    return name == LAG or bool(with_role(catalogue_name(name), "lateness"))
-
-
 def making_late(part: str) -> list[str]:
     """Effects whose `late_part` this is."""
     return [name for name in catalogue() if (late := late_part(name)) and late[0] == part]
@@ -463,7 +458,7 @@ def effect_parameters(
             continue
         full = f"{instance}.{p['name']}"
         strength = p["default"] - p["neutral"]
-        value = p["default"] if fresh else model.get(full)
+        value = min(max(p["default"], p["min"]), p["max"]) if fresh else model.get(full)
         found.append(
             _told_lever(
                 Parameter(

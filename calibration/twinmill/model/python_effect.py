@@ -76,8 +76,9 @@ class Number:
 
     Attributes:
         unit: in which the function takes it.
-        low, high: its range; what a fit tries beyond is taken for the nearer end.
-        prior: mean and standard deviation of what is known of it before; None: nothing.
+        low, high: its range, which models that get the effect keep.
+        prior: mean and standard deviation of what is known of it before; None: nothing. It is of
+            `Model.add` alone, as no file has it: later fits take it as their `priors`.
     """
 
     unit: str = "1"
@@ -180,6 +181,12 @@ class PythonEffect:
     def priors(self) -> dict[str, tuple[float, float]]:
         """Mean and standard deviation of those numbers of which something is known before."""
         return {name: n.prior for name, n in self.numbers.items() if n.prior is not None}
+
+    @property
+    def bounds(self) -> dict[str, tuple[float, float]]:
+        """Range of those numbers that have one."""
+        ends = {name: (n.low, n.high) for name, n in self.numbers.items()}
+        return {name: pair for name, pair in ends.items() if pair != (-math.inf, math.inf)}
 
     def names(self, model: native.Model) -> dict[str, str]:
         """Names of its numbers in a model, as `equation#air.drag`, by their own names.

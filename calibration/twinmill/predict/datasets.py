@@ -7,7 +7,7 @@ robot of a table. The third, `Detections`, has draws with chances and no floor: 
 it by likelihood.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -16,7 +16,7 @@ import numpy as np
 import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
-from twinmill.model.parameters import CLOCK, MOTION_STAGES, Parameter, of_each_log
+from twinmill.model.parameters import CLOCK, Parameter, of_each_log
 from twinmill.predict.windows import EVERY_S, HORIZONS_S, Windows, difference
 
 BLOCK_S = 8.0  # errors of different blocks count as independent
@@ -36,11 +36,6 @@ class Dataset(Protocol):
     @property
     def robot_id(self) -> int:
         """Number of the robot."""
-        ...
-
-    @property
-    def stages(self) -> Collection[str]:
-        """Stages of the catalogue whose effects this kind of data shows."""
         ...
 
     @property
@@ -106,8 +101,6 @@ class Trajectory:
         first_part: part that the log begins with. Logs often begin alike, so that of several each
             begins with another one: else a drive of all of them is left out at once.
         every_s: between two starts.
-        radius_ratio: of the wheels, over the model's radius, as errors that swing with their angle
-            tell it; 1 if none do.
         independent: (3,) share of the errors of each channel that are, as the floor tells.
     """
 
@@ -119,7 +112,6 @@ class Trajectory:
     own: tuple[Parameter, ...] = ()
     first_part: int = 0
     every_s: float = EVERY_S
-    radius_ratio: float = 1.0
     independent: np.ndarray = field(default_factory=lambda: np.ones(3))
     by_run: bool = False
     weight: np.ndarray = field(init=False, repr=False)
@@ -127,7 +119,6 @@ class Trajectory:
     part: np.ndarray = field(init=False, repr=False)
     channel: np.ndarray = field(init=False, repr=False)
     judged: np.ndarray = field(init=False, repr=False)
-    stages = MOTION_STAGES
 
     def __post_init__(self) -> None:
         counted = np.isfinite(self.measured) & self.keep[:, None, None]
@@ -248,16 +239,6 @@ class Trajectory:
     def score(self, model: native.Model) -> float:
         """RMS over horizons and channels of error over floor."""
         return float(np.sqrt(np.sum((np.nan_to_num(self.errors(model)) * self.weight) ** 2)))
-
-
-def thinning(datasets: Sequence[Dataset | None], most: int, apart_s: float) -> int:
-    """N of which every Nth start of the logs leaves no more predictions than `most`, about.
-
-    But starts are no further apart than `apart_s`.
-    """
-    logs = [d for d in datasets if isinstance(d, Trajectory)]
-    total = sum(len(d.keep) for d in logs)
-    return max(1, min([-(-total // most), *(int(apart_s / d.every_s) for d in logs)]))
 
 
 def errors_of(dataset: ErrorDataset, model: native.Model) -> np.ndarray:

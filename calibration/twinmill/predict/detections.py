@@ -10,7 +10,7 @@ import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames
 from twinmill.data.track import Track
-from twinmill.model.parameters import CAMERA_STAGES, CLOCK, CLOCK_RATE
+from twinmill.model.parameters import CLOCK, CLOCK_RATE
 from twinmill.predict.modelled_log import ModelledLog
 
 BLOCK_S = 4.0  # errors of detections within a block are correlated
@@ -52,8 +52,7 @@ class Detections:
     half: np.ndarray
     _seen: tuple[Any, Any] = field(default=(None, None), repr=False)
     _placed: tuple[Any, Any] = field(default=(None, None), repr=False)
-
-    stages = CAMERA_STAGES  # see Dataset
+    _votes: tuple[Any, Any] = field(default=(None, None), repr=False)
 
     @property
     def bits(self) -> np.ndarray:
@@ -107,11 +106,7 @@ class Detections:
             return self._voted_alone(model, frames)[pick]
         chance = self.chance(model, pick)
         raw = self.frames.raw[pick]
-        right = self.voted(frames)[pick] == self.frames.voted[pick]
-        vote = np.full(right.shape, np.log(VOTE_ERROR))
-        vote[right] = np.log(1 - VOTE_ERROR)
-        vote[np.arange(len(self.frames.raw))[pick] < UNSEEN_FRAMES] = 0
-        told = np.log(np.where(raw, chance, 1 - chance)) + vote * self.frames.has_vote
+        told = np.log(np.where(raw, chance, 1 - chance)) + self._of_votes(frames, pick)
         return np.where(self.usable[pick], told, np.nan)
 
     def voted(self, frames: int) -> np.ndarray:
@@ -121,10 +116,23 @@ class Detections:
         begin = np.maximum(end - frames, 0)
         return 2 * (count[end] - count[begin]) > end - begin
 
+    def _of_votes(self, frames: int, pick: slice) -> np.ndarray:
+        """(K,) log likelihood of the votes, given the raw bits and of how many they are taken."""
+        key = (pick.step, frames)
+        if self._votes[0] != key:
+            right = self.voted(frames)[pick] == self.frames.voted[pick]
+            vote = np.full(right.shape, np.log(VOTE_ERROR))
+            vote[right] = np.log(1 - VOTE_ERROR)
+            vote[np.arange(len(self.frames.raw))[pick] < UNSEEN_FRAMES] = 0
+            self._votes = (key, vote * self.frames.has_vote)
+        return self._votes[1]
+
     def _voted_alone(self, model: native.Model, frames: int) -> np.ndarray:
-        chance = np.clip(self.reported(model, False), SURE, 1 - SURE)
-        told = np.log(np.where(self.frames.voted, chance, 1 - chance))
-        told[(np.arange(len(told)) % frames != frames - 1) | ~self.usable] = np.nan
+        told = np.full(len(self.frames.voted), np.nan)
+        each = slice(frames - 1, None, frames)
+        chance = np.clip(majority(self.chance(model), frames, each), SURE, 1 - SURE)
+        told[each] = np.log(np.where(self.frames.voted[each], chance, 1 - chance))
+        told[~self.usable] = np.nan
         return told
 
     def _capture_s(self, age_s: float) -> np.ndarray:
@@ -132,19 +140,25 @@ class Detections:
         return robot_s * (1 + self.rate) + self.offset_s
 
 
-def majority(chance: np.ndarray, frames: int) -> np.ndarray:
+def majority(chance: np.ndarray, frames: int, of: slice = slice(None)) -> np.ndarray:
     """(K,) probability that more than half of the newest `frames` independent bits are 1.
 
     Poisson-binomial distribution by convolution (Wang 1993, Statistica Sinica 3, 295); at the start
     bits before the first count as it.
+
+    Args:
+        chance: (N,) of each bit.
+        frames: that vote.
+        of: the K frames whose votes are asked.
     """
     padded = np.concatenate([np.full(frames - 1, chance[0]), chance])
-    counts = np.zeros((len(chance), frames + 1))
+    counts = np.zeros((len(chance[of]), frames + 1))
     counts[:, 0] = 1
     for k in range(frames):
-        p = padded[k : k + len(chance), None]
-        moved = np.pad(counts[:, :-1], ((0, 0), (1, 0)))
-        counts = counts * (1 - p) + moved * p
+        p = padded[k : k + len(chance), None][of]
+        kept = counts * (1 - p)
+        kept[:, 1:] += counts[:, :-1] * p
+        counts = kept
     return counts[:, frames // 2 + 1 :].sum(axis=1)
 
 

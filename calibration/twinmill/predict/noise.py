@@ -60,12 +60,6 @@ class ChannelNoise:
             drive * by_phi * phi * period_s / self.memory_s,
         )
 
-    def displaced(self, horizon_s: np.ndarray) -> np.ndarray:
-        """Variance of a displacement over these times: the drive's integral, two readings."""
-        times = horizon_s / self.memory_s
-        drive = 2 * (self.drive * self.memory_s) ** 2 * (times - 1 + np.exp(-times))
-        return drive + 2 * self.sensor**2
-
     def whitening(self, period_s: float) -> tuple[np.ndarray, np.ndarray, float]:
         """Filter (numerator, denominator) and standard deviation of what comes out of it."""
         phi = np.exp(-period_s / self.memory_s)

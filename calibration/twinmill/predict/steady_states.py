@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A steady-state table with the model that is to explain it, as a data set."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,7 +12,6 @@ import twinmill_native as native
 from twinmill.data.log import LogError
 from twinmill.data.steady_table import STILL_MPS, SteadyTable
 from twinmill.model.mixing import asked_by_vendor_move
-from twinmill.model.parameters import MOTION_STAGES
 from twinmill.predict.datasets import PARTS
 
 CHANNELS = (("speed", "m/s"), ("turn", "rad/s"), ("standing side", "m/s"))
@@ -20,6 +20,7 @@ ON_BENCH = tuple((f"wheel {k}", "rad/s") for k in (1, 2, 3, 4))
 # Times the usual error, or the floor: beyond it the table is wrong rather than the model. Such an
 # error counts by its logarithm: a single one decides little, and has a slope to follow.
 TYPING_ERROR = 10.0
+STANDS = 1e-9  # m/s: a robot that stands is told in the direction of its input alone
 DRIVEN_BY = {"wheel_speed": "measured wheel speeds", "twist": "velocities of the body"}
 
 
@@ -27,6 +28,7 @@ DRIVEN_BY = {"wheel_speed": "measured wheel speeds", "twist": "velocities of the
 class SteadyStates:
     """One robot of a table with its model: a data set. Values are (U, C), as `channels`.
 
+    A tape tells how fast a robot is, forwards or backwards alike.
     The third of CHANNELS is the rim speed of the slower side where a note says that it stood still:
     an input that could not be measured tells something, too. NaN is not measured.
     """
@@ -37,7 +39,6 @@ class SteadyStates:
     own: tuple[Any, ...] = ()
     noise: None = None
     clock_free: bool = False
-    stages = MOTION_STAGES
     by_run = False
 
     @classmethod
@@ -84,7 +85,7 @@ class SteadyStates:
     @property
     def n_eff(self) -> np.ndarray:
         """(C,) number of values that were measured, each independent."""
-        return np.isfinite(self._measured()).sum(axis=0).astype(float)
+        return np.isfinite(self.measured()).sum(axis=0).astype(float)
 
     def with_model(self, model: native.Model) -> "SteadyStates":
         """A copy with another model."""
@@ -100,7 +101,13 @@ class SteadyStates:
 
     def errors(self) -> np.ndarray:
         """(U, C) measured less predicted."""
-        return self._measured() - self.predicted()
+        return self.measured() - self.predicted()
+
+    def errors_with(
+        self, model: native.Model, names: Sequence[str], values: np.ndarray
+    ) -> np.ndarray:
+        """(B, U, C) measured less predicted, for B rows of values of named quantities."""
+        return self.measured() - self._predicted(model, list(names), np.ascontiguousarray(values))
 
     def ratios(self) -> np.ndarray:
         """(U, C) errors over their floor, for scores: large ones count by their logarithm.
@@ -117,14 +124,13 @@ class SteadyStates:
 
     def _robust(self, ratios: np.ndarray) -> np.ndarray:
         size = np.abs(ratios)
-        agreed = (self._measured() == 0) & (size < 1)
+        agreed = (self.measured() == 0) & (size < 1)
         robust = np.minimum(size, self._most) * (1 + np.log(np.maximum(size / self._most, 1)))
         return np.where(agreed, np.nan, np.copysign(robust, ratios))
 
     def rows(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
         """(B, R) errors over floor for B rows of values; squares add up to the score's."""
-        predicted = self._predicted(model, names, np.ascontiguousarray(values))
-        ratios = self._robust((self._measured() - predicted) / self.floor())
+        ratios = self._robust(self.errors_with(model, names, values) / self.floor())
         return np.nan_to_num(ratios).reshape(len(values), -1) * np.sqrt(self.judged)
 
     def rows_by_part(self, model: native.Model, names: list[str], values: np.ndarray) -> np.ndarray:
@@ -135,7 +141,7 @@ class SteadyStates:
     @property
     def judged(self) -> np.ndarray:
         """(R,) share of the squared score that each row would make up if all were 1."""
-        known = np.isfinite(self._measured())
+        known = np.isfinite(self.measured())
         count = known.sum(axis=0)
         return (known / (np.maximum(count, 1) * np.count_nonzero(count))).reshape(-1)
 
@@ -150,7 +156,8 @@ class SteadyStates:
         still = np.full(len(self.commands), STILL_MPS)
         return np.column_stack([self.measurement.floor, still])
 
-    def _measured(self) -> np.ndarray:
+    def measured(self) -> np.ndarray:
+        """(U, C) values, as `channels`; NaN is not measured."""
         if self.measurement.of_wheels:
             return self.measurement.value
         still = np.where(self.measurement.still, 0.0, np.nan)
@@ -161,15 +168,36 @@ class SteadyStates:
         if self.measurement.of_wheels:
             return steady[..., 3:] / model.get("robot.wheel_radius_m")
         vx, vy, turn = np.moveaxis(steady[..., :3], -1, 0)
-        rim = steady[..., 3:]
-        forward, left = _direction(self.measurement.inputs)
-        sign = np.where(vx * forward + vy * left < 0, -1.0, 1.0)
+        return np.stack([np.hypot(vx, vy), turn, np.abs(self._slow(steady[..., 3:]))], -1)
+
+    def _slow(self, rim: np.ndarray) -> np.ndarray:
+        """(..., U) rim speed of the side that is asked for less, of (..., U, 4)."""
         sides = np.stack([rim[..., [0, 2]].mean(-1), rim[..., [1, 3]].mean(-1)], -1)
         asked = np.stack(
             [np.abs(self.commands[:, [0, 2]]).mean(1), np.abs(self.commands[:, [1, 3]]).mean(1)], -1
         )
-        slow = np.take_along_axis(sides, asked.argmin(-1)[None, :, None], -1)[..., 0]
-        return np.stack([sign * np.hypot(vx, vy), turn, np.abs(slow)], -1)
+        at = np.broadcast_to(asked.argmin(-1)[:, None], (*sides.shape[:-1], 1))
+        return np.take_along_axis(sides, at, -1)[..., 0]
+
+    def motion(self, model: native.Model) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity that each value is of, and the value's change with it, both (U, C, 3).
+
+        The body's forward, left and turn in m/s and rad/s; on a bench the wheel's in rad/s, and 0.
+        """
+        if self.measurement.of_wheels:
+            speed = self._predicted(model, [], np.zeros((1, 0)))[0]
+            along = np.array([1.0, 0.0, 0.0])
+            return speed[..., None] * along, np.broadcast_to(along, (*speed.shape, 3))
+        steady = native.steady(model, self.commands, [], np.zeros((1, 0)))[0]
+        vx, vy, turn = steady[:, :3].T
+        size, zero, one = np.hypot(vx, vy), np.zeros(len(vx)), np.ones(len(vx))
+        way = np.where(size > STANDS, [vx, vy], _direction(self.measurement.inputs))
+        way = way / np.hypot(*way)
+        slow = self._slow(steady[:, 3:])
+        lever_m = np.where(turn != 0, (slow - vx) / np.where(turn != 0, turn, 1.0), 0.0)
+        side = np.sign(slow) * [one, zero, lever_m]
+        change = np.stack([[*way, zero], [zero, zero, one], side]).transpose(2, 0, 1)
+        return np.repeat(steady[:, None, :3], len(CHANNELS), axis=1), change
 
 
 def _direction(inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

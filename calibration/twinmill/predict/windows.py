@@ -102,10 +102,3 @@ def rms(errors: np.ndarray) -> np.ndarray:
 def score(errors: np.ndarray, floor: np.ndarray) -> float:
     """RMS over horizons and channels of error over floor: 1 is as good as the log can tell."""
     return float(np.sqrt(np.nanmean((rms(errors) / floor) ** 2)))
-
-
-def score_of(parts: list[np.ndarray], floors: list[np.ndarray]) -> float:
-    """Score of several logs, of (H, 3) RMS errors and noise floors of each."""
-    return float(
-        np.sqrt(np.mean([np.nanmean((e / f) ** 2) for e, f in zip(parts, floors, strict=True)]))
-    )

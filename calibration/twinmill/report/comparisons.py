@@ -4,19 +4,9 @@
 from dataclasses import replace
 
 from twinmill.fitting.compare import GOOD, SUSPECT, Comparison, RobotComparison
-from twinmill.model.parameters import catalogue_of
 from twinmill.predict.steady_errors import ON_BENCH, SteadyComparison
 from twinmill.report import detections, steady, tables
 from twinmill.report.tables import Table, number
-
-# By what the robot was doing; the cards of effects say which to think of first.
-WRONG = {
-    "standing": "it is predicted to move while it stands",
-    "steady": "steady speeds are wrong",
-    "starting": "starts are wrong",
-    "stopping": "stops are wrong",
-    "changing": "the response to changes of the command is wrong",
-}
 
 
 def steady_comparisons(comparison: Comparison) -> list[SteadyComparison]:
@@ -70,25 +60,17 @@ def advice(comparison: Comparison, fitted: bool = False) -> str:
     if not phases:
         return "record a longer log with starts, stops and turns, then compare again."
     worst = max(phases, key=lambda r: r.share)
-    model = robot.model
-    fresh = [
-        name
-        for name, card in catalogue_of(model).items()
-        if worst.regime in card["suspect_when"] and name not in model.effects
-    ]
-    try_next = "look at where it fails"
+    try_next = "`twinmill diagnose` names what is missing"
     if comparison.missed:
         try_next = "`twinmill diagnose` tells how it differs from the others"
-    elif fitted:
-        try_next = "`twinmill diagnose` names what is missing"
-    elif fresh:
-        try_next = f"fit if you have not, then add {' or '.join(fresh)}"
+    elif not fitted:
+        try_next = f"fit if you have not, then {try_next}"
     whose, who = "", "the robot"
     if len(comparison.robots) > 1:
         whose, who = f" of {robot.measurement.label}", "it"
     return (
         f"{100 * worst.share:.0f} % of the error{whose} comes while {who} is {worst.regime} "
-        f"({number(worst.ratio)} times the noise floor): {WRONG[worst.regime]}; {try_next}."
+        f"({number(worst.ratio)} times the noise floor); {try_next}."
     )
 
 

@@ -23,16 +23,16 @@ FEWEST = 10  # frames of a place that tell a share
 
 
 def steps(found: Sequence[tuple[str | None, float]]) -> Table:
-    """The camera's effects as they were found, on frames that were not fitted to."""
+    """Scores of the detections with each of the camera's effects that were found."""
     rows = [
         [Cell(f"+ {effect}" if effect else "as given"), Cell(number(score, 4), tone(score))]
         for effect, score in found
     ]
     return Table(
         "Detections: score after each step",
-        ["step", "held-out\nscore"],
+        ["step", "score"],
         rows,
-        "On held-out frames: 1.0 is as good as a right model.",
+        "1.0 is as good as a right model.",
         words=(0,),
     )
 

@@ -64,7 +64,7 @@ class Section:
 SCORE_NOTE = (
     "The score is prediction error over what noise alone would cause: 1.0 is as good as this log "
     "can tell, above about 1.3 something is missing in the model, below 0.9 it predicts better "
-    "than the smooth response from which the noise floor comes."
+    "than the best model found, from whose noise the floor comes."
 )
 
 

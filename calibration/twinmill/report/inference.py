@@ -12,10 +12,9 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from twinmill.arguments import option
-from twinmill.fitting.compare import Comparison
-from twinmill.inference.answer import Answer, Named, units_of
-from twinmill.inference.infer import Inference
-from twinmill.inference.robots import shared
+from twinmill.diagnosis.infer import Inference
+from twinmill.fitting.compare import LACKING
+from twinmill.inference.answer import LIKELY, Answer, Named, units_of
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
 from twinmill.model.parameters import catalogue
@@ -24,16 +23,11 @@ from twinmill.report.canvas import FLOOR, PREDICTED, draw
 from twinmill.report.charted import charts
 from twinmill.report.error_figures import waterfall
 from twinmill.report.sections import beside, robot_pictures
-from twinmill.report.tables import VERDICTS, Cell, Table, number, of_unit, tone
+from twinmill.report.tables import VERDICTS, Cell, Table, number, of_unit, percent, tone
 
 if TYPE_CHECKING:
-    from twinmill.inference.better import Better
+    from twinmill.diagnosis.fleet import Fleet
 
-ONE_BY_ONE = (
-    "Robots of one model differ by an amount that infer does not know: a small effect of one robot "
-    "alone may be its own gains. For all results of one robot, give its logs alone."
-)
-LIKELY = 0.5  # probability of what is said in the sentences on several robots
 SHOWN = 0.01  # probability of an effect that is listed; --json has all
 SHARES = (
     "Shares are of the squared error that the refitted base leaves above the noise: an effect's is "
@@ -45,25 +39,52 @@ SCORES = (
     "the most probable ones by steps of 0.1 s and what was known before, not those with the least "
     "score, so a score may also rise; what has no name is in them by its formula alone."
 )
+OF_TABLES = (
+    "Scores are RMS errors of readings over their floors, the largest by their logarithm. The "
+    "models are the most probable ones, not those with the least score, so a score may also rise."
+)
+NOTHING, OUTSIDE = "Nothing is missing", "something outside the catalogue"
 SEVERAL = "Several dependences may be there at once: their probabilities do not add up to 100 %."
 
 
-def sentence(answer: Answer) -> str:
-    """The verdict in one sentence, with its probability."""
+def sentence(answer: Answer, nothing: str = NOTHING) -> str:
+    """The verdict with its probability, and that the base's numbers are stale.
+
+    Args:
+        answer: with the verdict.
+        nothing: words for that nothing is missing.
+    """
+    told = _verdict(answer, nothing)
+    if _stale(answer) or answer.stale <= LIKELY or not told.startswith(LACKING):
+        return told
+    return f"{told} The base's numbers are stale, too ({percent(answer.stale)})."
+
+
+def sentence_on(result: Inference) -> str:
+    """The sentence on one robot or on tables: what its own log shows, too, is nothing new."""
+    return sentence(result.answer, "Nothing new is missing" if _no_news(result) else NOTHING)
+
+
+def _verdict(answer: Answer, nothing: str) -> str:
+    """The verdict in one sentence, with its probability; arguments as of `sentence`."""
     if answer.verdict == "cannot_tell":
-        return (
-            f"This log cannot tell: nothing is missing ({percent(answer.nothing)}), or something "
-            f"outside the catalogue ({percent(answer.outside)}), or an effect."
-        )
+        return f"This cannot be told: {', or '.join(_possible(answer))}."
     if answer.verdict in ("model_adequate", "refit_enough"):
         better = ", but the base's numbers are stale: fit it anew" if _stale(answer) else ""
-        return f"Nothing is missing ({percent(answer.nothing)}){better}."
+        return f"{nothing} ({percent(answer.nothing)}){better}."
     names = " and ".join(_name(f) for f in answer.findings)
     if answer.verdict == "outside_catalogue":
         like = f", most like {names}" if names else ""
-        outside = f"something outside the catalogue ({percent(answer.outside)})"
-        return f"Missing: {outside}{like}{_on(answer)}."
-    return f"Missing: {names}{_on(answer)}."
+        return f"{LACKING}{OUTSIDE} ({percent(answer.outside)}){like}{_on(answer)}."
+    return f"{LACKING}{names}{_on(answer)}."
+
+
+def _possible(answer: Answer) -> list[str]:
+    """Things that may be missing, or that nothing is, with probabilities; the likeliest first."""
+    each = {f"{name} is missing": p for name, p in answer.effects.items()}
+    each |= {"nothing is missing": answer.nothing, OUTSIDE: answer.outside}
+    likely = [words for words, p in each.items() if p >= PRIORS.member]
+    return [f"{words} ({percent(each[words])})" for words in sorted(likely, key=lambda w: -each[w])]
 
 
 def next_run(answer: Answer) -> str:
@@ -75,111 +96,71 @@ def next_run(answer: Answer) -> str:
     return f"{names} {verb} neither sure nor ruled out; another run would tell."
 
 
-def terminal_of_robots(
-    results: Sequence[Inference], commands: show.Commands = (), written: Better | None = None
-) -> RenderableType:
-    """Text on the robots of a log: of one all, of several what is missing of each.
-
-    Args:
-        results: one for each robot.
-        commands: what to type then, each with why.
-        written: the new model of one robot.
-    """
-    if len(results) > 1:
-        told = map(Text, shared_words(results))
-        return Group(*told, Text(), show.table(_robots(results)), Text(ONE_BY_ONE))
-    new = [Text(), Text(_new(written))] if written else []
-    return Group(terminal(results[0]), *new, *show.typed_next(commands))
+def section(result: Inference) -> Section:
+    """The page on one robot, or on tables."""
+    curves = [figure for left in result.left for figure in unnamed.figures(left)]
+    notes = [*_formula(result), *_left_out(result), *_known(result)]
+    bars = probabilities(result.answer)
+    page = page_of(result, sentence_on(result), _tables(result), bars=bars, curves=curves)
+    return replace(page, notes=notes)
 
 
-def section(
-    results: Sequence[Inference], commands: show.Commands = (), written: Better | None = None
+def page_of(
+    result: Inference | Fleet,
+    told: str,
+    tables: list[Table],
+    *,
+    bars: Figure,
+    curves: Sequence[Figure] = (),
 ) -> Section:
-    """The page on the robots of a log: verdicts, figures, tables and the commands that follow.
+    """The page on a result: scores, figures and tables.
 
     Args:
-        results: as of `terminal_of_robots`.
-        commands: likewise.
-        written: likewise.
+        result: logs of one robot or several, judged.
+        told: verdict in words.
+        tables: below the figures.
+        bars: figure of probabilities.
+        curves: figures on what has no name.
     """
-    before, refitted, after = (
-        _joined([getattr(result, which) for result in results])
-        for which in ("before", "refitted", "after")
-    )
-    scores = [("as given", before.score), ("base refitted", refitted.score)]
-    if any(result.finds for result in results):
-        scores.append(("with what was found", after.score))
+    before, after, scores = result.before, result.after, _scores_of(result)
     errors = [("as given", before.shown), ("with what was found", beside(before, after))]
-    one = results[0] if len(results) == 1 else None
     return Section(
         f"What {before.model_name} lacks",
         [(label, number(value), tone(value)) for label, value in scores],
-        "\n".join(_verdicts(results)),
+        told,
         comparisons.facts(before),
         [
-            *([probabilities(one.answer)] if one else []),
-            *(figure for left in (one.left if one else ()) for figure in unnamed.figures(left)),
-            _fall(scores),
+            bars,
+            *curves,
+            _fall(scores, _about(result)),
             *robot_pictures(before, errors),
         ],
-        _tables(one) if one else [_robots(results)],
+        tables,
         charts=charts(before, [("with what was found", robot.model) for robot in after.robots]),
-        next_step=next_run(one.answer) if one else "",
-        commands=[(f"{why}:", command) for why, command in commands],
-        notes=[
-            *([*_formula(one), *_left_out(one), *_known(one)] if one else [ONE_BY_ONE]),
-            *([_new(written)] if written else []),
-        ],
-        warnings=[*results[0].strangers, *before.warnings],
+        next_step=next_run(result.answer),
+        warnings=[*result.strangers, *before.warnings],
         folded=[_priors()],
     )
 
 
-def _joined(each: Sequence[Comparison]) -> Comparison:
-    """One comparison of the robots of several."""
-    robots = [robot for one in each for robot in one.robots]
-    return replace(each[0], robots=robots, warnings=[w for one in each for w in one.warnings])
+def _about(result: Inference | Fleet) -> str:
+    """Scores' meaning, of logs or of tables."""
+    return OF_TABLES if isinstance(result, Inference) and result.of_tables else SCORES
 
 
-def _fall(scores: list[tuple[str, float]]) -> Figure:
+def _scores_of(result: Inference | Fleet) -> list[tuple[str, float]]:
+    """Scores of the given model, of its refitted base and of what was found, with their names."""
+    scores = [("as given", result.before.score), ("base refitted", result.refitted.score)]
+    return [*scores, ("with what was found", result.after.score)] if result.finds else scores
+
+
+def _fall(scores: list[tuple[str, float]], about: str) -> Figure:
     """Fall of the score, with what the three models are."""
-    drawn = waterfall(scores, "on the logs that were judged")
-    return replace(drawn, caption=f"{drawn.caption} {SCORES}")
+    drawn = waterfall(scores, "on what was judged")
+    return replace(drawn, caption=f"{drawn.caption} {about}")
 
 
-def _verdicts(results: Sequence[Inference]) -> list[str]:
-    if len(results) == 1:
-        return [sentence(results[0].answer)]
-    return shared_words(results)
-
-
-def shared_words(results: Sequence[Inference]) -> list[str]:
-    """Sentences on what several robots lack together, and what each lacks beside that."""
-    found = shared([result.table for result in results])
-    of_all = _likely(found.things, found.words)
-    none = f"Nothing is missing of all {len(results)} robots ({percent(found.nothing)})."
-    words = [f"All {len(results)} robots lack {listed(of_all)}." if of_all else none]
-    for result, own in zip(results, found.own, strict=True):
-        if likely := _likely(own, found.words):
-            words.append(f"{_label(result)} lacks {listed(likely)}{' besides' if of_all else ''}.")
-    return words
-
-
-def _likely(things: dict[str, float], dependences: frozenset[str]) -> list[str]:
-    """Words on the things that are likelier than not."""
-    told = []
-    for name, p in things.items():
-        if p > LIKELY:
-            what = f"something that depends on {name}" if name in dependences else name
-            told.append(f"{what} ({percent(p)}{'' if p >= PRIORS.sure else ', not sure'})")
-    return told
-
-
-def _label(result: Inference) -> str:
-    return f"R{result.measurements[0].track.robot_id:02d}"
-
-
-def probabilities(answer: Answer) -> Figure:
+def probabilities(answer: Answer, title: str = "What is missing, with its probability") -> Figure:
     """Bars of the probability of each effect, of nothing and of an unknown cause."""
     told = {"nothing is missing": answer.nothing, "outside the catalogue": answer.outside}
     effects = {name: p for name, p in answer.effects.items() if p >= SHOWN}
@@ -206,7 +187,7 @@ def probabilities(answer: Answer) -> Figure:
 
     return Figure(
         draw(0.9 + 0.36 * max(len(rows), 3), paint),
-        "What is missing, with its probability",
+        title,
         f"Several effects may be missing at once. Dashed: {PRIORS.sure:g}, from which on an effect "
         "is called sure.",
     )
@@ -218,40 +199,11 @@ def _priors() -> Table:
     return Table("Prior knowledge", ["name", "value", "meaning"], rows, words=(0, 2))
 
 
-def _new(written: Better) -> str:
-    has = f"has {', '.join(written.added)}" if written.added else "has the base's new numbers"
-    return (
-        f"{written.file.path} {has}: score {number(written.before.score)} without, "
-        f"{number(written.after.score)} with (1 is as good as the log can tell)."
-    )
-
-
-def _robots(results: Sequence[Inference]) -> Table:
-    rows = []
-    for result in results:
-        numbers = "; ".join(
-            f"{f.effect}.{name} {number(value)} ± {number(std, 2)} "
-            f"{of_unit(units_of(f.effect).get(name, ''))}".rstrip()
-            for f in result.answer.findings
-            for name, (value, std) in f.numbers.items()
-        )
-        rows.append([Cell(_label(result)), Cell(sentence(result.answer)), Cell(numbers)])
-    return Table("Each robot by itself", ["robot", "answer", "numbers"], rows, words=(0, 1, 2))
-
-
 def terminal(result: Inference) -> RenderableType:
     """Text on one robot: verdict, scores, effects, dependences, and errors that are not new."""
-    scores = (
-        f"score {number(result.before.score)} as given, "
-        f"{number(result.refitted.score)} after a refit of the base"
-    )
-    if result.finds:
-        scores += f", {number(result.after.score)} with what was found"
-    falls = result.before.score >= result.refitted.score >= result.after.score
     return Group(
-        Text(sentence(result.answer), show.STYLES[VERDICTS[result.answer.verdict]]),
-        Text(scores),
-        *([] if falls else [Text(SCORES)]),
+        Text(sentence_on(result), show.STYLES[VERDICTS[result.answer.verdict]]),
+        *scores_in_words(result),
         Text(),
         *map(show.table, _tables(result)),
         *map(Text, (*_formula(result), *_left_out(result), *_known(result))),
@@ -260,17 +212,32 @@ def terminal(result: Inference) -> RenderableType:
     )
 
 
+def scores_in_words(result: Inference | Fleet) -> list[Text]:
+    """Scores of the three models in a line, and what they are where they do not fall."""
+    scores = (
+        f"score {number(result.before.score)} as given, "
+        f"{number(result.refitted.score)} after a refit of the base"
+    )
+    if result.finds:
+        scores += f", {number(result.after.score)} with what was found"
+    falls = result.before.score >= result.refitted.score >= result.after.score
+    return [Text(scores), *([] if falls else [Text(_about(result))])]
+
+
 def _tables(result: Inference) -> list[Table]:
-    answer = result.answer
+    return [*of_answer(result.answer), *([unseen(result.not_shown)] if result.not_shown else [])]
+
+
+def of_answer(answer: Answer) -> list[Table]:
+    """Tables of effects and dependences with their probabilities."""
     return [
         *([_effects(answer.findings)] if answer.findings else []),
         *([_dependences(answer)] if answer.depends_on else []),
         *([others] if (others := _others(answer)) else []),
-        *([_unseen(result.not_shown)] if result.not_shown else []),
     ]
 
 
-def _unseen(not_shown: dict[str, str]) -> Table:
+def unseen(not_shown: dict[str, str]) -> Table:
     """Effects that these logs cannot show, those of one reason in a row."""
     of_why: dict[str, list[str]] = {}
     for effect, why in not_shown.items():
@@ -307,22 +274,24 @@ def _known(result: Inference) -> list[str]:
     """Errors that are not new, as far as they are known, in sentences."""
     always = result.always
     if always is None and result.told_here:
-        return ["This log told the base, too, so that all is named that the base misses in it."]
+        what = "table" if result.of_tables else "log"
+        return [f"This {what} told the base, too, so that all is named that the base misses in it."]
+    if result.of_tables:
+        return []
     if always is None:
         return [
             "The model's error on the log that it was fitted to is not known, so it may be "
             f"reported as new: give that log with {option('own')}, and store its result with "
             f"{option('keep')}."
         ]
-    known = [*always.effects, *(name for name, _ in always.kernels)]
+    known = _no_news(result)
     return [f"No news, since its own log shows it: {', '.join(known)}."] if known else []
 
 
-def percent(probability: float) -> str:
-    """A probability in percent; none is certain."""
-    if probability > 0.99:
-        return f"{min(100 * probability, 99.9):.1f} %"
-    return f"{100 * probability:.0f} %" if probability >= 0.01 else "< 1 %"
+def _no_news(result: Inference) -> list[str]:
+    """Names of effects and kernels that the model lacks in its own log, too."""
+    always = result.always
+    return [*always.effects, *(name for name, _ in always.kernels)] if always else []
 
 
 def _stale(answer: Answer) -> bool:
@@ -352,13 +321,19 @@ def _effects(findings: list[Named]) -> Table:
                     Cell("" if k else f.effect),
                     Cell("" if k else percent(f.probability), bar=None if k else f.probability),
                     Cell(name),
-                    Cell(f"{number(value)} ± {number(std, 2)}"),
+                    Cell(give_or_take(value, std)),
                     Cell(of_unit(units_of(f.effect).get(name, ""))),
                 ]
             )
     columns = ["effect", "probability", "number", "value ± std", "unit"]
     note = "\n".join(f"{f.effect}: {catalogue()[f.effect]['summary']}" for f in findings)
     return Table("Missing effects", columns, rows, words=(0, 2, 4), note=note)
+
+
+def give_or_take(value: float | None, std: float | None) -> str:
+    """A number with its standard deviation where that is known."""
+    known = std is not None and np.isfinite(std)
+    return f"{number(value)} ± {number(std, 2)}" if known else number(value)
 
 
 def _others(answer: Answer) -> Table | None:

@@ -14,8 +14,8 @@ from twinmill.joints.explain import JointExplanation
 from twinmill.joints.importers.import_joints import ImportedJoints
 from twinmill.joints.next import Excitation, sure
 from twinmill.report import show
-from twinmill.report.inference import SHARES, of_rest, percent, sentence
-from twinmill.report.tables import Cell, Table, number
+from twinmill.report.inference import SHARES, of_rest, sentence
+from twinmill.report.tables import Cell, Table, number, percent
 
 QUESTIONS = 8  # that are listed, those first that stay open; --json has all
 PLACES = {"mjcf": "MJCF", "hook": "hook", None: "neither"}  # that hold an effect

@@ -11,7 +11,7 @@ from twinmill.predict.detection_errors import DetectionComparison
 from twinmill.predict.steady_errors import SteadyComparison
 from twinmill.report import comparisons, detections, steady, tables
 from twinmill.report.charted import charts
-from twinmill.report.error_figures import error_growth, regimes, waterfall
+from twinmill.report.error_figures import error_growth, regimes
 from twinmill.report.html import Figure, Section
 from twinmill.report.motion_figures import floor_map
 from twinmill.report.tables import Table, number, tone
@@ -102,12 +102,6 @@ def _camera_section(result: AddResult, detected: DetectionComparison) -> Section
         figures=[detections.field_of_view(detected)],
         tables=[tables.parameters(result.parameters), *detections.confusion_tables(detected)],
     )
-
-
-def steps_section(title: str, scores: list[tuple[str, float]], verdict: str) -> Section:
-    """Section on a chain of steps."""
-    ends = [_score("start", scores[0][1]), _score("end", scores[-1][1])]
-    return Section(title, ends, verdict, figures=[waterfall(scores)], tables=[tables.steps(scores)])
 
 
 def beside(shown: Comparison, other: Comparison) -> RobotComparison | SteadyComparison:

@@ -133,7 +133,12 @@ def robots(entry: dict[str, Any]) -> str:
 
 
 def table(data: Table) -> RenderableType:
-    """A table for the terminal: cells in their tone, bars as blocks, words left-aligned."""
+    """A table for the terminal: cells in their tone, bars as blocks where there is room."""
+    return Fitting(_made(data, bars=True), data.lists, Fitting(_made(data, bars=False), data.lists))
+
+
+def _made(data: Table, bars: bool) -> RichTable:
+    """The table itself, words left-aligned."""
     made = RichTable(
         title=data.title,
         title_justify="left",
@@ -148,8 +153,8 @@ def table(data: Table) -> RenderableType:
         words = i in data.words
         made.add_column(column, justify="left" if words else "right", no_wrap=not words or i == 0)
     for row in data.rows:
-        made.add_row(*(_cell(cell) for cell in row))
-    return Fitting(made, data.lists)
+        made.add_row(*(_cell(cell, bars) for cell in row))
+    return made
 
 
 def score_line(label: str, result: Comparison, number_too: bool = True) -> Text:
@@ -160,10 +165,9 @@ def score_line(label: str, result: Comparison, number_too: bool = True) -> Text:
     return line.append(result.verdict)
 
 
-def _cell(cell: Cell) -> Text:
-    text = Text(cell.text, STYLES[cell.tone])
-    if cell.bar is None:
-        return text
+def _cell(cell: Cell, bars: bool) -> Text:
+    if cell.bar is None or not bars:
+        return Text(cell.text, STYLES[cell.tone])
     filled = max(0, min(BAR, round(BAR * cell.bar)))
     return Text.assemble(
         ("█" * filled, STYLES[cell.tone]),

@@ -3,12 +3,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Any, Literal
 
 import numpy as np
 
 from twinmill.data.measurement import Measurement
+from twinmill.data.units import date_of
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
 from twinmill.fitting.fit import Held
@@ -28,7 +28,7 @@ VERDICTS: dict[str, Tone] = {
     "outside_catalogue": "bad",
 }
 
-OF_RESPONSE = "error of a smooth response to the commands, in-sample and held out"
+OF_BEST = "error by the noise of the best model found, as diagnose searches for it"
 SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
@@ -107,7 +107,7 @@ def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str
         ),
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading, wrong=robot.score > GOOD)),
-        ("noise floor", robot.floor.reason or OF_RESPONSE),
+        ("noise floor", robot.floor.reason or OF_BEST),
         ("clocks", _clocks(robot)),
         *_held_heading(robot),
         *_wheel_angles(robot),
@@ -119,8 +119,8 @@ def _date(measurement: Measurement) -> str:
     """Date of a recording; the twin's own start is a fixed one, the same in every run."""
     if measurement.simulated:
         return "simulated"
-    recorded = datetime.fromtimestamp(measurement.recorded_utime_us / 1e6, UTC)
-    return f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded.year > 2000 else "date unknown"
+    recorded = date_of(measurement.recorded_utime_us)
+    return f"{recorded:%Y-%m-%d %H:%M} UTC" if recorded else "date unknown"
 
 
 def _clocks(robot: RobotComparison) -> str:
@@ -265,16 +265,21 @@ def where(robot: RobotComparison) -> Table:
     )
 
 
+def doubt_of(e: ParameterEstimate) -> str:
+    """Why an estimate is not just what the log tells; empty if it is."""
+    if e.at_bound:
+        return "at its bound"
+    if not e.told:
+        return "from the prior" if e.prior else "not determined by this log"
+    return "" if e.seen else "known only in combination"
+
+
 def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) -> Table:
     """Fitted quantities with their uncertainty, then those that were held."""
     rows = []
     for e in estimates:
         told = e.told or e.prior
-        doubt = "" if e.seen else "known only in combination"
-        if not e.told:
-            doubt = "from the prior" if e.prior else "not determined by this log"
-        if e.at_bound:
-            doubt = "at its bound"
+        doubt = doubt_of(e)
         remark = "; ".join(words for words in (e.words, doubt) if words)
         value, std = (
             (rounded(e.value, e.std), f"± {number(e.std)}") if told else (number(e.value), "-")
@@ -305,6 +310,13 @@ def parameters(estimates: list[ParameterEstimate], held: Sequence[Held] = ()) ->
 def of_unit(unit: str) -> str:
     """A unit for people; nothing for a pure number."""
     return "" if unit == "1" else unit.replace("^2", "²")
+
+
+def percent(probability: float) -> str:
+    """A probability in percent; none is certain."""
+    if probability > 0.99:
+        return f"{min(100 * probability, 99.9):.1f} %"
+    return f"{100 * probability:.0f} %" if probability >= 0.01 else "< 1 %"
 
 
 def estimate(e: ParameterEstimate) -> str:
@@ -344,22 +356,6 @@ def held_out(added: AddResult) -> list[Table]:
         "Six-fold cross-validation: each part of the log is predicted by a fit to the other five."
     )
     return [Table("Errors on held-out data", columns, rows, note)]
-
-
-def steps(scores: list[tuple[str, float]]) -> Table:
-    """Score after each step of a chain, with a bar on a scale of factors."""
-    widest = max(np.log(max(score, 1.0)) for _, score in scores) or 1.0
-    rows = [
-        [Cell(label), Cell(number(score), tone(score), float(np.log(max(score, 1.0)) / widest))]
-        for label, score in scores
-    ]
-    return Table(
-        "Score after each step",
-        ["step", "held-out\nscore"],
-        rows,
-        "On held-out data, without robots that differ from the others. 1.0 is as good as the log "
-        "can tell; bars have a logarithmic scale.",
-    )
 
 
 def catalogue(entries: list[dict[str, Any]]) -> Table:

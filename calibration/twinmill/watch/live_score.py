@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well a model predicts what robots did in the last seconds, over and over."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import twinmill_native as native
@@ -11,8 +11,8 @@ from twinmill.data.log import LogError
 from twinmill.data.measurement import Measurement
 from twinmill.data.multi_log import RecordedRobot
 from twinmill.data.track import REST_S, Track, make_track
-from twinmill.fitting.floor import NoiseFloor, noise_floor
-from twinmill.fitting.opening import Opened
+from twinmill.estimation.opened import NoiseFloor, Opened
+from twinmill.inference.floor import noise_floor
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import CLOCK
 from twinmill.predict.datasets import Trajectory
@@ -58,10 +58,9 @@ class LiveScorer:
             data = Trajectory.at(measurement, windows)
             model, same_clock = self._own(measurement)
             if self._floor is None or self._floor.kind is None:
-                self._floor = noise_floor(data, model, same_clock)
+                self._floor = noise_floor(measurement, self.model_file)
                 if self._floor.kind is None:
                     return None
-                data = replace(data, keep=self._floor.keep)
             data = data.over(self._floor.rms)
             own = Opened(measurement, data, model, self._floor, same_clock)
             own = own.aligned(self.model_file.model, self._offset_s)

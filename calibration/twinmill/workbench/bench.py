@@ -15,7 +15,6 @@ from twinmill.charts.arrays import RESTARTS, measured_path
 from twinmill.charts.packed import pack, pack_log, pack_prediction, pack_robot
 from twinmill.data.camera_frames import frames_of
 from twinmill.data.log import LogError
-from twinmill.diagnosis.trials import REFIT
 from twinmill.files import plain
 from twinmill.model.parameters import is_of_camera
 from twinmill.workbench.session import Session, beside_label
@@ -234,9 +233,8 @@ class Bench:
     async def _look_ahead(self) -> None:
         """Foresees what a click on each finding will show, before it comes."""
         for finding in (self.session.diagnosis or {"findings": ()})["findings"]:
-            of = "" if finding["effect"] == REFIT else finding["effect"]
-            if self.ready and moves(of):
-                await self.aside(self.session.preview, of, self.picked)
+            if self.ready and moves(finding["effect"]):
+                await self.aside(self.session.preview, finding["effect"], self.picked)
 
     async def _settled(self) -> None:
         """The session stands at another model: its prediction first, then what takes longer."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import tomlkit
 
+from twinmill.estimation.opened import Opened
 from twinmill.fitting.fit import base_names
-from twinmill.fitting.opening import Opened
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import (
     Parameter,

@@ -3,12 +3,13 @@
 
 from nicegui import ui
 
-from twinmill.diagnosis.trials import REFIT, REFIT_IN_WORDS
+from twinmill.diagnosis.fleet import REFIT
 from twinmill.fitting.add import OWN_GAINS
-from twinmill.model.parameters import catalogue, instance_of
-from twinmill.report.inference import percent
+from twinmill.inference.answer import LIKELY
+from twinmill.model.parameters import catalogue
+from twinmill.report.tables import percent
 from twinmill.workbench.bench import moves
-from twinmill.workbench.panel import PageActions, estimate, markup, scored, tone
+from twinmill.workbench.panel import PageActions, estimate, markup, scored
 from twinmill.workbench.session import beside_label, effect_of
 from twinmill.workbench.typeset import typeset
 
@@ -73,6 +74,8 @@ class MissingPanel:
                 ).classes("soft")
                 return
             self._said(found)
+            if found["probability"]["stale"] > LIKELY:
+                self._stale(found["probability"]["stale"])
             for finding in found["findings"]:
                 self._finding(finding)
             self._rest(found)
@@ -91,17 +94,22 @@ class MissingPanel:
             stale,
         )
 
+    def _stale(self, probability: float) -> None:
+        card = ui.element("div").classes("note").props('data-testid="stale"')
+        with card, ui.element("div").classes("head"):
+            words = "<b>The base's numbers are stale ({})</b>"
+            markup(words, percent(probability)).style("flex: 1")
+            self._buttons("")
+
     def _finding(self, finding: dict) -> None:
         effect, share = finding["effect"], finding["share"]
         sure = finding["certainty"] == "sure"
         with ui.element("div").classes("note").props(f'data-testid="finding-{effect}"'):
             with ui.element("div").classes("head"):
-                name = REFIT_IN_WORDS if effect == REFIT else effect
-                markup("<b>{}</b>", name).style("flex: 1")
+                markup("<b>{}</b>", effect).style("flex: 1")
                 ui.label(_chance(finding)).classes(f"chip {'good' if sure else 'warn'}")
                 self._buttons(effect)
-            if effect != REFIT:
-                _told(effect)
+            _told(effect)
             words = "less than 1 %" if share < 0.005 else f"{100 * share:.0f} %"
             markup(
                 '<div class=share><i style="width:{}%"></i></div>removes {} of the error',
@@ -112,8 +120,6 @@ class MissingPanel:
             ui.label(estimates).classes("soft")
             if finding["group"]:
                 self._rivals(finding["group"][1:])
-            if finding.get("why"):
-                ui.label(finding["why"]).classes("warn")
 
     def _rivals(self, rivals: list[str]) -> None:
         """Effects that these logs cannot distinguish from a finding."""
@@ -127,72 +133,44 @@ class MissingPanel:
         self._adding.append(button)
 
     def _buttons(self, effect: str, robot_id: int | None = None) -> None:
-        """To see what an effect would change, and to take it in."""
-        verb, words = ("fit", "Refit") if effect == REFIT else ("add", "Add")
-        of = "" if effect == REFIT else effect
-        name = effect_of(effect, robot_id).replace(" of ", "-")
-        if moves(of):
-            button = ui.button("Show", on_click=lambda: self.page.try_beside(of, robot_id))
+        """To see what an effect, or without a name a refit, would change, and to take it in."""
+        verb, words = ("add", "Add") if effect else ("fit", "Refit")
+        name = effect_of(effect or REFIT, robot_id).replace(" of ", "-")
+        if moves(effect):
+            button = ui.button("Show", on_click=lambda: self.page.try_beside(effect, robot_id))
             button.props(f'dense flat no-caps padding="0 8px" data-testid="show-{name}"')
             button.tooltip("Draws its effect on the predictions, before it is added")
-            self._trying.setdefault(beside_label(of, robot_id), []).append(button)
+            self._trying.setdefault(beside_label(effect, robot_id), []).append(button)
         options = {"robot_id": robot_id}
-        button = ui.button(words, on_click=lambda: self.page.start(verb, of, options))
+        button = ui.button(words, on_click=lambda: self.page.start(verb, effect, options))
         button.props(f'dense outline no-caps padding="0 12px" data-testid="add-{name}"')
         self._adding.append(button)
 
     def _rest(self, found: dict) -> None:
         rest = found["rest"]
-        if found["findings"] and "certainty" in rest:
-            most, other = ("most likely ", " or ") if rest.get("likely") else ("", ", ")
-            on = other.join(rest["depends_on"])
-            words = f"Unexplained: {100 * rest['share']:.0f} %"
-            words += f", depends {most}on {on}" if on and rest.get("told", True) else ""
-            certainty = rest["certainty"] if rest.get("told", True) else "no more than noise"
-            ui.label(f"{words}: {certainty}.").classes("soft")
-        elif rest["depends_on"]:
+        if rest["depends_on"]:
             each = [f"{word} ({percent(p)})" for word, p in rest["probability"].items()]
             ui.label(f"What is left depends on {', '.join(each)}.").classes("soft")
         for off in found["robots_off"]:
             self._robot(off)
-        self._would_show(found.get("robots", []))
-        doubts = [f["why"] for f in found["findings"] if f.get("why")]  # which the findings say
-        for note in found.get("notes", found["warnings"]):
-            if any(why in note for why in doubts):
-                continue
-            ui.label(note).classes("soft").style("margin-top: 6px")
+        for warning in found["warnings"]:
+            ui.label(warning).classes("soft").style("margin-top: 6px")
 
     def _robot(self, off: dict) -> None:
-        """One that differs from the others: how, and its own effect to be taken in.
-
-        Gains by axis are of the base, and `explain` writes them.
-        """
-        sentence, effect = off.get("sentence"), off["effect"]
-        if not sentence:
-            return
-        if effect is None or not moves(effect) or instance_of(effect) == "base":
-            _card("wrong", "{}", sentence)
+        """One that differs from the others: how, and its own effect to be taken in."""
+        effect = OWN_GAINS if off["effect"] == REFIT else off["effect"]
+        if effect != OWN_GAINS and (effect not in catalogue() or not moves(effect)):
+            _card("wrong", "{}", off["sentence"])
             return
         with ui.element("div").classes("note wrong").props(f'data-testid="off-{off["robot_id"]}"'):
             with ui.element("div").classes("head"):
-                markup("<b>{}</b>", sentence).style("flex: 1")
-                own = effect if effect in catalogue() else OWN_GAINS
-                self._buttons(own, off["robot_id"])
+                markup("<b>{}</b>", off["sentence"]).style("flex: 1")
+                self._buttons(effect, off["robot_id"])
             ui.label("; ".join(estimate(p) for p in off["parameters"])).classes("soft")
-
-    def _would_show(self, robots: list[dict]) -> None:
-        """The smallest difference of each robot that these logs would have put beyond doubt."""
-        if not robots:
-            return
-        with ui.expansion("What these logs would show").props("dense").style("width: 100%"):
-            rows = [("robot", "speed", "turning")]
-            rows += [
-                (f"R{r['robot_id']:02d}", *map(_share, (r["speed"], r["turn"]))) for r in robots
-            ]
-            for k, row in enumerate(rows):
-                cells = markup("<div>{}</div>" * len(row), *row)
-                cells.classes("model head" if k == 0 else "model still")
-            ui.label("The smallest difference from the model beyond doubt.").classes("soft")
+            for rival in (off.get("group") or ())[1:]:
+                with ui.element("div").classes("line"):
+                    ui.label(rival).style("flex: 1")
+                    self._buttons(rival, off["robot_id"])
 
     def _others(self, found: dict) -> None:
         """Lists the other effects that were tried, best first."""
@@ -204,19 +182,12 @@ class MissingPanel:
             for r in others:
                 with ui.element("div").classes("line"):
                     ui.label(r["effect"]).style("flex: 1")
-                    if "probability" in r:
-                        ui.label(percent(r["probability"]))
-                    else:
-                        ui.label(f"held out {scored(r['score_heldout'])}").classes(
-                            tone(r["score_heldout"])
-                        )
+                    ui.label(percent(r["probability"]))
                     self._buttons(r["effect"])
 
 
 def _chance(finding: dict) -> str:
-    """How certain a finding is, with its probability where one is told."""
-    if "probability" not in finding:
-        return str(finding["certainty"])
+    """How certain a finding is, with its probability."""
     return f"{finding['certainty']}, {percent(finding['probability'])}"
 
 
@@ -226,10 +197,6 @@ def _told(effect: str) -> None:
     if entry:
         ui.label(entry["summary"])
         markup("{}", typeset(entry["equation"])).classes("eq")
-
-
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f} %"
 
 
 def _card(kind: str, form: str, *values: str) -> None:

@@ -22,11 +22,12 @@ from twinmill.data.checks import InputFinding
 from twinmill.data.log import Log, RobotLog, read_log
 from twinmill.data.measurement import Measurements, clean_measurements
 from twinmill.data.steady_table import is_steady_table
+from twinmill.estimation.opened import Opened
+from twinmill.estimation.score_fit import ScoreFit
 from twinmill.files import replacing
 from twinmill.fitting.add import begun_at_best, with_effect, with_own
 from twinmill.fitting.fit import base_names
-from twinmill.fitting.opening import Opened, on_clock_of_others, open_measurements
-from twinmill.fitting.score_fit import ScoreFit
+from twinmill.fitting.opening import on_clock_of_others, open_measurements
 from twinmill.model.model_file import ModelError, ModelFile
 from twinmill.model.parameters import (
     CLOCK,

@@ -179,10 +179,9 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     from twinmill.fitting.add import add_to_model
     from twinmill.fitting.compare import compare
     from twinmill.fitting.fit import Choice, fit_model
-    from twinmill.inference.infer import Inference, infer
-    from twinmill.inference.keeping import by_probabilities, with_its_error
+    from twinmill.inference.keeping import with_its_error
     from twinmill.model.model_file import ModelFile
-    from twinmill.report.inference import sentence
+    from twinmill.report import judged
 
     model = native.Model.from_toml(work.text, work.model)
     model_file = ModelFile(Path(work.model), work.text, model)
@@ -194,15 +193,10 @@ def perform(work: Work, logs: list[Path], known: dict, say: Callable[[str], None
     if work.kind in ("diagnose", "next") and known.get("text") != work.text:
         if work.kind == "next":
             check(measurements, model_file, _limits(work.options))
-        if by_probabilities(measurements):
-            known["diagnosis"] = infer(measurements, model_file, progress=say)
-        else:
-            known["diagnosis"] = diagnose(measurements, model_file, say)
+        known["diagnosis"] = diagnose(measurements, model_file, progress=say)
         known["text"] = work.text
     if work.kind == "diagnose":
-        found = known["diagnosis"]
-        said = {"sentence": sentence(found.answer)} if isinstance(found, Inference) else {}
-        return Done(work, plain({**found.to_json(), **said}))
+        return Done(work, plain(judged.to_json(known["diagnosis"])))
     if work.kind == "next":
         plan = design(known["diagnosis"], model_file, _limits(work.options), say)
         return Done(work, plain(_told(plan)))

@@ -7,6 +7,7 @@ constants that it was made with.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import lcm
@@ -17,6 +18,7 @@ import turbopi
 from twinmill.data.measurement import Measurement, load_measurements
 from twinmill.experiment.drives import drive
 from twinmill.fitting.fit import fit
+from twinmill.inference.keeping import with_its_error
 from twinmill.model.model_file import ModelFile
 from twinmill_lab.challenge.cases import calibration
 from twinmill_lab.challenge.physics import catalogue_forms
@@ -108,6 +110,11 @@ class TanhRobot:
         return np.column_stack([x, y, heading]) + noise
 
 
+def times_s(values: np.ndarray) -> np.ndarray:
+    """(K,) since the first step, of values of each step."""
+    return np.arange(len(values)) * STEP_S
+
+
 def rich_script(duration_s: float, seed: int, legs_s: tuple[float, float] = (0.4, 1.6)):
     """(K, 4) duties in percent at each control step: straights, curves, strafes, rests."""
     random = np.random.default_rng(seed)
@@ -155,12 +162,22 @@ def write_run(
 
 @pytest.fixture(scope="session")
 def run_log(tmp_path_factory) -> Callable[..., Path]:
-    """Writes a log of a TanhRobot that drives a rich script (or another one)."""
+    """Writes a log of a TanhRobot that drives a rich script (or another one), the same one once."""
 
     def make(robot=None, seed=1, duration_s=40.0, script_pct=None, spoil=None) -> Path:
+        robot = robot or TanhRobot()
+        if type(robot) is TanhRobot and script_pct is None and spoil is None:
+            return usual(robot, seed, duration_s)
         script_pct = rich_script(duration_s, seed) if script_pct is None else script_pct
+        return written(robot, script_pct, seed, spoil)
+
+    @cache
+    def usual(robot, seed, duration_s) -> Path:
+        return written(robot, rich_script(duration_s, seed), seed, None)
+
+    def written(robot, script_pct, seed, spoil) -> Path:
         path = tmp_path_factory.mktemp("run") / "run.lcmlog"
-        return write_run(path, robot or TanhRobot(), script_pct, seed, spoil)
+        return write_run(path, robot, script_pct, seed, spoil)
 
     return make
 
@@ -219,6 +236,42 @@ def one_clock_base(tanh_robot, measure, model_file, tmp_path_factory) -> ModelFi
     path = tmp_path_factory.mktemp("one_clock") / "base.toml"
     fit([measure(tanh_robot(), 1, 60.0)], model_file(extra="[clock]\nsame = true\n"), path, "")
     return ModelFile.load(str(path))
+
+
+@pytest.fixture(scope="session")
+def known_base(tanh_robot, measure, one_clock_base, tmp_path_factory) -> ModelFile:
+    """That base with what it misses in its own log, as `twinmill fit` writes it."""
+    kept = with_its_error(one_clock_base, [measure(tanh_robot(), 1, 60.0)])
+    known = ModelFile.of(tmp_path_factory.mktemp("known") / "base.toml", kept.text)
+    known.write()
+    return known
+
+
+@pytest.fixture(scope="session")
+def changed(tanh_robot) -> Callable[..., TanhRobot]:
+    """Makes a robot by what is done to the usual one's duties, rim speeds or motion.
+
+    Args of what is given:
+        duties: (K, 4) duties -1..1 to those that the motors get.
+        wheels: (K, 4) rim speeds to those of the wheels, m/s.
+        motion: (K, 3) velocities of the body to those that it has, m/s and rad/s.
+        constants: of the robot.
+    """
+
+    def same(values):
+        return values
+
+    def make(duties=same, wheels=same, motion=same, **constants):
+        class Changed(tanh_robot):
+            def wheels_mps(self, duty):
+                return wheels(super().wheels_mps(duties(duty)))
+
+            def hindered(self, velocity):
+                return motion(velocity)
+
+        return Changed(**constants)
+
+    return make
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from twinmill.data.log import LogError
 from twinmill.data.measurement import load_measurements
 from twinmill.data.steady_table import read_steady_tables
-from twinmill.diagnosis.diagnose import diagnose
+from twinmill.diagnosis.infer import infer
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
 from twinmill.model.model_file import ModelFile
@@ -57,16 +57,23 @@ def test_wheels_that_turn_as_the_model_says_lack_nothing(tmp_path, model):
     cell = told.robots[0].cells()[-1]
     assert cell["fl_pct"] == cell["rr_pct"] == 100
     assert cell["w2_radps"]["predicted"] == pytest.approx(TOP_MPS / RADIUS_M)
-    assert not diagnose(sheets, model).findings
+    assert infer(sheets, model).answer.verdict == "model_adequate"
 
 
 def test_a_dead_zone_is_found_on_the_bench(tmp_path, model):
     path = bench(tmp_path / "b.csv", lambda duty: TOP_MPS * max(0.0, duty - DEAD))
     sheets = load_measurements([path])
-    (found,) = diagnose(sheets, model).findings
-    (estimate,) = found.parameters
+    (found,) = infer(sheets, model).answer.findings
     assert (found.effect, found.certainty) == ("dead_zone", "sure")
-    assert estimate.value == pytest.approx(DEAD, abs=0.002)
+    assert found.numbers["width"][0] == pytest.approx(DEAD, abs=0.002)
+
+
+def test_a_weak_side_is_found_on_the_bench(tmp_path, model):
+    path = bench(tmp_path / "b.csv", lambda duty: TOP_MPS * duty * np.array([0.9, 1.0]))
+    (found,) = infer(load_measurements([path]), model).answer.findings
+    assert (found.effect, found.certainty) == ("wheel_gain", "sure")
+    left, right = (value for value, _ in found.numbers.values())
+    assert (1 + left) / (1 + right) == pytest.approx(0.9, abs=0.01)
 
 
 def test_a_speed_of_the_base_is_fitted_on_the_bench(tmp_path, model):

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The camera's bits. Truth: geometry and draws by numpy here, enumeration, and counts."""
+"""The camera's bits, and what cameras lack. Truth: geometry and draws by numpy, and counts."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +13,10 @@ import twinmill_native as native
 
 from twinmill.data.camera_frames import Frames, frames_of
 from twinmill.data.track import make_track
-from twinmill.diagnosis.camera_outliers import odd_cameras
-from twinmill.diagnosis.cameras import camera_findings, not_shown
-from twinmill.diagnosis.rounds import Search
-from twinmill.diagnosis.search import search
-from twinmill.diagnosis.trials import camera_state
+from twinmill.inference.camera_search import CameraSearch
+from twinmill.inference.camera_set import CameraFitter, Lack
+from twinmill.inference.cameras import NO_RAW, Cameras, judge_detections
+from twinmill.model.model_file import ModelFile
 from twinmill.predict.detection_errors import compare_detections
 from twinmill.predict.detections import BLOCK_S, Detections, majority, thue_morse
 
@@ -30,19 +32,23 @@ false_positive_rate = {FALSE}
 vote_frames = 10
 """
 DURATION_S, POSE_HZ, EVERY = 32.0, 120, 3
-ROBOTS = 4
+ROBOTS = 3
 
 
 def model() -> native.Model:
     return native.Model.from_toml(MODEL, "test")
 
 
-def paths(seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) s and (ROBOTS, N, 3) poses: circles and slow turns at random, within a few metres."""
+def judged(cameras: list[Detections], text: str = MODEL, without=()) -> Cameras:
+    return judge_detections(cameras, ModelFile.of(Path("test.toml"), text), without=without)
+
+
+def paths(seed: int, robots: int = ROBOTS) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) s and (robots, N, 3) poses: circles and slow turns at random, within a few metres."""
     random = np.random.default_rng(seed)
     t_s = np.arange(0, DURATION_S, 1 / POSE_HZ)
     poses = []
-    for _ in range(ROBOTS):
+    for _ in range(robots):
         radius, phase = random.uniform(0.3, 0.7), random.uniform(0, 7)
         place = random.normal(0, 0.3, 2)
         rate = random.uniform(0.4, 1.2) * random.choice([-1, 1])
@@ -71,29 +77,27 @@ def vote(raw: np.ndarray, frames: int) -> np.ndarray:
                      for k in range(len(raw))])  # fmt: skip
 
 
-def searched(cameras: list[Detections], given: native.Model, excluded=()) -> Search:
-    return search(camera_state(cameras, given, excluded), known=0.0)
-
-
-@pytest.fixture
+@pytest.fixture(scope="module")
 def make_scenes(driven):
     """Scenes of all robots with bits drawn by a camera of the numbers given."""
 
     def make(seed, range_m=RANGE_M, cone_rad=CONE_RAD, pan_rad=0.0, miss=MISS, false=FALSE,
-             delay_s=0.0, frames=10, has_raw=True) -> list[Detections]:  # fmt: skip
+             delay_s=0.0, frames=10, has_raw=True, repeats=1,
+             robots=ROBOTS) -> list[Detections]:  # fmt: skip
         random = np.random.default_rng(seed + 1000)
-        t_s, poses = paths(seed)
+        t_s, poses = paths(seed, robots)
         late = round(delay_s * POSE_HZ)
         tracks = [
             make_track(replace(driven(DURATION_S), robot_id=i, pose=p), usual_radps=20)
             for i, p in enumerate(poses)
         ]
         scenes = []
-        for own in range(ROBOTS):
+        for own in range(robots):
             seen = in_view(poses, own, range_m, cone_rad, pan_rad)
             pick = np.arange(late, len(t_s), EVERY)
             raw = seen[pick - late]
-            raw = raw ^ (random.random(len(raw)) < np.where(raw, miss, false))
+            drawn = np.repeat(random.random(len(raw)), repeats)[: len(raw)]
+            raw = raw ^ (drawn < np.where(raw, miss, false))
             voted = vote(raw, frames)
             frame = Frames(t_s[pick], True, raw if has_raw else raw & False, has_raw, voted)
             block = (frame.t_s // BLOCK_S).astype(int)
@@ -181,52 +185,126 @@ HIDDEN = {
     "vote": {"frames": 14},
 }
 TRUE = {
-    "view_range.factor": 0.85,
-    "view_angle.factor": 1.3,
-    "view_pan.pan_rad": -0.12,
-    "sensor_delay.delay_s": 0.1,
-    "missed_detection.rate": 0.15,
-    "false_detection.rate": 0.1,
-    "vote.extra_frames": 4,
+    "view_range": ("factor", 0.85),
+    "view_angle": ("factor", 1.3),
+    "view_pan": ("pan_rad", -0.12),
+    "sensor_delay": ("delay_s", 0.1),
+    "missed_detection": ("rate", 0.15),
+    "false_detection": ("rate", 0.1),
+    "vote": ("extra_frames", 4),
 }
 
 
+@pytest.fixture(scope="module")
+def hiding(make_scenes) -> Callable[[str], list[Detections]]:
+    """Scenes with an effect hidden."""
+    return lambda effect: make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect])
+
+
+@pytest.fixture(scope="module")
+def found_in(hiding) -> Callable[[str], Cameras]:
+    """Judges scenes with an effect hidden, once."""
+    return cache(lambda effect: judged(hiding(effect)))
+
+
 @pytest.mark.parametrize("effect", HIDDEN)
-def test_a_hidden_effect_is_named_with_its_value(effect, make_scenes):
-    done = searched(make_scenes(50 + list(HIDDEN).index(effect), **HIDDEN[effect]), model())
-    assert done.found == [effect]
-    first = camera_findings(done)[0].parameters[0]
-    true, sampling = TRUE[first.name], 4 * first.std if np.isfinite(first.std) else 0.0
-    assert first.value == pytest.approx(true, abs=max(0.05 * abs(true), sampling))
-    assert sampling < 0.5 * abs(true)
+def test_a_hidden_effect_is_sure_with_its_value(effect, found_in):
+    found = found_in(effect)
+    assert [f.effect for f in found.findings] == [effect]
+    assert found.findings[0].certainty == "sure"
+    assert found.verdict("model_adequate") == found.verdict("cannot_tell") == "effect_missing"
+    name, true = TRUE[effect]
+    value, std = found.findings[0].numbers[name]
+    assert value == pytest.approx(true, abs=max(0.05 * abs(true), 4 * std))
+    assert std < 0.2 * abs(true)
+    assert found.after.score == pytest.approx(1, abs=0.1)
+
+
+def test_a_delay_on_clocks_of_their_own_is_one_of_two(make_scenes):
+    """Poses less the robot's clock are known by its motion alone, which a delay shifts as well."""
+    scenes = [replace(s, clock_free=True) for s in make_scenes(53, delay_s=0.1)]
+    found = judged(scenes)
+    assert {*found.findings[0].group} == {"sensor_delay", "input_delay"}
+    assert found.findings[0].certainty == "group"
+    assert found.verdict("model_adequate") == "ambiguous"
 
 
 @pytest.mark.parametrize(("effect", "clean"), [("false_detection", "false"),
                                                ("missed_detection", "miss")])  # fmt: skip
-def test_a_camera_better_than_the_model_is_named_too(effect, clean, make_scenes):
-    worse = native.Model.from_toml(MODEL.replace("rate = 0.05", "rate = 0.15"), "test")
-    done = searched(make_scenes(64, **{"miss": 0.15, clean: 0.0}), worse)
-    assert done.found == [effect]
-    assert camera_findings(done)[0].parameters[0].value == pytest.approx(-1, abs=0.05)
+def test_a_camera_better_than_the_model_is_told_too(effect, clean, make_scenes):
+    worse = MODEL.replace("rate = 0.05", "rate = 0.15")
+    found = judged(make_scenes(64, robots=4, **{"miss": 0.15, clean: 0.0}), worse)
+    assert [f.effect for f in found.findings] == [effect]
+    assert found.findings[0].numbers["rate"][0] == pytest.approx(-1, abs=0.1)
 
 
-def test_nothing_is_named_where_nothing_is_hidden(make_scenes):
-    """Each log may name something with a chance of 5 %: 2 of 5 would be one case in 45."""
-    named = [searched(make_scenes(seed), model()).found for seed in range(70, 75)]
-    assert sum(bool(n) for n in named) < 2
+def test_nothing_is_told_where_nothing_is_hidden(make_scenes):
+    for seed in range(70, 73):
+        found = judged(make_scenes(seed))
+        assert not found.findings and not found.off
+        assert found.verdict("model_adequate") == "model_adequate"
+
+
+def test_bits_that_come_several_times_count_once(make_scenes):
+    """A sum of n / m draws of weight m varies by m times that of n draws."""
+    scenes = make_scenes(75, repeats=4)
+    given = ModelFile.of(Path("test.toml"), MODEL)
+    names = ("false_detection", "missed_detection", "view_angle", "view_pan")
+    search = CameraSearch(CameraFitter(scenes, given), [Lack(name) for name in names])
+    search.run()
+    blocks = sum(s.block.max() + 1 for s in scenes)
+    assert search.dispersion() == pytest.approx(4, rel=4 * np.sqrt(2 / blocks))
+    found = judged(scenes)
+    assert not found.findings and not found.off
 
 
 def test_a_blind_camera_is_told_from_its_sisters(make_scenes):
-    # A target is in view in a few per cent of the frames: all others look right.
-    for seed in range(8):
-        alike, blind = make_scenes(100 + seed), make_scenes(100 + seed, miss=1.0)
-        assert odd_cameras(alike, model()) == set()
-        assert odd_cameras([*alike[:2], blind[2], alike[3]], model()) == {alike[2].robot_id}
+    """A target is in view in a few per cent of the frames: all others look right."""
+    alike, blind = (make_scenes(100, robots=4, miss=miss) for miss in (MISS, 1.0))
+    found = judged([*alike[:2], blind[2], *alike[3:]])
+    assert not found.findings
+    (off,) = found.off
+    assert off.robot_id == alike[2].robot_id
+    assert off.findings[0].effect == "missed_detection"
+    assert off.to_json()["effect"] == "missed_detection"
+    assert off.score_before > 1.2 * off.score_others
+
+
+def test_what_all_lack_is_told_beside_one_that_differs(make_scenes):
+    alike, odd = (make_scenes(110, pan_rad=0.12, miss=miss) for miss in (MISS, 0.7))
+    found = judged([alike[0], odd[1], *alike[2:]])
+    assert [f.effect for f in found.findings] == ["view_pan"]
+    assert [(o.robot_id, o.findings[0].effect) for o in found.off] == [(1, "missed_detection")]
 
 
 def test_without_raw_bits_the_vote_is_not_judged(make_scenes):
-    others = set(HIDDEN) - {"view_range", "vote"}
-    scenes = make_scenes(90, range_m=0.7, has_raw=False)
-    done = searched(scenes, model(), excluded={*others, "occlusion"})
-    assert "vote" in dict(not_shown(done, scenes))
-    assert done.found[:1] == ["view_range"]
+    found = judged(make_scenes(90, range_m=0.7, has_raw=False))
+    assert found.not_shown == {"vote": NO_RAW}
+    assert found.findings[0].effect == "view_range"
+    assert "voted detections alone" in found.notes[0]
+
+
+def test_an_effect_that_the_model_has_is_no_news(hiding):
+    """Its number is as sure as a data sheet's: 15 %."""
+    own = f"{MODEL}\n[[effect]]\nname = 'missed_detection'\nrate = 0.165\n"
+    found = judged(hiding("missed_detection"), own)
+    assert not found.findings and not found.off
+
+
+def test_a_better_model_has_what_was_found(hiding, found_in):
+    found = found_in("view_pan")
+    assert found.added == ("view_pan",)
+    assert found.model.get("view_pan.pan_rad") == pytest.approx(-0.12, abs=0.01)
+    assert compare_detections(hiding("view_pan"), found.model).score == pytest.approx(1, abs=0.1)
+
+
+def test_answers_on_motion_and_cameras_are_joined(found_in):
+    found = found_in("false_detection")
+    rows = ("findings", "found", "ranking", "not_identifiable", "robots_off", "warnings")
+    told = found.joined({"verdict": "cannot_tell", **{row: [] for row in rows}})
+    assert told["verdict"] == "effect_missing"
+    assert told["found"] == ["false_detection"]
+    assert told["findings"] == told["camera"]
+    assert told["ranking"][0]["effect"] == "false_detection"
+    assert told["bits_after"]["score"] < told["bits"]["score"]
+    assert [s["effect"] for s in told["bit_steps"]] == [None, "false_detection"]

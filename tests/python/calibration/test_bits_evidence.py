@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from twinmill.fitting.detection_evidence import HeldOutFrames, weigh
+from twinmill.estimation.detection_evidence import HeldOutFrames, weigh
 from twinmill.predict.detections import thue_morse
 
 BLOCKS, FRAMES = 400, 60

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`fit` and `add` on logs of a robot whose constants are known and whose form is not the twin's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from twinmill.data.measurement import load_measurements
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
+from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 
 EULER_S = 1 / 480  # the robot's step: times are known to half of it, and lags to as much again
@@ -58,6 +61,16 @@ def test_a_fit_keeps_the_speed_at_which_the_noise_was_seen(fitted, tanh_robot, m
 def test_fit_finds_the_clock_offset(fitted):
     assert fitted.clock.value == pytest.approx(OFFSET_S, abs=3 * fitted.clock.std + EULER_S / 2)
     assert fitted.clock.std < 5e-3  # beside a free lag, by errors from 0.1 to 2 s ahead
+
+
+def test_a_clock_that_is_half_a_second_off_is_found(tanh_robot, measure, model_file):
+    """Beyond any network, as cameras on another floor have it."""
+    run = measure(tanh_robot(offset_s=0.5), 16, 40.0)
+    (found,) = open_measurements([run], model_file())
+    assert found.model.get("clock.offset_s") == pytest.approx(0.5, abs=0.05)  # a guessed lag
+    same = replace(run, track=replace(run.track, same_clock=True))
+    (late,) = open_measurements([same], model_file())
+    assert found.score < late.score
 
 
 def test_a_right_model_is_as_good_as_its_log_can_tell(fitted):

@@ -80,7 +80,8 @@ def test_dead_zone(added):
 def test_a_base_of_the_same_robot_is_not_called_far_off(folder, base):
     """Its gains would take a part of the dead zone, though nothing else changed."""
     found = diagnose(load_measurements([folder / "case_a.lcmlog"]), base[1])
-    assert found.sentence.startswith("Missing: dead_zone")
+    assert found.answer.findings[0].effect == "dead_zone"
+    assert found.answer.findings[0].certainty == "sure"
 
 
 def test_motor_lag(added):

@@ -19,11 +19,11 @@ from twinmill.inference.discrepancy import (
     OF_FORM,
     SIZES,
     STEP,
-    _aside,
     _way_since_back,
     forms_of,
     in_another_log,
     kernels,
+    way_aside,
 )
 from twinmill.inference.evidence import Bank, Linear, gains_by_size
 from twinmill.inference.hypothesis import Hypothesis
@@ -31,7 +31,7 @@ from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Course, Noise, Usual, fit_noise, usual_after
 from twinmill.inference.planar import planar_kinds
 from twinmill.inference.posterior import beliefs
-from twinmill.inference.robots import _Robot
+from twinmill.inference.robots import _log_before, _Robot
 from twinmill.inference.screening import _products, _products_of_whiles, gains_of_pairs
 from twinmill.inference.search import log_prior_of_effects
 from twinmill.inference.settings import PRIORS
@@ -408,7 +408,7 @@ def test_an_effect_that_an_error_of_formulas_may_be_is_less_probable():
     both, log_odds = ("battery_sag", "heat_gain"), -1.5
     entries = [entry((), (), -50), entry(both, (), 0)]
     plain = table(entries)
-    known = replace(plain, no_news={both: [NoNews((), ("heat_gain",), ("time",), log_odds)]})
+    known = replace(plain, no_news={both: [NoNews((), ("heat_gain",), ("time",), log_odds, 0.0)]})
     alone, two = (
         sum(b.probability for b in beliefs(known) if set(b.effects) == names)
         for names in ({"battery_sag"}, set(both))
@@ -446,7 +446,7 @@ def test_a_heading_that_is_off_leads_the_way_aside():
     m, angle = motion(), 1e-4
     c, s = np.cos(angle), np.sin(angle)
     turned = m.moved @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    (led,) = _aside(m, np.full((1, len(m.t_s)), angle))
+    (led,) = way_aside(m, np.full((1, len(m.t_s)), angle))
     assert m.moved + led == pytest.approx(turned, abs=1e-9)
 
 
@@ -498,14 +498,23 @@ def test_all_pairs_of_words_share_one_prior_of_something_outside():
     assert found[1].probability / found[0].probability == pytest.approx(q**2 / (1 - PRIORS.outside))
 
 
-def test_what_two_robots_show_weakly_counts_twice_for_what_both_lack():
-    """Bayes' rule by hand, for an effect of prior odds q and Bayes factor b in each log.
+def test_what_all_robots_lack_counts_once_and_so_does_what_their_base_always_lacked():
+    """Two robots that are alike: slip is new with b, or always was there with a, and o before.
 
-    Each robot by itself has it or not: (1 + b q)^2; both have it: q b^2.
+    Each alone has 1 : b q : a q o for nothing, new and always, q the prior odds of one effect.
     """
-    words, candidates, b = frozenset({"time", "place"}), 10, 4.0
+    words, candidates, a, b, o = frozenset({"time", "place"}), 10, 3.0, 4.0, 0.2
     none, slip = frozenset(), frozenset({"slip"})
     q = float(np.exp(log_prior_of_effects(1, candidates)))
-    one = _Robot([none, slip], np.array([1, b * q]) / (1 + b * q), words, candidates)
-    both = one.log_prior(slip) - one.log_prior(none) + 2 * one.log_given(slip)
-    assert both - 2 * one.log_given(none) == pytest.approx(np.log(q * b**2 / (1 + b * q) ** 2))
+    odds = np.array([1, b * q, a * q * o])
+    log_own = np.log([1, 1, o])
+    things, always = [none, slip, none], [none, none, slip]
+    one = _Robot([], things, always, log_own, odds / odds.sum(), words, candidates)
+
+    def together(lack, lacked):
+        return _log_before([one, one], (lack, lacked)) + 2 * one.log_given((lack, lacked))
+
+    nothing = together(none, none)
+    # where none lacks it, each may still lack it alone
+    assert together(slip, none) - nothing == pytest.approx(np.log(q * b**2 / (1 + b * q) ** 2))
+    assert together(none, slip) - nothing == pytest.approx(np.log(q * o * a**2 / (1 + b * q) ** 2))

@@ -4,12 +4,11 @@
 import os
 import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 from twinmill.model.model_file import ModelFile
-from twinmill_cli.diagnose import _judge_swarm
+from twinmill_cli.swarm_as_whole import judge_swarm
 
 pytestmark = pytest.mark.skipif(
     not os.environ.get("TWIN_RUN"), reason="TWIN_RUN does not name the program"
@@ -33,11 +32,11 @@ def true() -> str:
 def judged(tmp_path: Path, log: Path, model: str, found=()) -> tuple[str, dict | None]:
     (tmp_path / "judge.toml").write_text(model)
     loaded = ModelFile.load(str(tmp_path / "judge.toml")).model
-    return _judge_swarm(log, SimpleNamespace(verdict="", model=loaded, found=list(found)))
+    return judge_swarm(log, "", loaded, bool(found))
 
 
 def test_a_model_that_fails_each_robot_is_not_held_against_the_swarm():
-    note, swarm = _judge_swarm(Path("none"), SimpleNamespace(verdict="outside_catalogue"))
+    note, swarm = judge_swarm(Path("none"), "outside_catalogue", None, True)
     assert swarm is None and "once the model predicts each robot" in note
 
 

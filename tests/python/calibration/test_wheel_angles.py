@@ -7,12 +7,11 @@ The robots are those of `conftest.py`, with 0.0325 m in their model's file.
 import numpy as np
 import pytest
 
+from twinmill.diagnosis.better import better
 from twinmill.diagnosis.diagnose import diagnose
-from twinmill.diagnosis.explain import explain
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
-from twinmill.fitting.opening import open_measurements
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import effect_parameters
 
@@ -23,7 +22,7 @@ OFF = 0.2
 APART_RAD = 2.0
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def uneven(tanh_robot):
     """A robot whose front right wheel runs unevenly, so many times a turn."""
 
@@ -40,26 +39,7 @@ def uneven(tanh_robot):
     return make
 
 
-def test_an_oval_wheel_is_no_effect_and_its_angle_is_told(uneven, measure, one_clock_base):
-    found = diagnose([measure(uneven(2, 0.15, 1.05 * TOLD_M), 103, 80.0)], one_clock_base)
-    assert found.rest.depends_on[:1] == ["angle of the front right wheel"]
-
-
-def test_a_wheel_off_its_centre_is_found_with_its_radius(uneven, measure, one_clock_base):
-    found = diagnose([measure(uneven(1, 0.2, 0.94 * TOLD_M), 104, 80.0)], one_clock_base)
-    assert found.findings[0].effect == "wheel_eccentricity"
-    values = {p.short: p.value for p in found.findings[0].parameters}
-    assert values["radius_ratio"] == pytest.approx(0.94, abs=0.01)
-    assert np.hypot(values["fr_cos"], values["fr_sin"]) == pytest.approx(0.2, abs=0.06)
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_round_wheels_tell_no_radius(seed, tanh_robot, measure, one_clock_base):
-    (opened,) = open_measurements([measure(tanh_robot(), seed, 60.0)], one_clock_base)
-    assert opened.floor.response.radius_ratio == 1.0
-
-
-@pytest.fixture
+@pytest.fixture(scope="module")
 def two_runs(uneven, measure):
     """Two logs of a robot whose front right axle is off its centre by OFF, begun at two angles."""
     begins_rad = (0.5, 0.5 + APART_RAD)
@@ -73,17 +53,20 @@ def size_of(model) -> float:
 def test_what_one_log_told_of_an_axle_predicts_the_next(two_runs, one_clock_base, tmp_path):
     """Wheels stand anywhere when the next log begins."""
     first, second = two_runs
-    out = tmp_path / "explained.toml"
-    found = explain([first], one_clock_base, out=out, command="", formula=False)
-    assert found.diagnosis.findings[0].effect == "wheel_eccentricity"
-    explained = ModelFile.load(str(out))
+    found = diagnose([first], one_clock_base)
+    axle = found.answer.findings[0]
+    assert axle.effect == "wheel_eccentricity"
+    (cos, _), (sin, _) = (axle.numbers[f"fr_{part}"] for part in ("cos", "sin"))
+    assert np.hypot(cos, sin) == pytest.approx(OFF, abs=0.06)
+    explained = better(found, one_clock_base, tmp_path / "explained.toml", "").file
     own, other = (compare([m], explained) for m in two_runs)
     assert compare([second], one_clock_base).score > 1.3 * other.score
     assert other.score == pytest.approx(own.score, rel=0.1)
     angles_rad = [c.main.wheel_angles_rad["fr"] for c in (own, other)]
     assert angles_rad[0] == pytest.approx(0, abs=0.05)
     assert angles_rad[1] == pytest.approx(APART_RAD, abs=0.15)
-    assert diagnose([second], explained).found == []
+    named = diagnose([second], explained).answer.findings
+    assert not [f for f in named if f.certainty == "sure"]
 
 
 def test_two_logs_of_an_axle_are_fitted_with_an_angle_each(two_runs, one_clock_base, tmp_path):
@@ -98,12 +81,6 @@ def test_two_logs_of_an_axle_are_fitted_with_an_angle_each(two_runs, one_clock_b
     told = {p.name: p for p in fit(two_runs, model, again, "").parameters}
     assert told["wheel_eccentricity.fr_cos"].seen
     assert size_of(ModelFile.load(str(again)).model) == pytest.approx(OFF, abs=0.02)
-
-
-def test_an_axle_is_found_in_two_logs_together(two_runs, one_clock_base):
-    found = diagnose(two_runs, one_clock_base)
-    assert found.findings[0].effect == "wheel_eccentricity"
-    assert size_of(found.model) == pytest.approx(OFF, abs=0.02)
 
 
 def test_a_robot_on_one_axle_has_two_wheels(model_file):

@@ -9,7 +9,6 @@ import twinmill_native as native
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import make_track
-from twinmill.fitting.floor import body_velocities_at, body_velocity_at
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.windows import HORIZONS_S, Windows, difference, rms, score
@@ -160,24 +159,3 @@ def test_rms_leaves_out_what_is_not_there():
 def test_headings_differ_the_short_way_round():
     a, b = np.array([[0, 0, 3.1]]), np.array([[0, 0, -3.1]])
     assert difference(a, b)[0, 2] == pytest.approx(6.2 - 2 * np.pi)
-
-
-def test_a_lost_frame_takes_no_speed_away(driven, modelled_of):
-    """Duties 0.5 and 0.8 of 0.4 m/s: as fast in the step over the loss as in all others."""
-    robot = driven()
-    robot.pose[[600, 601]], robot.valid[[600, 601]] = np.nan, False
-    own = modelled_of(robot)
-    velocity = body_velocity_at(own, own.model, slice(1, None))
-    expected = np.tile([0.4 * 0.65, 0, 0.4 * 0.15 / LEVER_M], (len(velocity), 1))
-    np.testing.assert_allclose(velocity, expected, atol=1e-4)
-
-
-def test_models_side_by_side_drive_as_each_alone(driven, modelled_of):
-    """Floor alone, or wheels: duties 0.5 and 0.8 of each one's own."""
-    given = [(1.0, 0.4), (0.7, 0.4), (1.0, 0.2), (0.7, 0.2)]
-    each = [modelled_of(driven(), yaw_gain, top_mps) for yaw_gain, top_mps in given]
-    models = [own.model for own in each]
-    velocities = body_velocities_at(each[0], models, slice(1, None))
-    for (yaw_gain, top_mps), found in zip(given, velocities, strict=True):
-        expected = [0.65 * top_mps, 0, yaw_gain * 0.15 * top_mps / LEVER_M]
-        np.testing.assert_allclose(found, np.tile(expected, (len(found), 1)), atol=1e-4)

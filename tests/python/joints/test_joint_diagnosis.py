@@ -6,7 +6,9 @@ of the code that judges it.
 """
 
 import json
+from contextlib import redirect_stdout
 from functools import cache
+from io import StringIO
 from pathlib import Path
 
 import mujoco
@@ -98,20 +100,31 @@ def test_friction_one_way_is_named_by_a_force_of_another_formula(slide):
     assert abs(value - 6) < 3 * std
 
 
-def test_the_written_mjcf_has_what_was_found_and_nothing_but_numbers_changed(slide, tmp_path):
-    """10 N s/m become 25; joint, drive and mass alone differ, and stock MuJoCo reads them."""
-    log = simulated(damping=25)
-    with threadpool_limits(1, "blas"):
-        found = explain_joints(log, slide)
-    assert found.added == ("viscous_friction@x",) and not found.hook
-    before, after = slide.read_text().splitlines(), found.text.splitlines()
+@pytest.fixture(scope="module")
+def explained(tmp_path_factory):
+    """Log, model, better model, and what `twinmill explain` told: 10 N s/m became 25."""
+    folder = tmp_path_factory.mktemp("explained")
+    path, model, better = (folder / name for name in ("run.npz", "slide.xml", "better.xml"))
+    simulated(damping=25).saved(path)
+    model.write_text(SLIDE.format(damping=10, motor=""))
+    stale = folder / "better_hook.py"  # of a model that is replaced, which a new one is not with
+    stale.write_text("EFFECTS = [('drag@x', {'drag': 9.0})]")
+    with redirect_stdout(StringIO()) as out:
+        run(["explain", str(path), "--model", str(model), "-o", str(better), "--force", "--json"])
+    assert not stale.exists()
+    return path, model, better, json.loads(out.getvalue())
+
+
+def test_the_written_mjcf_has_what_was_found_and_nothing_but_numbers_changed(explained):
+    """Joint, drive and mass alone differ, and stock MuJoCo reads them."""
+    log, slide, better, told = explained
+    assert [one["effect"] for one in told["added"]] == ["viscous_friction@x"]
+    before, after = slide.read_text().splitlines(), better.read_text().splitlines()
     (told,) = (line for line in after if "<inertial" in line)  # of the body, whose geom had it
     after.remove(told)
     changed = [a for b, a in zip(before, after, strict=True) if a != b]
     assert any('name="x"' in line for line in changed)
     assert all('name="x"' in line or 'name="drive"' in line for line in changed)
-    better = tmp_path / "better.xml"
-    better.write_text(found.text)
     read = mujoco.MjModel.from_xml_path(str(better))
     assert read.dof_damping[0] == pytest.approx(25, rel=0.1)
     assert read.body_mass[1] == pytest.approx(5, rel=0.05)
@@ -152,14 +165,8 @@ def test_each_effect_that_an_mjcf_holds_reads_back_as_it_was_written(slide):
     assert tried >= 10
 
 
-def test_the_commands_name_write_and_compare(slide, tmp_path, capsys):
-    path, better = tmp_path / "run.npz", tmp_path / "better.xml"
-    simulated(damping=25).saved(path)
-    stale = tmp_path / "better_hook.py"  # of a model that is replaced, which a new one is not with
-    stale.write_text("EFFECTS = [('drag@x', {'drag': 9.0})]")
-    run(["explain", str(path), "--model", str(slide), "-o", str(better), "--force", "--json"])
-    told = json.loads(capsys.readouterr().out)
-    assert not stale.exists()
+def test_the_commands_name_write_and_compare(explained, capsys):
+    path, _, better, told = explained
     assert told["findings"][0]["effect"] == "viscous_friction@x"
     assert told["output"] == str(better) and told["hook"] is None
     run(["compare", str(path), "--model", str(better), "--json"])

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A designed motion keeps limits in stock MuJoCo, and parts what it was designed to part."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
@@ -54,6 +56,11 @@ def recorded(path, wanted, push=lambda v: 0.0):
     return JointLog(T_S, ctrl, qpos)
 
 
+def motions(told):
+    """Motions begun, of which a clock that gives each 2 s counts the time."""
+    return sum(words.startswith("motion") for words in told)
+
+
 def slow():
     """One speed alone, to and fro: friction is known, and not how it grows."""
     return 0.15 * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * T_S / 4))
@@ -85,17 +92,20 @@ def test_motions_within_limits_keep_them_when_mujoco_runs_them(tmp_path, kind, m
     assert kept
 
 
-def test_speeds_that_the_log_lacks_part_forms_of_friction(tmp_path):
+def test_speeds_that_the_log_lacks_part_forms_of_friction(tmp_path, monkeypatch):
     """At one speed its forms are the same; algebra: c v and c v |v| are told by two speeds."""
+    told: list[str] = []
+    monkeypatch.setattr(design, "time", SimpleNamespace(monotonic=lambda: 2.0 * motions(told)))
     path = carriage(tmp_path, more='forcerange="-60 60" ctrlrange="-60 60"')
     log = recorded(path, slow(), push=lambda v: -8 * v)
     with threadpool_limits(1, "blas"):
         before = diagnose_joints(log, path).answer
         assert "viscous_friction@x" in before.findings[0].group
-        found = next_joints(log, path, duration_s=16, times_speed=3)
+        found = next_joints(log, path, duration_s=16, times_speed=3, progress=told.append)
         wanted = np.interp(T_S, found.log.t_s, found.log.qpos[:, 0])
         again = recorded(path, wanted, push=lambda v: -8 * v)
         after = diagnose_joints([log, again], path).answer
+    assert "motion 21 of 40, 40 s left" in told  # 20 more of 2 s each
     assert any("viscous_friction@x" in pair for pair in found.odds)
     assert max(found.odds.values()) > max(found.before.values())
     assert after.findings[0].effect == "viscous_friction@x"

@@ -57,10 +57,9 @@ def wrist(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_servo_that_lacks_nothing_raises_no_alarm(wrist, seed):
+def test_a_servo_that_lacks_nothing_raises_no_alarm(wrist):
     with threadpool_limits(1, "blas"):
-        found = diagnose_joints(simulated(seed, 2e-4), wrist).answer
+        found = diagnose_joints(simulated(1, 2e-4), wrist).answer
     assert not found.findings and found.verdict in ("model_adequate", "cannot_tell")
 
 

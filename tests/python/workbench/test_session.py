@@ -161,7 +161,7 @@ def test_as_a_hand_turns_a_knob_the_clock_goes_with_it(session):
 def test_the_first_answer_of_an_addition_is_near_the_full_one(session):
     previewed = session.preview("coasting", 0)
     done = perform(session.work("add", "coasting"), session.paths, {}, print)
-    assert previewed[0].score == pytest.approx(done.result["score_after"], rel=0.05)
+    assert previewed[0].score == pytest.approx(done.result["score_after"], rel=0.1)
 
 
 def test_a_session_goes_on_where_it_was_left(session):

@@ -1,14 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Effects that a log does not exclude, and how strong each may be without having shown in it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import twinmill_native as native
+from scipy.stats import norm
 
-from twinmill.diagnosis.result import Diagnosis
+from twinmill.data.measurement import Measurement, of_one_robot
+from twinmill.data.steady_table import SteadyTable
+from twinmill.diagnosis.infer import HELD, ONE, prepared
+from twinmill.inference.candidate import Candidate
+from twinmill.inference.hypothesis import Fitter
+from twinmill.inference.planar import PlanarProblem
+from twinmill.inference.settings import PRIORS
+from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import MOTION_STAGES, catalogue_of
 
 MOST = 3.0  # times the usual strength: more is not thought of, as in a diagnosis
@@ -38,34 +46,71 @@ class Hidden:
         return vars(self)
 
 
-def hidden_effects(diagnosis: Diagnosis) -> list[Hidden]:
-    """All effects of the catalogue that the model lacks.
+def hidden_effects(
+    measurements: Sequence[Measurement | SteadyTable],
+    model_file: ModelFile,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Hidden]:
+    """All effects of the catalogue that the model lacks, and how strong each may be.
 
-    A diagnosis looks at the trace of each in the log's errors, what the free quantities could
-    imitate left out. One so strong that its trace would lower the squared error, in units of its
-    scatter, by less than what the diagnosis takes for evidence would not have been named.
+    An effect may have the strength below which it is with 97.5 %, in the posterior of its sizes,
+    all grown at once, beside what is free in the base; of several robots in that of the one whose
+    log tells it least.
+
+    Args:
+        measurements: logs of one robot or several.
+        model_file: the model.
+        progress: told in words what is being done.
+
+    Raises:
+        LogError: there is no log of a robot.
     """
-    search = diagnosis.search
-    traces = {s.name: float((s.columns.sum(axis=1) ** 2).sum()) for s in search.rounds[-1].screened}
-    found = []
-    for name in _lacking(diagnosis.model):
-        stage = catalogue_of(diagnosis.model)[name]["stage"]
-        if name not in traces:
-            why = (
-                "this log does not show it"
-                if stage in MOTION_STAGES
-                else "the motion of one robot does not show it"
-            )
-            times = MOST if stage in MOTION_STAGES else 1.0
-        else:
-            times = float(min(MOST, np.sqrt(search.settings.evidence / max(traces[name], 1e-12))))
-            why = (
-                f"more than {times:.2g} times its usual strength would have shown in this log"
-                if times < MOST
-                else f"{MOST:g} times its usual strength would not have shown in this log"
-            )
-        found.append(Hidden(name, times, why))
+    robots = {m.track.robot_id for m in measurements if isinstance(m, Measurement)}
+    each = []
+    for robot in sorted(robots):
+        progress(f"robot {robot}")
+        runs = of_one_robot(measurements, HELD, ONE, robot)
+        each.append(_possible(prepared(runs, model_file, (), progress)[0]))
+    shown = {name for own in each for name in own}
+    times = {name: max(own.get(name, MOST) for own in each) for name in shown}
+    return [_hidden(name, model_file.model, times) for name in _lacking(model_file.model)]
+
+
+def _possible(p: PlanarProblem) -> dict[str, float]:
+    """How many times its usual strength each effect may have that acts at all times."""
+    fitter = Fitter(p.steps, p.noise, p.prior.columns)
+    linear, found = p.base.linear(fitter), {}
+    for name, c in p.columns(p.base).items():
+        change = _usual(c)
+        if change is None:
+            continue
+        white = fitter.whiten(change[None])
+        gram, push = linear.projected(white, white @ white.T)
+        precision = gram[0, 0] + PRIORS.size**-2
+        found[name] = float(abs(push[0]) / precision + norm.ppf(0.975) / np.sqrt(precision))
     return found
+
+
+def _usual(c: Candidate) -> np.ndarray | None:
+    """(W, C) change by an effect of its usual strength; None of what a place or moment has."""
+    if c.where is not None:
+        return None
+    if c.limits is None:
+        return np.asarray(c.columns.sum(axis=0)) if len(c.columns) else None
+    values = np.array([parameter.value for parameter in c.parameters])
+    nearest = int(np.argmin(np.abs(c.limits.at - values).sum(axis=1)))
+    return np.asarray(c.limits.changes[nearest])
+
+
+def _hidden(name: str, model: native.Model, times: Mapping[str, float]) -> Hidden:
+    if name in times:
+        most = min(MOST, times[name])
+        less = f"more than {most:.2g} times its usual strength would have shown in this log"
+        none = f"{MOST:g} times its usual strength would not have shown in this log"
+        return Hidden(name, most, less if most < MOST else none)
+    if catalogue_of(model)[name]["stage"] in MOTION_STAGES:
+        return Hidden(name, MOST, "this log does not show it")
+    return Hidden(name, 1.0, "the motion of one robot does not show it")
 
 
 def unseen_effects(model: native.Model) -> list[Hidden]:

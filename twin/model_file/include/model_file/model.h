@@ -137,9 +137,6 @@ public:
     void RemoveEffect(size_t index);
     // The model of one robot: its [robots.Rnn] overrides applied.
     Model ForRobot(int robot_id) const;
-    // The robot's form alone, with nothing told that a log can tell: no effect, gains of 1, a usual
-    // lag, speeds in proportion to the duty. The clock is as it was.
-    Model Form() const;
     // What this robot's camera sees and its body does on contact, effects included.
     DetectionModel MakeDetectionModel() const;
     Body MakeBody() const;

@@ -41,12 +41,6 @@ struct Track
 // For each pose the one predicted from the pose before it: (N, 3), NaN at the start of a segment.
 std::vector<double> PredictOneStep(const Model &model, const Track &track);
 
-// The mean velocity in the body's axes, m/s and rad/s, of each of these models (B) in the step that
-// ends at each of `poses` (K; ascending), restarted at the usable pose before it: (B, K, 3), zero
-// where a segment starts. On all cores.
-std::vector<double> PredictVelocities(const std::vector<Model> &models, const Track &track,
-                                      std::span<const int64_t> poses);
-
 // For each start (W, index of a pose) the poses predicted at `ends` (W, H; ascending indices, -1 =
 // none): (W, H, 3), NaN where there is none. `starts` ascend.
 std::vector<double> PredictWindows(const Model &model, const Track &track,
