@@ -11,8 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import logsumexp
 
+from twinmill.inference.bounds import log_within
 from twinmill.inference.discrepancy import OF_FORM, SIZES
 from twinmill.inference.evidence import Linear
 from twinmill.inference.hypothesis import Hypothesis
@@ -40,7 +41,8 @@ def log_odds(
     seen = _Seen(
         inverse - np.linalg.inv(own),
         inverse @ (mean - h.mean)[at],
-        np.where(h.one_sided, h.low - h.mean, -np.inf)[at],
+        (h.low - h.mean)[at],
+        (h.high - h.mean)[at],
     )
     usual = norms[at] / size
     card = 1 / np.diag(own)  # is as wide as the prior may be: of what the log does not show
@@ -54,19 +56,20 @@ class _Seen:
 
     Attributes:
         precision, push: (P, P), (P,) of it, where all is usual.
-        low: (P,) bounds of what a card lets be positive alone, -inf of others. An error that looks
-            like such an effect has its sign: the opposite does not look like it.
+        low, high: (P,) bounds of its card. An error that looks like an effect of one sign has that
+            sign: the opposite does not look like it.
     """
 
     precision: np.ndarray
     push: np.ndarray
     low: np.ndarray
+    high: np.ndarray
 
     def log_evidence(self, prior: np.ndarray) -> float:
-        """Log evidence under N(0, prior), of which one-sided numbers have the half."""
+        """Log evidence under N(0, prior) within the bounds."""
         grown = np.eye(len(self.push)) + prior @ self.precision
         mean = np.linalg.solve(grown, prior @ self.push)
         std = np.sqrt(np.diag(np.linalg.solve(grown, prior)))
         found = 0.5 * float(self.push @ mean - np.linalg.slogdet(grown)[1])
-        sided = np.isfinite(self.low)
-        return found + float(np.sum((np.log(2) + log_ndtr((mean - self.low) / std))[sided]))
+        before = log_within(self.low, self.high, np.zeros(len(mean)), np.sqrt(np.diag(prior)))
+        return found + float(np.sum(log_within(self.low, self.high, mean, std) - before))

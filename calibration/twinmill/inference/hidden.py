@@ -90,15 +90,9 @@ class Hidden:
         slope[own] = np.eye(len(at))
         rest = h.cov.copy()
         rest[own], rest[:, own] = 0.0, 0.0
-        return (
-            replace(
-                h,
-                mean=h.mean + slope @ (mean * unit),
-                cov=rest + slope @ cov @ slope.T,
-                one_sided=np.where(np.isin(np.arange(len(h.mean)), own), False, h.one_sided),
-            ),
-            log_factor,
-        )
+        told = replace(h, mean=h.mean + slope @ (mean * unit), cov=rest + slope @ cov @ slope.T)
+        within = h.log_share(told.mean, told.cov) - h.log_share(h.mean, h.cov)
+        return told, log_factor + within
 
 
 def _place(h: Any, name: str) -> int:

@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.special import log_ndtr
 
+from twinmill.inference.bounds import log_within
 from twinmill.inference.candidate import FAR, Candidate, is_size, size_std
 from twinmill.inference.evidence import Columns, Linear
 from twinmill.inference.noise import Noise
@@ -41,9 +41,8 @@ class Guess:
         effects: names, in the order in which they were added; a second of a kind is `name#2`.
         model: with them.
         labels: N of them; `named` (N,) says which are quantities of the model.
-        mean, cov: (N,), (N, N) of the prior.
-        low, high, step, value: (N,) bounds, steps of finite differences, numbers.
-        one_sided: (N,) numbers whose prior is half a normal distribution.
+        mean, cov: (N,), (N, N) of the prior, a normal distribution within bounds.
+        low, high, step, value: (N,) these bounds, steps of finite differences, numbers.
         grid: log evidence of what was integrated on a grid, by effect, less that of its best point.
     """
 
@@ -57,7 +56,6 @@ class Guess:
     high: np.ndarray
     step: np.ndarray
     value: np.ndarray
-    one_sided: np.ndarray
     grid: dict[str, float]
 
     @classmethod
@@ -78,7 +76,6 @@ class Guess:
             high=np.r_[prior.high, wide],
             step=np.r_[prior.step, np.ones(more)],
             value=value,
-            one_sided=np.zeros(len(prior.mean), bool),
             grid={},
         )
 
@@ -141,16 +138,14 @@ class Hypothesis(Guess):
         return Linear.of_products(columns, gram + across + across.T, push)
 
     def log_evidence(self, linear: Linear, cov: np.ndarray | None = None) -> float:
-        """Log evidence, with what was integrated on grids, and signs that cards demand.
+        """Log evidence, with what was integrated on grids, of numbers that end at their bounds."""
+        before = self.mean, self.cov if cov is None else cov
+        within = self.log_share(*self.posterior(linear, cov)) - self.log_share(*before)
+        return linear.log_evidence + sum(self.grid.values()) + within
 
-        A half normal prior doubles the density and cuts the posterior's share on the other side.
-        """
-        found = linear.log_evidence + sum(self.grid.values())
-        if not self.one_sided.any():
-            return found
-        mean, spread = self.posterior(linear, cov)
-        z = (mean - self.low)[self.one_sided] / np.sqrt(np.diag(spread)[self.one_sided])
-        return found + float(np.sum(np.log(2) + log_ndtr(z)))
+    def log_share(self, mean: np.ndarray, cov: np.ndarray) -> float:
+        """Log of the share within its bounds of a distribution of its numbers, (N,) and (N, N)."""
+        return float(log_within(self.low, self.high, mean, np.sqrt(np.diag(cov))).sum())
 
     def posterior(
         self, linear: Linear, cov: np.ndarray | None = None
@@ -307,9 +302,6 @@ class Fitter:
             high=np.r_[h.high, [p.max for p in free]],
             step=np.r_[h.step, np.where(limit, LIMIT_STEP * np.abs(start), [p.step for p in free])],
             value=np.r_[h.value, start],
-            one_sided=np.r_[
-                h.one_sided, [p.min >= p.usual and p.role not in ("limit", "radius") for p in free]
-            ],
             grid={**h.grid, effect: grid + float(np.log(chance))},
         )
         return self.fit(grown, kept=h.slopes)
@@ -321,7 +313,7 @@ class Fitter:
         keep = np.array([instance_of(n) != instance for n in h.labels])
         part = {
             k: getattr(h, k)[keep]
-            for k in ("named", "mean", "low", "high", "step", "value", "one_sided", "slopes")
+            for k in ("named", "mean", "low", "high", "step", "value", "slopes")
         }
         less = replace(
             h,

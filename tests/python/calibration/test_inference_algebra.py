@@ -247,8 +247,14 @@ class OneAdded(Hypothesis):
     of_effects = property(lambda self: np.arange(4) == 3)
 
 
-def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_logs(monkeypatch):
-    """Two logs share a base; an effect is in both, or in the later one alone."""
+@pytest.mark.parametrize("low, high", [(-np.inf, np.inf), (0.0, 0.75)])
+def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_logs(
+    monkeypatch, low, high
+):
+    """Two logs share a base; an effect within bounds is in both, or in the later one alone.
+
+    The effect is integrated over by the trapezoidal rule, the base by its covariance.
+    """
     monkeypatch.setattr(hidden, "PRIORS", replace(PRIORS, sheet=0.0))
     random = np.random.default_rng(11)
     own, later = random.normal(size=(4, 30)), random.normal(size=(4, 40))
@@ -258,9 +264,13 @@ def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_log
     def joint(effect_in_own: bool) -> float:
         first = own * np.array([1, 1, 1, effect_in_own])[:, None]
         x = np.concatenate([first, later], axis=1)
-        prior = np.array([1, 1, 1, PRIORS.size**2])
-        cov = (x.T * prior) @ x + np.eye(x.shape[1])
-        return multivariate_normal(cov=cov).logpdf(np.r_[y_own, y_later])
+        of_base = multivariate_normal(cov=x[:3].T @ x[:3] + np.eye(x.shape[1]))
+        size = np.linspace(*np.clip([low, high], -9 * PRIORS.size, 9 * PRIORS.size), 4001)
+        left = np.r_[y_own, y_later] - size[:, None] * x[3]
+        prior = norm(0, PRIORS.size)
+        log_density = prior.logpdf(size) - np.log(prior.cdf(high) - prior.cdf(low))
+        weight = np.gradient(size) * np.where(np.isin(size, size[[0, -1]]), 0.5, 1)
+        return logsumexp(log_density + of_base.logpdf(left), b=weight)
 
     def flat(rows: np.ndarray) -> np.ndarray:
         return rows.reshape(*rows.shape[:-2], -1)
@@ -277,11 +287,10 @@ def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_log
         named=np.ones(4, bool),
         mean=np.r_[base.mean, 0.0],
         cov=prior,
-        low=np.full(4, -np.inf),
-        high=np.full(4, np.inf),
+        low=np.r_[np.full(3, -np.inf), low],
+        high=np.r_[np.full(3, np.inf), high],
         step=np.ones(4),
         value=np.zeros(4),
-        one_sided=np.zeros(4, bool),
         grid={},
         slopes=later[:, :, None],
         errors=y_later[:, None],
@@ -289,8 +298,8 @@ def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_log
     always, log_factor = told.explained(h, ("motor_lag",), np.arange(3))
     none = np.zeros((0, y_later.size))
     fitter = SimpleNamespace(whiten=flat, always=none, gram_always=none @ none.T)
-    found = always.linear(fitter).log_evidence + log_factor - h.linear(fitter).log_evidence
-    assert found == pytest.approx(joint(True) - joint(False))
+    there, new = (each.log_evidence(each.linear(fitter)) for each in (always, h))
+    assert there + log_factor - new == pytest.approx(joint(True) - joint(False), abs=1e-5)
 
 
 OF_TIME = ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss")
@@ -355,7 +364,7 @@ def test_an_error_of_formulas_has_the_evidence_of_its_own_prior():
     prior = np.array([0.5, 0.7, 1.1])  # standard deviations; the last two are of the effect
     h = SimpleNamespace(
         labels=("base.forward_gain", "lateral_slip.a", "lateral_slip.b"),
-        mean=np.zeros(3), low=np.full(3, -np.inf), one_sided=np.zeros(3, bool),
+        mean=np.zeros(3), low=np.full(3, -np.inf), high=np.full(3, np.inf),
         cov=np.diag(prior**2), instance=lambda name: name,
     )  # fmt: skip
     linear = Linear.of(y, prior[:, None] * x)
@@ -383,7 +392,7 @@ def test_an_error_that_looks_like_a_one_sided_effect_has_its_sign():
     prior = np.array([0.5, 0.7])
     h = SimpleNamespace(
         labels=("base.forward_gain", "stiction.a"),
-        mean=np.zeros(2), low=np.array([-np.inf, 0.0]), one_sided=np.array([False, True]),
+        mean=np.zeros(2), low=np.array([-np.inf, 0.0]), high=np.full(2, np.inf),
         cov=np.diag(prior**2), instance=lambda name: name,
     )  # fmt: skip
     linear = Linear.of(y, prior[:, None] * x)
