@@ -147,9 +147,9 @@ def test_a_log_without_noise_is_said_to_have_none(model_text, tmp_path):
     assert float(told[1]) == pytest.approx(0.3, rel=0.1)
 
 
-def test_noise_of_a_wrong_model_is_called_so(section):
+def test_errors_of_a_wrong_model_are_not_white(section):
     """The model given lacks the robot's coasting."""
-    assert dict(section.facts)["noise"].endswith("include the model's error")
+    assert dict(section.facts)["residuals"].startswith("not white")
 
 
 def test_a_simulated_log_has_no_date():

@@ -129,6 +129,7 @@ class RobotComparison:
             "log": self.measurement.log_name,
             "score": self.score,
             "score_by_chance": list(self.floor.by_chance),
+            "whiteness_p": self.modelled.whiteness,
             "floor_kind": self.floor.kind,
             "noise": self.modelled.known_noise.to_json(),
             "errors": self.error_rows(),

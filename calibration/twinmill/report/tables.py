@@ -15,6 +15,7 @@ from twinmill.fitting.fit import Held
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
 from twinmill.predict.noise import LEAST, Noise
 from twinmill.predict.regimes import HORIZON, Regime
+from twinmill.predict.whiteness import MEMORY_S
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 
 Tone = Literal["", "good", "warn", "bad", "dim"]
@@ -36,6 +37,7 @@ SHOWN = {
 # Times the least noise that a fit assumes, which a log without any shares among sensor and drive.
 UNSEEN = 2
 WORST = 3  # regimes of a group
+NOT_WHITE, LEAST_P = 0.01, 0.001  # p-values: of the usual level, and of which no digits are shown
 TOGETHER = (
     "Known only in combination: the log determines how such quantities go together (the "
     "covariance in the model file), as that one side is weaker, but none of them by itself."
@@ -106,8 +108,9 @@ def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str
             f"{len(track.pose)} poses used, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
-        ("noise", _noise(noise, track.has_heading, wrong=robot.score > GOOD)),
+        ("noise", _noise(noise, track.has_heading)),
         ("noise floor", robot.floor.reason or OF_BEST),
+        ("residuals", _whiteness(robot.modelled.whiteness)),
         ("clocks", _clocks(robot)),
         *_held_heading(robot),
         *_wheel_angles(robot),
@@ -168,11 +171,10 @@ def _phases(robot: RobotComparison) -> list[tuple[str, str]]:
     return [("phases", f"the log begins at {', '.join(told)}, where the model fits best")]
 
 
-def _noise(noise: Noise, has_heading: bool, *, wrong: bool) -> str:
+def _noise(noise: Noise, has_heading: bool) -> str:
     """Standard deviations of the poses and of the robot's speed, in words.
 
-    No larger than fits assume at least is none. While the model is wrong its error is in what seems
-    to be noise of the speed.
+    No larger than fits assume at least is none.
     """
     channels = [
         ("speed", noise.position, 1000.0, " mm"),
@@ -188,8 +190,16 @@ def _noise(noise: Noise, has_heading: bool, *, wrong: bool) -> str:
     of = "poses" if has_heading else "positions"
     told = [f"{of} {' and '.join(poses)}"] if poses else []
     told += [", ".join(moves)] if moves else []
-    of_model = "; those of speed and turn rate include the model's error" if moves and wrong else ""
-    return f"{'; '.join(told)}{of_model}" if told else "none found"
+    return "; ".join(told) if told else "none found"
+
+
+def _whiteness(p_value: float) -> str:
+    """Result of the test of whiteness, in words."""
+    tested = f"(Ljung-Box test over {MEMORY_S:g} s: p {'<' if p_value < LEAST_P else '='} "
+    tested += f"{number(max(p_value, LEAST_P), 1)})"
+    if p_value < NOT_WHITE:
+        return f"not white {tested}: the noise alone does not explain them"
+    return f"white {tested}: what the model leaves looks like noise"
 
 
 def robots(result: Comparison, before: Comparison | None = None) -> list[Table]:
