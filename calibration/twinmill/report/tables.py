@@ -9,6 +9,7 @@ import numpy as np
 
 from twinmill.data.measurement import Measurement
 from twinmill.data.units import date_of
+from twinmill.estimation.opened import NoiseFloor
 from twinmill.fitting.add import AddResult
 from twinmill.fitting.compare import GOOD, MISSING, Comparison, RobotComparison
 from twinmill.fitting.fit import Held
@@ -29,7 +30,6 @@ VERDICTS: dict[str, Tone] = {
     "outside_catalogue": "bad",
 }
 
-OF_BEST = "error by the noise of the best model found, as diagnose searches for it"
 SHOWN = {
     "m": (1000.0, "mm"),
     "rad": (float(np.degrees(1)), "°"),
@@ -109,7 +109,7 @@ def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str
         ),
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading)),
-        ("noise floor", robot.floor.reason or OF_BEST),
+        ("noise floor", robot.floor.reason or _floor(robot.floor)),
         ("residuals", _whiteness(robot.modelled.whiteness)),
         ("clocks", _clocks(robot)),
         *_held_heading(robot),
@@ -191,6 +191,13 @@ def _noise(noise: Noise, has_heading: bool) -> str:
     told = [f"{of} {' and '.join(poses)}"] if poses else []
     told += [", ".join(moves)] if moves else []
     return "; ".join(told) if told else "none found"
+
+
+def _floor(floor: NoiseFloor) -> str:
+    """Where a floor comes from, and between which scores right models are."""
+    low, high = floor.by_chance
+    of_best = "error by the noise of the best model found, as diagnose searches for it"
+    return f"{of_best}; 95 of 100 right models score {low:.2f} to {high:.2f} in such a log"
 
 
 def _whiteness(p_value: float) -> str:
