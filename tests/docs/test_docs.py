@@ -11,6 +11,7 @@ import pytest
 import twinmill_native as native
 
 import twinmill as tm
+from twinmill.inference.settings import PRIORS
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs"))
@@ -38,6 +39,14 @@ def test_fences_that_a_command_prints_do_not_end_its_block(tmp_path):
     assert with_outputs(page, tmp_path).splitlines()[1:] == [
         "$ printf '```\\ntwinmill\\n```\\n'", "```", "twinmill", "```", "````"
     ]  # fmt: skip
+
+
+def test_the_page_on_inference_lists_the_numbers_that_move_an_answer():
+    """All of them and no other, with their values: a number that is changed is noticed."""
+    page = (ROOT / "docs/inference.md").read_text()
+    table = page.split("## The numbers that can move an answer")[1].split("\n## ")[0]
+    listed = re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", table, re.M)
+    assert {name: float(value) for name, value in listed} == vars(PRIORS)
 
 
 def test_the_page_on_sweeps_tells_every_metric():
