@@ -3,6 +3,7 @@
 
 from collections.abc import Iterable
 from io import StringIO
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from twinmill.experiment.played import csv_text
 from twinmill.files import plain, replacing
 from twinmill.fitting import compare as _compare
 from twinmill.fitting.residuals import Residuals
+from twinmill.predict.paths import predicted_path
 from twinmill.report import (
     comparisons,
     error_figures,
@@ -86,6 +88,32 @@ class Comparison(Reported):
             True
         """
         return residuals_table(Residuals.of(robot) for robot in self._result.robots)
+
+    def paths(self, restart_s: float = 2.0) -> pd.DataFrame:
+        """Measured poses beside those that follow from the commands alone.
+
+        Args:
+            restart_s: how long a prediction goes on before the next begins at a measured pose;
+                `math.inf` for one from the log's begin, and from each gap of the poses.
+
+        Returns:
+            log, robot_id, t_s (of the poses, on the capture's clock), since_s (t_s at which the
+            prediction began), x_m, y_m, theta_rad as measured, and x_predicted_m, y_predicted_m,
+            theta_predicted_rad. Lost poses and steady-state tables have none.
+
+        Raises:
+            ValueError: `restart_s` is not above zero.
+
+        Examples:
+            >>> paths = found.paths(restart_s=5)
+            >>> ahead_s = paths["t_s"] - paths["since_s"]
+            >>> bool(0 <= ahead_s.min() and ahead_s.max() < 5.1)
+            True
+        """
+        if not checked("restart_s", restart_s, Real, "a number of seconds") > 0:
+            raise ValueError(f"restart_s: {restart_s} s: give a time above zero, or math.inf.")
+        logs = [r for r in self._result.robots if isinstance(r, _compare.RobotComparison)]
+        return pd.concat([paths_table(r, restart_s) for r in logs], ignore_index=True)
 
     def plot(self) -> Figure:
         """Errors over the horizon, with the noise floor; for a steady-state table, its values.
@@ -368,6 +396,18 @@ class Effect(Shown):
 def residuals_table(residuals: Iterable[Residuals]) -> pd.DataFrame:
     """A row for each prediction of all robots."""
     return pd.concat([pd.DataFrame(own.columns()) for own in residuals], ignore_index=True)
+
+
+def paths_table(robot: _compare.RobotComparison, restart_s: float) -> pd.DataFrame:
+    """A row for each pose that was not lost, measured and predicted."""
+    track = robot.measurement.track
+    since, predicted = predicted_path(robot.modelled, restart_s)
+    known = since >= 0
+    columns = {"log": robot.measurement.log_name, "robot_id": robot.robot_id}
+    columns |= {"t_s": track.pose_t_s[known], "since_s": track.pose_t_s[since[known]]}
+    columns |= dict(zip(("x_m", "y_m", "theta_rad"), track.pose[known].T, strict=True))
+    names = ("x_predicted_m", "y_predicted_m", "theta_predicted_rad")
+    return pd.DataFrame(columns | dict(zip(names, predicted[known].T, strict=True)))
 
 
 def errors_drawn(results: list[tuple[str, _compare.Comparison]]) -> Figure:

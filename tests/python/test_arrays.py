@@ -285,3 +285,24 @@ def test_a_frame_that_lacks_a_column_is_refused_by_its_name():
         circle(kind="velocity")
     with pytest.raises(tm.LogError, match="robot_id: is 100"):
         circle(robot_id=100)
+
+
+def test_a_predicted_path_is_the_circle_that_the_commands_describe(tmp_path):
+    """Half of the speed and of the turning rate: a circle as large, half of it in the time."""
+    twist = '[base]\ndrive = "twist"\nwheels = "none"\nspeed_per_input_mps = 0.0036\n'
+    (tmp_path / "half.toml").write_text(
+        f'name = "half"\n{twist}forward_gain = 0.5\nyaw_gain = 0.5\ncontrol_period_s = 0.02\n'
+    )
+    found = tm.compare(circle(same_clock=True), tmp_path / "half.toml")
+    predicted = ["x_predicted_m", "y_predicted_m", "theta_predicted_rad"]
+    turned = 0.5 * OMEGA_RADPS * T_S
+    ways = np.column_stack([RADIUS_M * np.sin(turned), RADIUS_M * (1 - np.cos(turned)), turned])
+    np.testing.assert_allclose(found.paths(np.inf)[predicted], ways, atol=2e-3)
+
+    parts = found.paths(restart_s=5)
+    np.testing.assert_allclose(parts[["x_m", "y_m", "theta_rad"]], POSE, atol=1e-6)
+    np.testing.assert_allclose(parts["since_s"].unique(), np.arange(0, 30, 5), atol=0.02)
+    turned = parts["since_s"] + 0.5 * (parts["t_s"] - parts["since_s"])
+    np.testing.assert_allclose(parts["theta_predicted_rad"], OMEGA_RADPS * turned, atol=2e-3)
+    with pytest.raises(ValueError, match=r"restart_s: 0 s"):
+        found.paths(0)
