@@ -683,6 +683,26 @@ class Model(Shown):
         checked("model", name, (str, Path), "the name of a model")
         return cls(ModelFile.load(str(name)))
 
+    @classmethod
+    def from_text(cls, text: str, name: str = "model.toml") -> "Model":
+        """Model that a text describes, as a file's would; `save` writes it.
+
+        Args:
+            text: TOML.
+            name: that results call it by.
+
+        Raises:
+            ModelError: it is no valid model; one sentence.
+
+        Examples:
+            >>> text = tm.Model.load("turbopi.toml").file.text
+            >>> tm.Model.from_text(text, "mine.toml")
+            Model(mine.toml: duty, no effects)
+        """
+        checked("text", text, str, "a model's TOML")
+        checked("name", name, str, "the name of a model")
+        return cls(ModelFile.of_text(Path(name), text, name))
+
     @property
     def file(self) -> ModelFile:
         """Source of the model: `path`, `text` (TOML) and `hash` (sha256 of the text).

@@ -573,3 +573,16 @@ def test_the_file_of_a_model_stays(here):
     with pytest.raises(AttributeError):
         model.file = None
     assert repr(model) == "Model(fitted.toml: duty, no effects)"
+
+
+def test_a_model_of_a_text_is_that_of_its_file(tmp_path):
+    text = tm.Model.load("turbopi.toml").file.text
+    (tmp_path / "mine.toml").write_text(text)
+    from_file = tm.Model.load(tmp_path / "mine.toml")
+    made = tm.Model.from_text(text, "mine.toml")
+    pd.testing.assert_frame_equal(made.table(), from_file.table())
+    assert made.file.hash == from_file.file.hash
+    with pytest.raises(tm.ModelError, match=r"mine\.toml: has no section \[base\]"):
+        tm.Model.from_text('name = "mine"\n', "mine.toml")
+    with pytest.raises(tm.ModelError, match=r"mine\.toml"):
+        tm.Model.from_text("name = ", "mine.toml")

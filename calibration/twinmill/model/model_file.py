@@ -41,13 +41,31 @@ class ModelFile:
         """
         try:
             path = Path(native.find_model_file(str(name)))
-            loaded = cls.of(path, path.read_text(), str(name))
+            text = path.read_text()
         except UnicodeDecodeError as error:
             raise ModelError(
                 f"{name}: is no text, so it is no model file; check the name."
             ) from error
         except (ValueError, OSError) as error:
             raise ModelError(str(error).replace(str(name), first_line(name))) from error
+        return cls.of_text(path, text, str(name))
+
+    @classmethod
+    def of_text(cls, path: Path, text: str, name: str) -> "ModelFile":
+        """A model that somebody wrote.
+
+        Args:
+            path: of its file.
+            text: TOML.
+            name: in errors.
+
+        Raises:
+            ModelError: it is no valid model.
+        """
+        try:
+            loaded = cls.of(path, text, name)
+        except ValueError as error:
+            raise ModelError(str(error).replace(name, first_line(name))) from error
         if "base" not in loaded._document:
             raise ModelError(
                 f"{name}: has no section [base], so it does not say what the commands are nor how "
