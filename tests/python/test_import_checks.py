@@ -11,7 +11,7 @@ import pytest
 
 import twinmill as tm
 from twinmill.data.importers.import_log import ImportOptions, import_log
-from twinmill.data.log import read_log
+from twinmill.data.log import LogError, read_log
 
 STEP_S, HELD_S, DURATION_S = 0.02, 1.2, 60.0
 TWIST = """
@@ -217,3 +217,16 @@ def test_headings_in_degrees_are_told_and_nothing_that_follows_from_them(tmp_pat
     commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
     said = _said(tmp_path, POSES, poses, BODY, commands)
     assert said.count("robot 1:") == 1 and "the headings are in degrees" in said
+
+
+def test_of_a_second_run_that_is_wrong_it_is_said_that_the_first_is_not(tmp_path):
+    """As of a motor whose wires were exchanged between the days."""
+    (tmp_path / "t.toml").write_text(TWIST)
+    for day, sign in (("monday", 1), ("friday", -1)):
+        t_s, told, pose = _drive()
+        commands = np.column_stack([t_s, told[:, 0], 0 * t_s, sign * told[:, 1]])
+        _said(tmp_path, POSES, np.column_stack([t_s, pose]), BODY, commands)
+        (tmp_path / "o.lcmlog").rename(tmp_path / f"{day}.lcmlog")
+    runs = (tmp_path / "monday.lcmlog", tmp_path / "friday.lcmlog", tmp_path / "t.toml")
+    with pytest.raises(LogError, match=r"omega_radps has the wrong .*; monday\.lcmlog has no such"):
+        tm.compare_runs(*runs)
