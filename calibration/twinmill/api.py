@@ -48,7 +48,7 @@ from twinmill.data.importers.plain import VALUES
 from twinmill.data.lcm_log import split_events
 from twinmill.data.log import Log as RecordedLog
 from twinmill.data.log import LogError, RobotLog, log_of, read_log
-from twinmill.data.measurement import Measurements, load_measurements
+from twinmill.data.measurement import Measurement, Measurements, load_measurements
 from twinmill.data.multi_log import multi_log_of
 from twinmill.data.steady_table import SteadyTable, is_steady_table, read_steady_tables
 from twinmill.defaults import (
@@ -104,7 +104,7 @@ from twinmill.results import (
     residuals_table,
 )
 from twinmill.runs.compare import compare_runs as _compare_runs
-from twinmill.runs.compare import of_robot
+from twinmill.runs.compare import of_robot, right_before
 from twinmill.shown import (
     A_PATH,
     Reported,
@@ -1706,10 +1706,16 @@ def compare_runs(
     rate = float(checked("alarm_rate", alarm_rate, *NUMBER))
     if not 0 < rate < 1:
         raise ValueError(f"alarm_rate: is {rate:g}, and must be between 0 and 1.")
-    given = [_log(log) for log in (first, second, *healthy)]
-    a, b, *others = (of_robot(g.measurements(model), g.paths[0].name, robot) for g in given)
+    one, two, *more = (_log(log) for log in (first, second, *healthy))
+
+    def run(log: Log) -> Measurement:
+        return of_robot(log.measurements(model), log.paths[0].name, robot)
+
+    a = run(one)
+    with right_before(one.paths[0].name):
+        b = run(two)
     known = (a.log_sha256, b.log_sha256)
-    others = [m for m in others if m.log_sha256 not in known]
+    others = [m for m in map(run, more) if m.log_sha256 not in known]
     found = _compare_runs(
         *(a, b, model.file), healthy=others, rate=rate, tell=progress or (lambda _: None)
     )

@@ -30,16 +30,44 @@ def test_jitter_of_50_ms_is_taken_out(kind):
     assert "a beat of 100 Hz" in said
 
 
+def test_frames_that_wait_for_a_busy_machine_come_where_they_were_taken():
+    """Each twentieth waits 50 to 90 ms, one 360 ms, and those behind them come in a heap."""
+    random = np.random.default_rng(7)
+    waits_s = random.uniform(0.05, 0.09, len(TAKEN_S)) * (random.random(len(TAKEN_S)) < 0.05)
+    waits_s[2000] = 0.36
+    stamps_s = np.maximum.accumulate(TAKEN_S + waits_s)
+    utime_us, _ = at_even_beat(stamped(stamps_s), "p.csv")
+    late_s = 1e-6 * utime_us - TAKEN_S
+    assert np.abs(late_s - np.mean(stamps_s - TAKEN_S)).max() < 0.5 / RATE_HZ
+
+
+def test_frames_under_whole_seconds_come_where_they_were_taken():
+    """Within half a frame, but for the half second by which the seconds were cut."""
+    stamps_s = np.floor(TAKEN_S + 0.4)
+    utime_us, (said,) = at_even_beat(stamped(stamps_s), "p.csv")
+    late_s = 1e-6 * utime_us - TAKEN_S
+    assert np.abs(late_s - np.mean(stamps_s - TAKEN_S)).max() < 0.5 / RATE_HZ
+    assert "a beat of 100 Hz" in said
+
+
 @pytest.mark.parametrize(
     "stamps_s",
     [
         TAKEN_S + np.random.default_rng(1).normal(0, 0.001, len(TAKEN_S)),
         np.delete(TAKEN_S, np.arange(2000, 2100)),
         np.delete(TAKEN_S, slice(1000, 5000, 50)) + np.tile([0.03, -0.03], 2960),
+        np.floor(np.delete(TAKEN_S, slice(2000, 2150))),
         np.random.default_rng(1).permutation(TAKEN_S),
         TAKEN_S + 0.1 * np.sin(TAKEN_S),
     ],
-    ids=["hardly", "a second is missing", "frames are missing", "shuffled", "a clock that wavers"],
+    ids=[
+        "hardly",
+        "a second is missing",
+        "frames are missing",
+        "whole, some are missing",
+        "shuffled",
+        "a clock that wavers",
+    ],
 )
 def test_stamps_that_are_no_jittering_beat_stay(stamps_s):
     utime_us, said = at_even_beat(stamped(stamps_s), "p.csv")

@@ -187,6 +187,28 @@ def test_pixels_and_frames_ask_for_the_number_that_no_table_has(imported, tmp_pa
     np.testing.assert_allclose(robot.pose[9, :2], [0.9, 0.18])
 
 
+def test_a_count_of_frames_is_no_time_by_any_of_its_names(imported):
+    """Frames without the robot are missing, as of SLEAP: 25 a second, of which 3 to 7 are lost."""
+    rows = "".join(f"{k},{0.01 * k},0,0\n" for k in (0, 1, 2, 8, 9))
+    for name in ("frame_idx", "frameNumber", "Image_No"):
+        for rename in ({}, {name: "t_s"}):
+            with pytest.raises(LogError, match=f"'{name}' is a count of frames"):
+                imported(f"{name},x_m,y_m,theta_rad\n" + rows, robot_id=4, rename=rename)
+
+
+def test_stamps_coarser_than_frames_are_told_as_such(imported):
+    """Whole seconds of frames at 5 Hz, too few to tell a beat: 8 of 10 are under another's."""
+    rows = "".join(f"{k // 5},4,{0.01 * k},0,0\n" for k in range(10))
+    robot, warnings = imported(POSES.splitlines()[0] + "\n" + rows)
+    assert any("8 of 10 rows repeat a stamp" in w and "coarser" in w for w in warnings)
+    np.testing.assert_allclose(robot.pose[:, 0], [0.04, 0.09])
+
+
+def test_half_a_quaternion_is_no_heading_that_was_not_recorded(imported):
+    with pytest.raises(LogError, match="column qw is missing"):
+        imported(POSES.replace("theta_rad", "qz"))
+
+
 @pytest.mark.parametrize("lost", ["null", "None", "NaN", "N/A", ""])
 def test_words_for_a_lost_measurement_are_none(imported, lost):
     robot, _ = imported(POSES.replace("1,4,0.5,0.25,0.5", f"1,4,{lost},{lost},{lost}"))
@@ -244,7 +266,7 @@ def test_rows_out_of_order_and_repeated_stamps_are_put_right_and_said(imported):
     )
     np.testing.assert_allclose(robot.pose[:, 0], [-1, 0, 9])
     assert any("2 rows earlier" in w for w in warnings)
-    assert any("1 row repeats a stamp" in w for w in warnings)
+    assert any("1 of 4 rows repeats a stamp" in w for w in warnings)
 
 
 STAMPS_S = np.round(0.02 * np.arange(200), 2)  # of poses; a command is told each half second

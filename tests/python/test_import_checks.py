@@ -11,7 +11,7 @@ import pytest
 
 import twinmill as tm
 from twinmill.data.importers.import_log import ImportOptions, import_log
-from twinmill.data.log import read_log
+from twinmill.data.log import LogError, read_log
 
 STEP_S, HELD_S, DURATION_S = 0.02, 1.2, 60.0
 TWIST = """
@@ -25,8 +25,13 @@ speed_per_input_mps = 0.0036
 TURNED = 0.4  # the heading at the beginning
 
 
-def _drive(seed=3):
-    """(N,) s; (N, 2) m/s ahead and rad/s to the left; (N, 3) m, m, rad."""
+def _drive(seed=3, every=1):
+    """(N,) s; (N, 2) m/s ahead and rad/s to the left; (N, 3) m, m, rad.
+
+    Args:
+        seed: of the drive.
+        every: row that is told; 0 in those between.
+    """
     random = np.random.default_rng(seed)
     t_s = np.arange(0, DURATION_S, STEP_S)
     choices = np.array(
@@ -34,6 +39,7 @@ def _drive(seed=3):
     )
     order = random.integers(0, len(choices), int(DURATION_S / HELD_S) + 1)
     told = choices[order[(t_s / HELD_S).astype(int)]]
+    told[np.arange(len(told)) % every > 0] = 0
     heading = TURNED + np.concatenate([[0], np.cumsum(told[:-1, 1])]) * STEP_S
     middle = heading + told[:, 1] * STEP_S / 2
     steps = told[:, :1] * np.column_stack([np.cos(middle), np.sin(middle)]) * STEP_S
@@ -128,6 +134,31 @@ def test_velocities_of_the_room_under_the_names_of_the_bodys_are_told(tmp_path):
     assert not _said(tmp_path, POSES, poses, room, commands)
 
 
+def test_the_z_of_a_quaternion_is_no_heading(tmp_path):
+    t_s, told, pose = _drive()
+    half = np.sin(np.angle(np.exp(1j * pose[:, 2])) / 2)
+    commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
+    said = _said(tmp_path, POSES, np.column_stack([t_s, pose[:, :2], half]), BODY, commands)
+    assert said.count("robot 1:") == 1 and "the z of a quaternion" in said
+
+
+@pytest.mark.parametrize("every", [3, 6])
+@pytest.mark.parametrize("obeys_both", [False, True])
+def test_zeros_of_an_idle_sender_are_told_where_the_robot_does_not_obey_them(
+    tmp_path, every, obeys_both
+):
+    t_s, mixed, pose = _drive(every=every)
+    if not obeys_both:
+        pose = _drive()[2]
+    commands = np.column_stack([t_s, mixed[:, 0], 0 * t_s, mixed[:, 1]])
+    said = _said(tmp_path, POSES, np.column_stack([t_s, pose]), BODY, commands)
+    assert said.count("robot 1:") == (0 if obeys_both else 1)
+    if not obeys_both:
+        assert "zeros stand between its commands" in said
+        times = float(re.search(r"robot is ([\d.]+) times", said)[1])
+        assert times == pytest.approx(every, rel=0.1)
+
+
 @pytest.mark.parametrize("late_s", [-0.4, -0.08, 0.0, 0.08, 0.4])
 def test_poses_before_their_commands_belie_one_clock_and_those_after_are_a_delay(tmp_path, late_s):
     t_s, told, pose = _drive()
@@ -186,3 +217,16 @@ def test_headings_in_degrees_are_told_and_nothing_that_follows_from_them(tmp_pat
     commands = np.column_stack([t_s, told[:, 0], 0 * t_s, told[:, 1]])
     said = _said(tmp_path, POSES, poses, BODY, commands)
     assert said.count("robot 1:") == 1 and "the headings are in degrees" in said
+
+
+def test_of_a_second_run_that_is_wrong_it_is_said_that_the_first_is_not(tmp_path):
+    """As of a motor whose wires were exchanged between the days."""
+    (tmp_path / "t.toml").write_text(TWIST)
+    for day, sign in (("monday", 1), ("friday", -1)):
+        t_s, told, pose = _drive()
+        commands = np.column_stack([t_s, told[:, 0], 0 * t_s, sign * told[:, 1]])
+        _said(tmp_path, POSES, np.column_stack([t_s, pose]), BODY, commands)
+        (tmp_path / "o.lcmlog").rename(tmp_path / f"{day}.lcmlog")
+    runs = (tmp_path / "monday.lcmlog", tmp_path / "friday.lcmlog", tmp_path / "t.toml")
+    with pytest.raises(LogError, match=r"omega_radps has the wrong .*; monday\.lcmlog has no such"):
+        tm.compare_runs(*runs)

@@ -243,9 +243,12 @@ def test_shares_of_full_duty_under_percent_are_refused(imported):
 
 @pytest.mark.parametrize(
     "form",
-    ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "%H:%M:%S.%f", "%d.%m.%Y %H:%M:%S,%f"],
+    [
+        *("%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "%d.%m.%Y %H:%M:%S,%f"),
+        *("%H:%M:%S.%f", "%M:%S.%f", "%M:%S,%f"),
+    ],
 )
-def test_dates_and_times_of_day_go_on_over_midnight(imported, form):
+def test_dates_and_times_of_day_go_on_over_midnight_and_the_hour(imported, form):
     start = pd.Timestamp("2026-03-07 23:59:50")
     times = [
         table.assign(t_s=(start + pd.to_timedelta(table.t_s, unit="s")).dt.strftime(form))

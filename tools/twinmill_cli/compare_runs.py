@@ -19,7 +19,7 @@ if working():  # not for --help
 
     from twinmill.data.measurement import Measurement, load_measurements
     from twinmill.report import runs as present
-    from twinmill.runs.compare import RunComparison, compare_runs, of_robot
+    from twinmill.runs.compare import RunComparison, compare_runs, of_robot, right_before
     from twinmill.runs.history import healthy_logs
     from twinmill_cli.frame import command_line, finish_changed, open_model, provenance
 
@@ -89,10 +89,13 @@ def _compare_runs(
         return of_robot(load_measurements([path], model_file.model), path.name, robot)
 
     with telling("comparing runs") as tell, threadpool_limits(1, "blas"):
-        known = {m.log_sha256: m for m in map(run, [first, second])}
+        before = run(first)
+        with right_before(first.name):
+            after = run(second)
+        known = (before.log_sha256, after.log_sha256)
         more = [m for m in map(run, others) if m.log_sha256 not in known]
         result = compare_runs(
-            *(run(first), run(second), model_file), healthy=more, rate=alarm_rate, tell=tell
+            *(before, after, model_file), healthy=more, rate=alarm_rate, tell=tell
         )
     finish_changed(result, present, source, changed=result.changed, as_json=as_json, out=out)
     return result

@@ -42,7 +42,8 @@ DIGITS = re.compile(
     r"(?:[_.,:-]?(\d{1,9}))?Z?"
 )
 TIME_OF_DAY = re.compile(r"\d{1,2}:\d\d:\d\d")
-DAY_S = 86_400
+MINUTES = re.compile(r"\d{1,2}:\d\d[.,]\d+")  # and seconds, as Excel shows a time of day
+HOUR_S, DAY_S = 3600, 86_400
 DAYS = ("date", "day", "datum", "fecha")  # names of columns that hold no time of day
 UNITLESS = ("-", "1", "#", "id")  # as they stand in a row of units
 LOST = ("", "nan", "null", "none", "na", "n/a", "#n/a", "-")  # as programs write a lost one
@@ -256,14 +257,15 @@ class Table:
         """True if a column holds dates with times, or times of day."""
         first = self.rows[0][self._place(column)].strip()
         kinds = (DATE, DAY_FIRST, SLASHED, TIME_OF_DAY)
-        return any(kind.match(first) for kind in kinds) or bool(DIGITS.fullmatch(first))
+        whole = DIGITS.fullmatch(first) or MINUTES.fullmatch(first)
+        return any(kind.match(first) for kind in kinds) or bool(whole)
 
     def seconds(self, column: str) -> np.ndarray:
         """(rows,) s of a column of numbers, dates or times of day.
 
         Dates are ISO 8601, in digits alone (20260105_100030_020), day, month and year with points
         between, or these with slashes, where a day above 12 tells the order; UTC if they name no
-        zone. Times of day go on over midnight.
+        zone. Times of day go on over midnight, and minutes and seconds over the hour.
 
         Raises:
             LogError: no day tells the order.
@@ -273,7 +275,9 @@ class Table:
             return self.finite(column)
         import pandas as pd  # slow to import
 
-        cells = self._with_days(self.cells(column))
+        cells, period_s = self._with_days(self.cells(column)), DAY_S
+        if MINUTES.fullmatch(cells[0]):
+            cells, period_s = [f"0:{cell.replace(',', '.')}" for cell in cells], HOUR_S
         cells = _of_digits(self._of_slashed([_day_last(cell) for cell in cells], column))
         if DATE.match(cells[0]):
             stamps = pd.to_datetime(pd.Series(cells), format="ISO8601", utc=True, errors="coerce")
@@ -289,7 +293,7 @@ class Table:
                 bad,
             )
         seconds = (spans // pd.Timedelta(microseconds=1)).to_numpy(float) / 1e6
-        return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=DAY_S)
+        return seconds if DATE.match(cells[0]) else np.unwrap(seconds, period=period_s)
 
     def _with_days(self, cells: list[str]) -> list[str]:
         """Times of day with the days that stand in a column of their own, if there is one."""

@@ -120,7 +120,7 @@ def make_track(
     lost_s = np.empty((0, 2)) if len(robot.mode) else lost_commands(robot)
     usable = _trackable(robot, lost_s, notes)
     segment = find_segments(robot, usable, (usual_mps, usual_radps), notes)
-    pose = _continuous(robot.pose, segment)
+    pose = continuous(robot.pose, segment)
     rest, astray_rad = _rest(robot, lost_s), 0.0
     _note_frozen(robot, notes)
     if robot.has_heading:
@@ -262,7 +262,7 @@ def _after_the_last(robot: RobotLog) -> np.ndarray:
     return after
 
 
-def _continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:
+def continuous(pose: np.ndarray, segment: np.ndarray) -> np.ndarray:
     """Poses with the heading unwrapped anew in each segment: outliers may have hidden a turn.
 
     NaN where unusable: what is left out must not count as way driven or as a place.

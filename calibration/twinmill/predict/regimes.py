@@ -42,6 +42,8 @@ def where_it_fails(
     """Regimes with enough windows, by group; within a group the worst first."""
     over = (errors[:, HORIZON] / floor[HORIZON]) ** 2
     judged = np.isfinite(floor[HORIZON])  # a channel without a floor was not recorded, or is still
+    if not judged.any():
+        return []
     squares = over[:, judged].mean(axis=1)
     known = np.isfinite(squares)
     regimes = []

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Did anything change between two runs of one robot: by name, by how much, from when on?"""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from twinmill.arguments import option
 from twinmill.chance import f_above, t_quantile
 from twinmill.data.log import LogError
-from twinmill.data.measurement import Measurement, of_one_robot
+from twinmill.data.measurement import BadInputError, Measurement, of_one_robot
 from twinmill.data.steady_table import SteadyTable
 from twinmill.defaults import ALARM_RATE
 from twinmill.estimation.opened import Opened
@@ -254,6 +255,27 @@ def of_robot(
     """
     remedy = f"give commands and poses of one robot, or its number with {option('robot')}"
     return of_one_robot(measurements, f"{name}: holds", remedy, robot)[0]
+
+
+@contextmanager
+def right_before(first: str) -> Iterator[None]:
+    """Says of a second run that is wrong that the first is not: so the robot may have changed.
+
+    Args:
+        first: name of that one's log.
+
+    Raises:
+        BadInputError: the second one cannot be judged.
+    """
+    try:
+        yield
+    except BadInputError as error:
+        since = (
+            f"{first} has no such mistake, so between the two what writes the logs was changed, or "
+            "the robot itself, as by wires that were exchanged"
+        )
+        found = [replace(f, remedy=f"{f.remedy}; {since}") for f in error.findings]
+        raise BadInputError(found) from error
 
 
 def open_run(run: Measurement, model_file: ModelFile) -> Opened:

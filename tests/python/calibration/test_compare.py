@@ -11,6 +11,7 @@ from twinmill.diagnosis.diagnose import diagnose
 from twinmill.fitting.add import add
 from twinmill.fitting.compare import compare
 from twinmill.fitting.fit import fit
+from twinmill.predict.regimes import where_it_fails
 
 from .conftest import STEP_S
 
@@ -106,3 +107,8 @@ def test_a_comparison_does_not_deny_what_the_input_tells(measure, tanh_robot, tr
     )
     assert "nothing is missing" in silent
     assert "follows its commands later" in told and "nothing is missing" not in told
+
+
+def test_where_no_channel_has_a_floor_nothing_is_said_of_where_it_fails():
+    """As of poses that come once in a second, at a horizon of half a second."""
+    assert where_it_fails(None, None, np.ones((9, 5, 3)), np.full((5, 3), np.nan)) == []

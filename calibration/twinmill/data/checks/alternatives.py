@@ -526,18 +526,21 @@ def _left_by_first(
     Args: sums of stretches, as there; fold (B,) half that each stretch belongs to.
     """
     power, along, total = sums
-    halves = [
-        [np.cumsum(s * (fold == h)[:, None, None], axis=1)[:, counts - 1] for s in (power, along)]
-        for h in (0, 1)
-    ]
     left = np.cumsum(total)[counts - 1]
-    each, split, channel = np.ogrid[: len(power), : len(counts), : power.shape[3]]
-    for (here_p, here_m), (p, m) in (halves, halves[::-1]):
-        gain = np.maximum(m, 0) / np.maximum(p, 1e-12)
-        shape = np.argmax(gain * m, axis=2)  # (A, K, C)
-        best, p, m = (sums[each, split, shape, channel] for sums in (gain, here_p, here_m))
-        left = left + (best**2 * p - 2 * best * m).sum(axis=2)
-    return left
+    halves = np.arange(2) == fold[:, None]  # (B, 2)
+    split, channel = np.ogrid[: len(counts), : power.shape[3]]
+    found = np.empty((len(power), len(counts)))
+    for at_shift, *both in zip(found, power, along, strict=True):  # all at once would be large
+        (p, other_p), (m, other_m) = (
+            np.cumsum(s[None] * halves.T[:, :, None, None], axis=1)[:, counts - 1] for s in both
+        )
+        at_shift[:] = left
+        for here_p, here_m, of_p, of_m in ((p, m, other_p, other_m), (other_p, other_m, p, m)):
+            gain = np.maximum(of_m, 0) / np.maximum(of_p, 1e-12)
+            shape = np.argmax(gain * of_m, axis=1)  # (K, C)
+            best, own_p, own_m = (v[split, shape, channel] for v in (gain, here_p, here_m))
+            at_shift += (best**2 * own_p - 2 * best * own_m).sum(axis=1)
+    return found
 
 
 def _inverse(place: tuple[int, ...]) -> list[int]:

@@ -24,10 +24,11 @@ from twinmill.data.checks.finding import CheckedTrack, InputFinding, Remedy
 from twinmill.data.checks.foreign import foreign_stretches
 from twinmill.data.checks.motion import Motion
 from twinmill.data.checks.rolling import factor_words
+from twinmill.data.checks.senders import check_senders
 from twinmill.data.checks.settings import CHECKS
 from twinmill.data.checks.words import described
 from twinmill.data.log import KINDS, CommandKind
-from twinmill.data.track import Track
+from twinmill.data.track import Track, continuous
 
 OMNI = 3  # wheels of the only robots with an odd number
 OTHER_DRIVE = "take a model of this robot, or import the commands that the model is driven by"
@@ -221,7 +222,7 @@ def _mistakes(checked: CheckedTrack, search: Search, own: Explained) -> list[Inp
     tried = [e for e in search.best(_alternatives(checked)) if not _is_bias(e)]
     found = [e for e in tried if _shows(e.alternative, track)]
     best = min(found, key=lambda e: e.left)
-    for mistake in (_in_room, _shifted, stepped):
+    for mistake in (_in_room, _of_quaternion, _shifted, stepped):
         if mistaken := mistake(checked, search, own, best):
             return [mistaken]
     if not far_better(best, own):
@@ -264,6 +265,27 @@ def _in_room(
         f"the commands explain {1 - own.left:.0%} of the motion as the body's, and "
         f"{1 - room.left:.0%} as the room's",
         anew_with(IN_ROOM),
+    )
+
+
+def _of_quaternion(
+    checked: CheckedTrack, search: Search, own: Explained, best: Explained
+) -> InputFinding | None:
+    """The z of a quaternion, which is the sine of half the heading, that was taken for it."""
+    track = checked.track
+    if not track.has_heading or np.nanmax(np.abs(track.pose[:, 2])) > 1:
+        return None
+    pose = track.pose.copy()
+    pose[:, 2] = 2 * np.arcsin(track.pose[:, 2])
+    motion = Motion.of(replace(track, pose=continuous(pose, track.segment)))
+    turned = at_axle(Search(motion, search.wheels), [OWN]).own()
+    if turned.left > alike_left([best.left]) or not far_better(turned, own):
+        return None
+    return checked.finding(
+        "the headings are no angles, but the z of a quaternion",
+        f"the commands explain {1 - own.left:.0%} of the motion as they are, and "
+        f"{1 - turned.left:.0%} as those of which z is the sine of half",
+        "take the whole quaternion, in columns qw and qz, or its angle, 2 atan2(z, w)",
     )
 
 
@@ -353,6 +375,8 @@ def _units(checked: CheckedTrack, e: Explained) -> list[InputFinding]:
     """Speeds that are off by what a unit makes, where the commands explain the motion well."""
     if e.left > CHECKS.explained:
         return []
+    if mixed := check_senders(checked, e):
+        return mixed
     speed, turn = (float(gain) for gain in e.gain)
     turn = turn if checked.track.has_heading else 0.0
     (window, what, names), *_ = HEADINGS_IN

@@ -4,11 +4,10 @@
 import numpy as np
 
 FEWEST = 50  # rows that tell a beat
-MOST_S = 0.25  # off the beat: beyond it is no jitter
 JITTERS = 0.5  # of a period, standard deviation
 HEAPED, SHORT = 0.1, 0.1  # share of the steps that are shorter than that share of a period, or back
-WANDERS = 1.0  # of a period, of means over MEAN_S: frames are missing, or the beat is none
-MEAN_S = 2.0
+WANDERS = 1.0  # of a period, of medians over MIDDLE_S: frames are missing, or the beat is none
+MIDDLE_S = 2.0  # a stamp that is further off is none of a frame that was only written late
 
 
 def at_even_beat(utime_us: np.ndarray, where: str) -> tuple[np.ndarray, list[str]]:
@@ -33,7 +32,11 @@ def at_even_beat(utime_us: np.ndarray, where: str) -> tuple[np.ndarray, list[str
 
 
 def _beat(utime_us: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """(N,) int ascending, and the standard deviation of the jitter, s."""
+    """(N,) int ascending, and the standard deviation of the jitter, s.
+
+    Frames that wait for a busy machine come late in a heap, and those behind them as soon as ever:
+    the median of a stretch, unlike its mean, does not tell how long the longest of them waited.
+    """
     if len(utime_us) < FEWEST:
         return None
     frame = np.arange(len(utime_us))
@@ -41,14 +44,14 @@ def _beat(utime_us: np.ndarray) -> tuple[np.ndarray, float] | None:
     period_s, first_s = np.polyfit(frame, t_s, 1)
     off_s = t_s - (first_s + period_s * frame)
     jitter_s = float(off_s.std())
-    if period_s <= 0 or np.abs(off_s).max() > MOST_S or jitter_s < JITTERS * period_s:
+    if period_s <= 0 or np.abs(off_s).max() > MIDDLE_S or jitter_s < JITTERS * period_s:
         return None
     if np.mean(np.diff(t_s) < SHORT * period_s) < HEAPED:
         return None
-    count = max(1, round(MEAN_S / period_s))
-    means_s = np.array([part.mean() for part in np.array_split(off_s, -(-len(off_s) // count))])
-    chance_s = 3 * jitter_s / np.sqrt(count)
-    if np.abs(means_s).max() > WANDERS * period_s + chance_s:
+    count = max(1, round(MIDDLE_S / period_s))
+    stretches = np.array_split(off_s, -(-len(off_s) // count))
+    wanders_s = np.abs([np.median(stretch) for stretch in stretches] - np.median(off_s)).max()
+    if wanders_s > WANDERS * period_s + 3 * jitter_s / np.sqrt(count):
         return None
     beat_us = utime_us[0] + np.round(1e6 * (first_s + period_s * frame)).astype(np.int64)
     return beat_us, jitter_s

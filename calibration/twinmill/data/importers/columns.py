@@ -248,7 +248,7 @@ NUMBERED = ("q0", "q1", "q2", "q3")
 HALF_TURN_DEG = 180.0  # no robot turns so far from row to row: then it is the way back of degrees
 LEVEL = 0.2  # x and y of the quaternion of a robot on a floor are smaller
 DIRECTION = re.compile(r"(^|_)dir(ection)?(_|$)")  # of a wheel, beside a duty without a sign
-COUNTERS = ("frame", "frame_id", "frame_number", "sample", "index")
+COUNTER = re.compile(r"(frame|sample|image|index)_?(id|idx|index|no|nr|num|number|count)?")
 
 
 def explain(
@@ -312,9 +312,9 @@ def _together(table: Table, known: frozenset[str], guesses: list[Guess]) -> list
         if DIRECTION.search(name) and told & {*LEFT, *RIGHT}:
             why = "is a direction, and our duties have signs: give them its sign, and take it out"
             changed[column] = Guess(column, (), 1.0, why, False)
-    has_time = any("t_s" in guess.targets for guess in guesses)
-    counter = next((named[name] for name in COUNTERS if name in named), None)
-    if counter and not has_time and "t_s" in known:
+    counter = next((column for name, column in named.items() if COUNTER.fullmatch(name)), None)
+    times = {guess.column for guess in guesses if "t_s" in guess.targets}
+    if counter and times <= {counter} and "t_s" in known:
         changed[counter] = Guess(counter, ("t_s",), math.nan, ", ".join(lacks("t_s")), False)
     return [changed.get(guess.column, guess) for guess in guesses]
 

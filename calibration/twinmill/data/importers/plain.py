@@ -30,7 +30,7 @@ from twinmill.data.importers.series import (
     velocities_of_steering,
     with_z_up,
 )
-from twinmill.data.importers.stamps import sound_rows
+from twinmill.data.importers.stamps import repeats, sound_rows
 from twinmill.data.log import CommandKind, LogError
 from twinmill.data.measurement_table import LOST, CellError, Table, is_number
 from twinmill.data.units import unit_of_stamps
@@ -409,6 +409,9 @@ def _orientation(table: Table) -> np.ndarray:
     Of a robot on the floor qx and qy may be left out: they are 0, or the length tells.
     """
     if not table.has("qw", "qz"):
+        half = [name for name in ("qw", "qz") if table.has(name)]
+        if half and not table.has("theta_rad"):
+            raise table.missing("qz" if half == ["qw"] else "qw")
         if not table.has("theta_rad") and not any(map(HEADING_LIKE.search, table.strange)):
             return np.full((len(table.rows), 4), np.nan)
         return quaternion_from_heading(table.numbers("theta_rad", True))
@@ -514,10 +517,10 @@ def _check_passes(table: Table, rows: np.ndarray, stamps: np.ndarray, where: str
         return
     back_s = f"{-step[at - 1] / 1e6:.6g} s"
     raise LogError(
-        f"{where}row {table.line[rows[at]]} is {back_s} earlier than the row before, and {shared} "
-        "rows behind it fall among those before it: the clock was set back, or two recordings "
-        f"stand in one file; make a file of each part, or add {back_s} and the pause between them "
-        "to the stamps from that row on."
+        f"{where}: row {table.line[rows[at]]} is {back_s} earlier than the row before, and "
+        f"{shared} rows behind it fall among those before it: the clock was set back, or two "
+        f"recordings stand in one file; make a file of each part, or add {back_s} and the pause "
+        "between them to the stamps from that row on."
     )
 
 
@@ -539,21 +542,20 @@ def _by_robot(
     for number in np.unique(ids).tolist():
         rows = np.flatnonzero(ids == number)
         stamps = utime_us[rows]
-        where = f"{table.name}: robot {number}: "
+        where = f"{table.name}: robot {number}"
         _check_passes(table, rows, stamps, where)
         late = int(np.count_nonzero(np.diff(stamps) < 0))
         rows = rows[np.argsort(stamps, kind="stable")]
         last = np.append(np.diff(utime_us[rows]) > 0, True)
         most_s = -np.diff(stamps).min(initial=0) / 1e6
         earlier = f"{counted(late, 'row')} earlier than the row before, by {most_s:.3g} s at most"
-        notes = [f"{where}{earlier}; sorted."] if late else []
+        notes = [f"{where}: {earlier}; sorted."] if late else []
         lost = ~last
         if held is not None and lost.any():
             changed = np.diff(held[rows], axis=0).any(axis=1)
             lost &= np.append(True, changed) & np.append(changed, True)
         if lost.any():
-            double = counted(np.count_nonzero(lost), "row repeats", "rows repeat")
-            notes.append(f"{where}{double} a stamp; the last of each was kept.")
+            notes.append(repeats(where, np.count_nonzero(lost), len(lost), "row"))
         called = "" if named is None else table.rows[rows[0]][named].strip()
         yield number, rows[last], said + notes, called
         said = []

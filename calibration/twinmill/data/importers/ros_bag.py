@@ -53,6 +53,7 @@ from twinmill.data.importers.series import (
     velocities_of_steering,
     with_z_up,
 )
+from twinmill.data.importers.stamps import repeats
 from twinmill.data.log import LogError
 from twinmill.data.other_files import refuse_other_file
 from twinmill.data.unpacking import UnpackError, bound_bag_readers
@@ -587,8 +588,7 @@ class _Rows:
         last = np.append(np.diff(self.utime_us[rows]) > 0, True)
         if last.all():
             return rows, self.notes
-        repeated = counted(np.count_nonzero(~last), "message repeats", "messages repeat")
-        note = f"{self.topic}: {repeated} a stamp; the last of each was kept."
+        note = repeats(self.topic, np.count_nonzero(~last), len(last), "message")
         return rows[last], [*self.notes, note]
 
 

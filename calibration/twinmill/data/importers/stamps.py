@@ -44,6 +44,22 @@ def sound_rows(table: Table, t_s: np.ndarray, ids: np.ndarray) -> tuple[Table, n
     return replace(table.where(kept), notes=notes), kept
 
 
+def repeats(where: str, count: int, total: int, noun: str) -> str:
+    """Sentence on samples that came under the stamp of another, of which one was kept.
+
+    Args:
+        where: the file, the robot, the topic.
+        count: of those that were not kept.
+        total: of all.
+        noun: for one of them.
+    """
+    repeat = "repeats" if count == 1 else "repeat"
+    told = f"{where}: {count} of {total} {noun}s {repeat} a stamp; the last of each was kept"
+    if count < total / 2:
+        return f"{told}."
+    return f"{told}: stamps are coarser than the times between {noun}s; write all their digits."
+
+
 def _damaged(t_s: np.ndarray) -> np.ndarray:
     """Places of stamps that lie by themselves, far before or after all the others.
 
