@@ -29,9 +29,7 @@ FINEST = 1e-5  # m or rad: below it are numerical errors of simulations, as of t
 LEAST = 5e-5, 1e-4  # sensor in m or rad, drive in m/s or rad/s: a tenth of a good capture's
 NUDGE = 0.1  # of logarithms, in the differences that tell how well they are known
 DRIFT = PRIORS.sheet  # of the logarithms, between two logs of a robot: as of a discrepancy
-SLOPE_STEP = 1e-3  # of logarithms, in the differences that lead to the best noise
-SETTLED = 1e-6  # relative fall of a log posterior of some thousands: less decides nothing
-REACH = np.log(1000.0)  # of logarithms about the usual noise: beyond it lies no robot's
+EVALUATIONS = 60  # of the simplex: its evidence is flat within half a unit by then
 SEEN = 0.5  # information in units of the prior, below which a direction says nothing of the noise
 HEAVY = 5.0  # standard deviations, beyond which a step weighs as under Student's t
 
@@ -293,9 +291,13 @@ class _Channel:
 
     def fitted(self, start: np.ndarray) -> np.ndarray:
         """(4,) where it is largest."""
-        within = np.column_stack([self.mean - REACH, self.mean + REACH])
-        options = {"eps": SLOPE_STEP, "ftol": SETTLED}
-        return minimize(self.cost, start, method="L-BFGS-B", bounds=within, options=options).x
+        options = {
+            "maxfev": EVALUATIONS,
+            "xatol": 0.05,
+            "fatol": 0.3,
+            "initial_simplex": np.vstack([start, *(start + 0.5 * np.eye(4))]),
+        }
+        return minimize(self.cost, start, method="Nelder-Mead", options=options).x
 
     def spread(self, at: np.ndarray) -> np.ndarray:
         """(4, 4) covariance by the curvature there; no direction is less known than before."""
