@@ -248,7 +248,7 @@ def _in_the_light(robot: Inference, every: list[Belief]) -> RobotAnswer:
 def _of_all(found: Shared, robots: Sequence[Inference]) -> Answer:
     """Answer on what all robots lack, by the sets of it."""
     every = [(things - found.words, things & found.words, p) for things, p in found.sets.items()]
-    outside = sum(p for effects, words, p in every if words and not effects)
+    outside = sum(p for _, words, p in every if words)
     effects = {name: p for name, p in found.things.items() if name not in found.words}
     words = {name: p for name, p in found.things.items() if name in found.words}
     of_effects = summed((own, p) for own, _, p in every)
@@ -259,7 +259,7 @@ def _of_all(found: Shared, robots: Sequence[Inference]) -> Answer:
     likely = {word: p for word, p in words.items() if p > LIKELY}
     share = np.mean([robot.answer.share for robot in robots]) if likely else 0.0
     return Answer(
-        verdict_of(found.nothing, outside, findings, refit=stale > LIKELY),
+        verdict_of(found.nothing, outside * float(share), findings, refit=stale > LIKELY),
         findings,
         found.nothing,
         outside,

@@ -198,8 +198,8 @@ def answer(table: Table, every: list[Belief] | None = None) -> RobotAnswer:
     findings = told([_named(name, best, every, table) for name in _by_worth(best, table)])
     stale = sum(b.probability for b in every if b.entry.stale)
     refit = sum(b.probability for b in every if b.nothing and b.entry.stale) > nothing / 2
-    verdict = verdict_of(nothing, outside, findings, refit=refit)
     words, share = _rest(best, every, table) if something else ({}, 0.0)
+    verdict = verdict_of(nothing, _worth_unnamed(findings, share, every), findings, refit=refit)
     added = _likeliest(every, lambda b: tuple(sorted(b.effects)))
     own = max((b for b in every if tuple(sorted(b.effects)) == added), key=lambda b: b.probability)
     return RobotAnswer(
@@ -223,20 +223,34 @@ def told(named: list[Named]) -> list[Named]:
     return sorted(likely, key=lambda f: -min(f.probability, PRIORS.sure))
 
 
-def verdict_of(nothing: float, outside: float, findings: list[Named], *, refit: bool) -> Verdict:
-    """The verdict by the probabilities that nothing is missing, or nothing of the catalogue.
+def verdict_of(nothing: float, unnamed: float, findings: list[Named], *, refit: bool) -> Verdict:
+    """Nothing, a name that is sure, or the expectation of which is worth most: a name or none.
 
     Args:
-        nothing: the first.
-        outside: the second.
+        nothing: probability that nothing is missing.
+        unnamed: expected share of what has no name.
         findings: effects that are told.
         refit: the base's numbers are stale if nothing is missing.
     """
     if nothing > 1 - PRIORS.sure:
         return PASSES[refit] if nothing >= 0.5 else "cannot_tell"
-    if outside >= 0.5 or not findings:
+    doubtful = all(f.certainty == "doubtful" for f in findings)
+    if doubtful and unnamed >= max((f.group_probability * f.share for f in findings), default=0.0):
         return "outside_catalogue"
     return "ambiguous" if findings[0].certainty == "group" else "effect_missing"
+
+
+def _worth_unnamed(findings: list[Named], share: float, every: list[Belief]) -> float:
+    """Expected share of the excess that causes without a name take.
+
+    They are behind what is left, and in the place of effects that look like them.
+    """
+    own = {f.effect: f.share for f in findings}
+    each = (
+        b.probability * min(1.0, bool(b.words) * share + sum(own.get(n, 0.0) for n in b.mimicked))
+        for b in every
+    )
+    return float(sum(each))
 
 
 def _of_each(every: list[Belief]) -> dict[str, float]:

@@ -52,8 +52,8 @@ class Belief:
 
     @property
     def outside(self) -> bool:
-        """Something is missing, and nothing of the catalogue."""
-        return not self.effects and not self.nothing
+        """Something without a name is missing, alone or beside effects of the catalogue."""
+        return bool(self.words or self.mimicked)
 
     @property
     def fitted(self) -> tuple[str, ...]:

@@ -74,9 +74,11 @@ def _verdict(answer: Answer, nothing: str) -> str:
         return f"{nothing} ({percent(answer.nothing)}){better}."
     names = " and ".join(_name(f) for f in answer.findings)
     if answer.verdict == "outside_catalogue":
-        like = f", most like {names}" if names else ""
-        return f"{LACKING}{OUTSIDE} ({percent(answer.outside)}){like}{_on(answer)}."
-    return f"{LACKING}{names}{_on(answer)}."
+        perhaps = f"; perhaps {names} as well or instead" if names else ""
+        on = f", which depends on {words}" if (words := _words(answer)) else ""
+        return f"{LACKING}{OUTSIDE} ({percent(answer.outside)}){on}{perhaps}."
+    left = f"; what is left depends on {words}" if (words := _words(answer)) else ""
+    return f"{LACKING}{names}{left}."
 
 
 def _possible(answer: Answer) -> list[str]:
@@ -305,11 +307,10 @@ def _name(found: Named) -> str:
     return f"{found.effect} ({percent(found.probability)}{word})"
 
 
-def _on(answer: Answer) -> str:
-    if not answer.depends_on:
-        return ""
+def _words(answer: Answer) -> str:
+    """Dependences of what has no name, with their probabilities; empty if there is none."""
     words = [f"{word} ({percent(answer.depends_on[word])})" for word in answer.sure_words]
-    return f"; what is left depends on {listed(words)}"
+    return listed(words) if words else ""
 
 
 def _effects(findings: list[Named]) -> Table:

@@ -184,7 +184,7 @@ def test_a_better_prediction_never_scores_worse(opened, true_model):
 def test_two_wheels_swapped_score_far_above_one(drive, true_model):
     """The log says that each front wheel got what the other had."""
     track = replace(drive.track, command=np.ascontiguousarray(drive.track.command[:, SWAPPED]))
-    assert compare([replace(drive, track=track)], true_model).score > 3
+    assert compare([replace(drive, track=track)], true_model).score > 2
 
 
 def test_a_log_too_short_gives_no_floor_and_says_why(tanh_robot, measure, model_file):

@@ -72,7 +72,9 @@ def test_comparison_and_diagnosis_say_the_same_of_one_log_and_model(driven):
     missed, right = tm.compare(log, bare), tm.compare(log, true)
     assert missed.verdict.startswith("Something is missing")
     assert right.verdict.startswith("As good as this log can tell")
-    assert [f.effect for f in tm.diagnose(log, bare).found] == ["slew_limit"]
+    assert [f.effect for f in tm.diagnose(log, bare).found if f.certainty == "sure"] == [
+        "slew_limit"
+    ]
     assert not [f for f in tm.diagnose(log, true).found if f.certainty == "sure"]
 
 
