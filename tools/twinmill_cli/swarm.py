@@ -37,11 +37,11 @@ from twinmill_cli.swarm_door import (
 )
 from twinmill_cli.swarm_signals import (
     OVER_SSH,
+    WhatEnds,
     commanding,
     ended_by_signals,
     is_over_ssh,
     told_of_signals,
-    what_ends,
 )
 from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
 
@@ -190,10 +190,13 @@ def _start(
             by_old_news = {i for i in old if f"R{i:02d}" not in told.standing}
             return "" if is_named else of_heard(sorted(asked - by_old_news), sorted(by_old_news))
 
-        def ends(*becomes: str) -> str:
-            return what_ends(lcm_url, channel_prefix, *becomes)
+        ends = WhatEnds(lcm_url, channel_prefix, voice.say_instead)
 
-        with ended_by_signals(fleet, voice.check_listener) as asked_to_end:
+        def check() -> None:
+            voice.check_listener()
+            ends.look()
+
+        with ended_by_signals(fleet, check) as asked_to_end:
             try:
                 with kept_free(fleet):
                     verdict = _drive(
