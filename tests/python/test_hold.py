@@ -30,7 +30,7 @@ def held(monkeypatch):
     """One robot that was started, and a function that has it say how it is."""
     monkeypatch.setattr(hold, "SETTLE_S", 0.0)
     fleet = Fleet("", connect=lambda _: Nowhere())
-    robot = fleet.robots[3] = Robot(3)
+    robot = fleet.robots[3] = Robot(3, heard_s=time.monotonic())
     answer = Answer(3, True, True, "", "running", False, False, [])
 
     def say(mode, said_mode=None, *, stands=True, session=SESSION, flags=0, counter=OWN):

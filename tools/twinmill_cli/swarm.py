@@ -56,11 +56,11 @@ if working():  # not for --help
     from twinmill_cli.swarm_double import doubles
     from twinmill_cli.swarm_end import (
         addressed,
-        awaiting,
         beside_all,
         clocks,
         driving,
         finish,
+        of_those_to_begin,
         placed,
         times,
     )
@@ -445,7 +445,7 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         say(f"this computer has no network ({fleet.fault}).")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
-    odd = " ".join(filter(None, [awaiting(fleet), doubles(fleet, fleet.robots), odd]))
+    odd = " ".join(filter(None, [of_those_to_begin(fleet), doubles(fleet, fleet.robots), odd]))
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
         data |= addressed(fleet, fleet.robots)

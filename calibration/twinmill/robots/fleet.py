@@ -136,6 +136,7 @@ class Heard:
         words: the command as a person would write it, and when it was said, by its sender's clock:
             a computer that slept hears it late.
         behavior: that it names.
+        start_utime_us: instant of a start, us since the Unix epoch, by its sender's clock.
     """
 
     seq: int
@@ -144,6 +145,7 @@ class Heard:
     counter: int
     words: str
     behavior: str = ""
+    start_utime_us: int = 0
 
     @property
     def starts(self) -> bool:
@@ -157,7 +159,8 @@ class Robot:
     """Last words of one robot.
 
     What it signed, or said, too long ago is old news (`is_old_news`), and tells nothing of now:
-    no mode, that it drives, is armed or held, who commands it, nor an alarm.
+    no mode, that it drives, is armed or held, who commands it, nor an alarm. Nor does what it said
+    before it fell silent (`tells_of_now`): then it may do what it was about to (`may_drive`).
 
     Attributes:
         telemetry, run: its newest messages.
@@ -196,11 +199,11 @@ class Robot:
 
     @property
     def mode(self) -> str:
-        """In words, or empty where nobody knows: before the first telemetry, or by old news."""
-        return "" if self.is_old_news else self._said_mode
+        """In words, or empty where nobody knows: before the first telemetry, or not of now."""
+        return self.last_mode if self.tells_of_now else ""
 
     @property
-    def _said_mode(self) -> str:
+    def last_mode(self) -> str:
         """As its newest telemetry says, however old that is."""
         return _mode_of(self.telemetry) if self.telemetry else ""
 
@@ -231,6 +234,45 @@ class Robot:
         return time.monotonic() - self.heard_s < GONE_S
 
     @property
+    def tells_of_now(self) -> bool:
+        """It said something just now that is new: by nothing else the present is told."""
+        return self.is_here and not self.is_old_news
+
+    @property
+    def may_drive(self) -> str:
+        """Words on one that fell silent as it drove or waited for a start, to go on behind a name.
+
+        Empty where it is heard, or stood when it was heard last.
+        """
+        if self.tells_of_now or self.is_old_news:
+            return ""
+        heard = f"when it was last heard, at {_time_of_day(1e6 * self._heard_utime_s)}"
+        modes = {self.last_mode, _mode_of(self.link) if self.link else ""}
+        if modes & {*DRIVING}:
+            return f"drove {heard}, and may drive on"
+        if "fault" in modes:
+            return f"had a fault {heard}, and may drive once that is over"
+        if not self._flags & TELEMETRY.STATUS_AWAITS_START:
+            return ""
+        instant_us = max((c.start_utime_us for c in self._starts), default=0)
+        if not instant_us:
+            return f"waited for a start {heard}, and may drive by now"
+        instant = _time_of_day(instant_us)
+        if time.time_ns() < 1000 * instant_us:
+            return f"waited for a start at {instant} {heard}, and may begin by itself then"
+        return f"may drive since {instant}: it waited for that start {heard}"
+
+    @property
+    def _heard_utime_s(self) -> float:
+        return time.time() - (time.monotonic() - self.heard_s)
+
+    @property
+    def _starts(self) -> list[Heard]:
+        """Starts that it has signed to obey in the session of its newest link."""
+        known = [c for c in self.commands.values() if c.starts and self.has_obeyed(c)]
+        return [c for c in known if self.link and c.session == self.link.session]
+
+    @property
     def says_that_it_drives(self) -> bool:
         """Its telemetry of just now does; not what it had said before it fell silent.
 
@@ -246,7 +288,7 @@ class Robot:
         """Its newest telemetry says so, its board obeys, and no start is to come."""
         t = self.telemetry
         return (
-            self._said_mode == "stopped"
+            self.last_mode == "stopped"
             and not t.status_flags & MAY_MOVE
             and not any(t.wheel_duty_pct)
         )
@@ -398,20 +440,33 @@ class Robot:
 
     @property
     def link_timeout_s(self) -> float | None:
-        """How long it goes on without its operator, 0: for ever; None as `is_tethered`."""
-        is_started = self.drives or (self.link and self.awaits_start)
-        return self.link.link_timeout_ms / 1e3 if is_started else None
+        """How long it goes on without its operator, 0: for ever; None as `is_tethered`.
+
+        By a link that itself tells of the start; one from before tells of no start, or of another.
+        """
+        link = self.link
+        if not (link and self.tells_of_now):
+            return None
+        awaits = bool(link.status_flags & TELEMETRY.STATUS_AWAITS_START)
+        is_older = any(c.counter > link.counter for c in self._starts)
+        is_started = awaits or link.mode != TELEMETRY.MODE_STOPPED
+        return link.link_timeout_ms / 1e3 if is_started and not is_older else None
 
     @property
     def is_armed(self) -> bool | None:
         """It may be started; None if it has not signed that."""
-        return bool(self.link.armed) if self.link and not self.is_old_news else None
+        return bool(self.link.armed) if self.link and self.tells_of_now else None
 
     @property
     def awaits_start(self) -> bool:
         """It stands and, as it says, signed or not, begins at the instant of a start to come."""
         is_said = bool(self._flags & TELEMETRY.STATUS_AWAITS_START)
-        return is_said and not self.is_old_news and self._said_mode not in DRIVING
+        return is_said and self.tells_of_now and self.last_mode not in DRIVING
+
+    @property
+    def may_begin(self) -> bool:
+        """It waits for a start, or fell silent and may drive."""
+        return bool(self.awaits_start or self.may_drive)
 
     @property
     def may_await_start(self) -> bool:
@@ -431,13 +486,13 @@ class Robot:
         """It stands, as it has signed, because it had lost its operator."""
         link = self.link
         is_lost = bool(link) and bool(link.status_flags & TELEMETRY.STATUS_LINK_LOST)
-        return is_lost and not self.is_old_news and not self.drives
+        return is_lost and not self.is_old_news and link.mode == TELEMETRY.MODE_STOPPED
 
     @property
     def drives(self) -> bool:
         """It has signed so; one in a fault drives on once that is over."""
         is_moving = bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
-        return is_moving and not self.is_old_news
+        return is_moving and self.tells_of_now
 
     @property
     def drives_by_any_word(self) -> bool:
@@ -485,7 +540,7 @@ class Robot:
         if flags & TELEMETRY.STATUS_CAMERA_LOST:  # which tells that there is no picture
             flags &= ~TELEMETRY.STATUS_FRAME_STALE
         told = self._double_alarm + [words for flag, words in ALARMS if flags & flag]
-        if self._said_mode == "fault" and not told:
+        if self.last_mode == "fault" and not told:
             told = [OF_A_PART]
         return [*told, AWAITS_START] if self.awaits_start else told
 
@@ -601,6 +656,7 @@ class Robot:
             "version": run.version if run else None,
             "behavior": run.behavior if run else None,
             "mode": self.mode or None,
+            "may_drive": self.may_drive or None,
             "stands": self.signs_that_it_stands,
             "alarms": self.alarms,
             "hosts": self.senders.hosts,
@@ -628,7 +684,7 @@ def _mode_of(telemetry: Any) -> str:
     return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
 
-def _time_of_day(utime_us: int) -> str:
+def _time_of_day(utime_us: float) -> str:
     with suppress(ValueError, OverflowError, OSError):
         return f"{datetime.fromtimestamp(utime_us / 1e6):%H:%M:%S}"
     return f"{datetime.now():%H:%M:%S}"  # no calendar has that time
@@ -790,7 +846,8 @@ class Fleet:
             words = f"{COMMANDS.get(command.verb, '?')} {behavior}"
             words = f"{words.strip()} at {_time_of_day(command.utime_us)}"
             robot.commands[sealed.counter] = Heard(
-                *(command.seq, command.verb, sealed.session, sealed.counter, words, behavior)
+                *(command.seq, command.verb, sealed.session, sealed.counter, words, behavior),
+                start_utime_us=command.start_utime_us,
             )
 
     def _on_plain_command(self, data: bytes) -> None:

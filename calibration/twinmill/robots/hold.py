@@ -126,7 +126,7 @@ class Held:
         known = [fleet.robots[a.robot_id] for a in begun.answers if a.robot_id in fleet.robots]
         signed = {a.robot_id: bool(a.accepted) for a in begun.answers if a.signed}
         linked = [r for r in known if r.link]
-        moving = {r.robot_id: r.mode != "stopped" and not r.is_old_news for r in linked}
+        moving = {r.robot_id: r.last_mode != "stopped" and not r.is_old_news for r in linked}
         self.robots = [r for r in linked if signed.get(r.robot_id, moving[r.robot_id])]
         self._sessions = {
             r.robot_id: begun.sessions.get(r.robot_id, r.link.session) for r in self.robots

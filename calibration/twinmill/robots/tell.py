@@ -236,15 +236,21 @@ def _unasked(fleet: Fleet, robots: set[int]) -> set[int]:
 
 
 def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
-    """Those of some robots that drive already, or wait for a start, or that an operator holds.
+    """Those of some robots that drive already, or may, or wait for a start, or that are held.
 
     Be it by a word that nobody can check: a robot of another key signs nothing. Who holds them is
     heard by then. To be asked before this program holds any.
     """
     known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
     fleet.listen(OTHERS_S, lambda: all(robot.hears_operator for robot in known))
-    fleet.listen(FIND_S, lambda: all(r.is_held is not False for r in known))
-    return [r for r in known if r.drives_by_any_word or r.awaits_start or r.hears_operator]
+    fleet.listen(FIND_S, lambda: all(_is_told_for_whom(r) for r in known))
+    return [r for r in known if r.drives_by_any_word or r.may_begin or r.hears_operator]
+
+
+def _is_told_for_whom(robot: Robot) -> bool:
+    """It is known who holds it, or that it needs nobody; or no signature of it can be checked."""
+    is_open = robot.link and (robot.drives or robot.awaits_start) and robot.is_tethered is None
+    return robot.is_held is not False and not is_open
 
 
 def hear_doubles(fleet: Fleet, robots: set[int]) -> list[Robot]:
@@ -711,7 +717,7 @@ def _not_begun(fleet: Fleet, command, given: list[Answer], patience_s: float) ->
         return {
             r.robot_id
             for r in accepted
-            if r.mode in STANDING or r.is_old_news or not r.says_since(command.start_utime_us)
+            if r.last_mode in STANDING or r.is_old_news or not r.says_since(command.start_utime_us)
         }
 
     fleet.listen(patience_s, lambda: not waiting())
@@ -754,7 +760,7 @@ def _answer(fleet: Fleet, robot: Robot, command) -> Answer:
     is_before = _changes(command, signed) and not robot.says_since(command.start_utime_us)
     is_unknown = (robot.is_old_news or is_before) and not stands
     signs_no_more = is_unknown and robot.signs_no_more
-    mode = MODES[TELEMETRY.MODE_STOPPED] if stands else robot.mode
+    mode = MODES[TELEMETRY.MODE_STOPPED] if stands else robot.last_mode
     return Answer(
         robot_id=robot.robot_id,
         accepted=bool(ack.accepted) if ack else None,
