@@ -182,3 +182,35 @@ def test_for_whom_a_robot_waits_is_listened_for(monkeypatch):
 
     monkeypatch.setattr(Fleet, "listen", listen)
     assert tell.find_busy(fleet_of(known), {3}) == [known] and listened == [False, True]
+
+
+def test_what_a_robots_version_cannot_say_is_not_known(clock):
+    """Of one with older firmware "stands": true was told in the count to its start."""
+    waits, told = robot(), "R03 stands still, and may wait for a start and begin by itself: its"
+    said = waits.to_json()
+    assert (said["awaits_start"], said["stands"]) == (None, None)
+    assert f"{told} version cannot say." in beside_all(fleet_of(waits), STOOD).sentence
+    for changed in (
+        robot(flags=TELEMETRY.STATUS_TELLS_START),  # it would say so
+        robot(counter=0),  # it was told nothing since it began
+        disarmed(),  # it was told to stop last
+    ):
+        said = changed.to_json()
+        assert (said["awaits_start"], said["stands"]) == (False, True)
+        assert beside_all(fleet_of(changed), STOOD) == STOOD
+    drives = robot(mode=TABLE)
+    assert drives.to_json()["awaits_start"] is False and not drives.hides_start
+
+
+def disarmed() -> Robot:
+    known = robot()
+    known.link.armed = 0
+    return known
+
+
+@pytest.mark.parametrize("tells", [True, False])
+def test_one_that_is_armed_since_its_stop_and_cannot_say_that_it_waits_has_not_confirmed(tells):
+    known, stop = robot(flags=TELEMETRY.STATUS_TELLS_START * tells), turbopi.signed_ack_t()
+    stop.session, stop.accepted, stop.stands, stop.session_us = SESSION, 1, 1, -1
+    known.signed_acks[9] = stop
+    assert known.confirms(9) == tells

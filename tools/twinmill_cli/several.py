@@ -22,6 +22,7 @@ OF_SEVERAL = {
     "it was last heard": "they were last heard",
     "it waited": "they waited",
     "begin by itself": "begin by themselves",
+    "its version": "their versions",
     "it did": "they did",
     "it was halted": "they were halted",
     "it obeyed": "they obeyed",

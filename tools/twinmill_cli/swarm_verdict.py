@@ -12,7 +12,14 @@ from typing import Any
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
 from twinmill.robots.countdown import DOUBLE, NONE_BEGUN, STOPPED
-from twinmill.robots.fleet import AWAITS_START, DRIVING, DRY_RUN, SIGNED_S, Robot
+from twinmill.robots.fleet import (
+    AWAITS_START,
+    DRIVING,
+    DRY_RUN,
+    HIDES_START,
+    SIGNED_S,
+    Robot,
+)
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
     AHEAD_S,
@@ -376,6 +383,8 @@ def _of_busy(robot: Robot, who: str) -> str:
     in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
     if robot.awaits_start:
         return f"stands still{in_fault}, {AWAITS_START}, {who}"
+    if robot.hides_start and not (robot.drives_by_any_word or robot.hears_operator):
+        return f"stands still{in_fault}, and {HIDES_START}"
     if not robot.drives_by_any_word:
         count = " who may be counting down to a start" if robot.may_await_start else ""
         return f"stands still{in_fault}, held by another operator{count}"

@@ -50,6 +50,7 @@ ALARMS = (
 # A fault for which there is no flag: a button, lights or battery that cannot be read.
 OF_A_PART = "a part does not answer"
 AWAITS_START = "waits for a start and begins by itself"
+HIDES_START = "may wait for a start and begin by itself: its version cannot say"
 # A robot with one of these may be moving, or is about to, whatever it was told.
 MAY_MOVE = (
     TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED | TELEMETRY.STATUS_AWAITS_START
@@ -307,6 +308,7 @@ class Robot:
             and not link.status_flags & MAY_MOVE
             and self.stands
             and self.is_here
+            and self.awaits_start is False
             and not self.is_double
         )
 
@@ -403,7 +405,7 @@ class Robot:
             ack
             and ack.accepted
             and (later.stands if later else ack.stands)
-            and not (later and later.status_flags & MAY_MOVE)
+            and not (later and (later.status_flags & MAY_MOVE or _may_await(later)))
             and (self.stands or not self.telemetry)
         )
 
@@ -458,15 +460,29 @@ class Robot:
         return bool(self.link.armed) if self.link and self.tells_of_now else None
 
     @property
-    def awaits_start(self) -> bool:
-        """It stands and, as it says, signed or not, begins at the instant of a start to come."""
-        is_said = bool(self._flags & TELEMETRY.STATUS_AWAITS_START)
-        return is_said and self.tells_of_now and self.last_mode not in DRIVING
+    def awaits_start(self) -> bool | None:
+        """It stands and, as it says, signed or not, begins at the instant of a start to come.
+
+        None: nobody knows, as it fell silent, or its program is older than the word for that.
+        """
+        if not self.tells_of_now:
+            return None
+        if self.last_mode in DRIVING:
+            return False
+        if self._flags & TELEMETRY.STATUS_AWAITS_START:
+            return True
+        is_sure = self._flags & TELEMETRY.STATUS_TELLS_START or not self.may_await_start
+        return False if is_sure else None
+
+    @property
+    def hides_start(self) -> bool:
+        """It signs, stands, and its version cannot say whether it waits for a start."""
+        return bool(self.link) and self.tells_of_now and self.awaits_start is None
 
     @property
     def may_begin(self) -> bool:
-        """It waits for a start, or fell silent and may drive."""
-        return bool(self.awaits_start or self.may_drive)
+        """It waits for a start, or cannot say so, or fell silent and may drive."""
+        return bool(self.awaits_start or self.hides_start or self.may_drive)
 
     @property
     def may_await_start(self) -> bool:
@@ -542,6 +558,7 @@ class Robot:
         told = self._double_alarm + [words for flag, words in ALARMS if flags & flag]
         if self.last_mode == "fault" and not told:
             told = [OF_A_PART]
+        told += [HIDES_START] if self.hides_start else []
         return [*told, AWAITS_START] if self.awaits_start else told
 
     @property
@@ -657,7 +674,7 @@ class Robot:
             "behavior": run.behavior if run else None,
             "mode": self.mode or None,
             "may_drive": self.may_drive or None,
-            "stands": self.signs_that_it_stands,
+            "stands": None if self.hides_start else self.signs_that_it_stands,
             "alarms": self.alarms,
             "hosts": self.senders.hosts,
             "signed": self.link is not None,
@@ -677,6 +694,12 @@ class Robot:
             "detected_frac": self.detected_frac,
             "status_flags": t.status_flags if t else None,
         }
+
+
+def _may_await(link: Any) -> bool:
+    """It was told something since it was stopped, and cannot say that it is a start to come."""
+    tells = link.status_flags & TELEMETRY.STATUS_TELLS_START
+    return not tells and bool(link.armed and link.counter)
 
 
 def _mode_of(telemetry: Any) -> str:
