@@ -302,7 +302,7 @@ def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb
 @pytest.mark.parametrize(
     ("hosts", "words"),
     [
-        (("127.0.0.1", "10.9.0.2"), "127.0.0.1 is this computer: end what speaks here, a twin"),
+        (("127.0.0.1", "10.9.0.2"), "127.0.0.1 is this computer: if a twin or a recording speaks"),
         (("198.51.100.1", "198.51.100.2"), "give one another number"),  # RFC 5737: nobody has these
     ],
 )
@@ -331,7 +331,7 @@ def test_who_looks_or_stops_is_told_that_this_computer_is_one_of_the_two(
     for more in ([], ["--json"]):
         _, out, _ = twinmill("swarm", verb, *options, "--key", key_file, *more)
         said = json.loads(out)["sentence"] if more else " ".join(out.split())
-        assert said.count("127.0.0.1 is this computer: end what speaks here, a twin or a") == 1
+        assert said.count("127.0.0.1 is this computer: if a twin or a recording speaks") == 1
 
 
 def test_both_ends_of_a_start_name_a_clock_that_is_off(monkeypatch):

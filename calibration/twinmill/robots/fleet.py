@@ -537,9 +537,13 @@ class Robot:
 
     @property
     def is_double(self) -> bool:
-        """Two robots speak as this one, as is heard here or by one of them."""
+        """Two robots speak as this one, as is heard here or by one of them.
+
+        One that is heard on two ways hears itself.
+        """
         flags = self.telemetry.status_flags if self.telemetry and not self.is_old_news else 0
-        return self.senders.are_double or bool(flags & TELEMETRY.STATUS_DOUBLE)
+        hears_one = bool(flags & TELEMETRY.STATUS_DOUBLE) and not self.senders.on_two_ways
+        return self.senders.are_double or hears_one
 
     @property
     def alarms(self) -> list[str]:
@@ -555,6 +559,8 @@ class Robot:
         flags = self._flags
         if flags & TELEMETRY.STATUS_CAMERA_LOST:  # which tells that there is no picture
             flags &= ~TELEMETRY.STATUS_FRAME_STALE
+        if self.senders.on_two_ways:
+            flags &= ~TELEMETRY.STATUS_DOUBLE
         told = self._double_alarm + [words for flag, words in ALARMS if flags & flag]
         if self.last_mode == "fault" and not told:
             told = [OF_A_PART]
@@ -569,8 +575,10 @@ class Robot:
 
     @property
     def _double_alarm(self) -> list[str]:
-        hosts = ", ".join(self.senders.hosts)
-        return [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
+        hosts, ways = (", ".join(h) for h in (self.senders.hosts, self.senders.on_two_ways))
+        if self.senders.are_double:
+            return [f"TWO ROBOTS OF THIS NUMBER ({hosts})"]
+        return [f"heard on two ways, as over a relay ({ways})"] if ways else []
 
     @property
     def clock_s(self) -> float:
@@ -797,6 +805,8 @@ class Fleet:
         robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
         now_s = robot.heard_s = time.monotonic()
         sender = getattr(self.bus, "sender", None)
+        if kind == "TELEMETRY" and robot.senders.is_copy(sender, data):
+            return
         if kind in ("LINK", "SIGNED_ACK"):
             self._on_signed(robot, kind, message, data)
         elif kind == "ACK":
