@@ -122,6 +122,8 @@ def test_who_drove_when_it_was_last_heard_may_drive_on_though_it_was_not_asked(c
         f"All that were told to stop stand. R03 drove when it was last heard, at {heard}, and may "
         f"drive on. {BY_HAND}"
     )
+    both = of_busy([fleet.robots[3], fleet.robots[3]])
+    assert both == f"R03, R03 drove when they were last heard, at {heard}, and may drive on"
     assert "SWITCH OFF" not in beside_all(fleet, Verdict(True, "Started at 12:00:00.")).sentence
     said = fleet.robots[3].to_json()
     assert (said["mode"], said["stands"]) == (None, False) and "may drive on" in said["may_drive"]
@@ -168,7 +170,7 @@ def test_a_robot_that_was_given_up_is_not_said_to_be_held_from_here(clock):
     ack.session, ack.accepted = SESSION, 1
     assert f"{says}, and has not signed yet for whom." in beside_all(fleet, STOOD).sentence
     known.other_hold_s = time.monotonic()
-    assert f"{says}, held by another operator." in beside_all(fleet, STOOD).sentence
+    assert f"{says}, held by another operator or terminal." in beside_all(fleet, STOOD).sentence
 
 
 def test_for_whom_a_robot_waits_is_listened_for(monkeypatch):
@@ -185,7 +187,7 @@ def test_for_whom_a_robot_waits_is_listened_for(monkeypatch):
 
 
 def test_what_a_robots_version_cannot_say_is_not_known(clock):
-    """Of one with older firmware "stands": true was told in the count to its start."""
+    """One with older firmware had "stands": true told of it in the count to its start."""
     waits, told = robot(), "R03 stands still, and may wait for a start and begin by itself: its"
     said = waits.to_json()
     assert (said["awaits_start"], said["stands"]) == (None, None)

@@ -60,6 +60,7 @@ if working():  # not for --help
         clocks,
         driving,
         finish,
+        of_stops,
         of_those_to_begin,
         placed,
         times,
@@ -271,7 +272,7 @@ def _drive(
             fleet.watch()  # the last that ends it, while robots drive on
             return said
         _hold(fleet, held, voice)
-        ended = of_end(begun, held.states, None)
+        ended = of_end(begun, held.states, None).more(of_stops(fleet, held.states))
         ended = ended.more(heard(ended)).beside(driving(fleet, asked))
         ended = beside_all(fleet, ended.more(times(fleet, asked, ended.standing)))
     except BaseException as error:
@@ -288,7 +289,8 @@ def _drive(
         data["left_alone"] = left
         ended = ended.beside([f"R{i:02d}" for i in left], LEFT_ALONE).more(_who_drives(fleet, left))
         ended = (
-            ended.more(told_of_signals(signals))
+            ended.more(of_stops(fleet, states))
+            .more(told_of_signals(signals))
             .more(of_remarks(given) if stopped.ok else "")
             .more(heard(ended))
             .beside(driving(fleet, asked))

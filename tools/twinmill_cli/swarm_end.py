@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 
+from twinmill.robots.hold import BY_COMMAND
 from twinmill.robots.tell import OTHERS_S, ask_once
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli import done
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
     from twinmill.robots.fleet import Fleet
+    from twinmill.robots.hold import State
     from twinmill.robots.tell import Answer
     from twinmill_cli.swarm_verdict import Verdict
 
@@ -74,6 +76,18 @@ def times(fleet: Fleet, robots: Iterable[int], standing: Collection[str] = ()) -
     open_robots = [i for i in sorted(robots) if f"R{i:02d}" not in standing]
     old = of_old_news(r for i in open_robots if (r := fleet.robots.get(i)))
     return " ".join(filter(None, [old, clocks(fleet, robots)]))
+
+
+def of_stops(fleet: Fleet, states: dict[str, State]) -> str:
+    """Sentence on where a stop came from that was not said here; empty if none was obeyed or heard.
+
+    Args:
+        fleet: where the robots are.
+        states: of each that was held, by name.
+    """
+    stopped = {int(name[1:]) for name, state in states.items() if state is BY_COMMAND}
+    heard = fleet.stop_heard(stopped) if stopped else ""
+    return f"A stop came from {heard}." if heard else ""
 
 
 def of_those_to_begin(fleet: Fleet, standing: Collection[str] = ()) -> str:

@@ -87,7 +87,7 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
 
 
 def _mode(robot: Robot) -> Text:
-    """What it does; of one that fell silent, what it did."""
+    """Its mode of now, or, of one that fell silent, of then."""
     if not robot.is_here and robot.last_mode and not robot.is_old_news:
         return Text(f"was {robot.last_mode}", "red")
     return Text(robot.mode or "?", {"fault": "red", "running": "green"}.get(robot.mode, ""))

@@ -368,7 +368,7 @@ def _for_whom(robot: Robot, held: Collection[int]) -> str:
     if robot.is_tethered is False:
         return "untethered"
     if robot.hears_other_operator:
-        return "held by another operator"
+        return "held by another operator or terminal"
     if robot.is_tethered is None:
         return "and has not signed yet for whom" if robot.link else BY_ITS_WORD
     if robot.robot_id in held:
@@ -386,8 +386,8 @@ def _of_busy(robot: Robot, who: str) -> str:
     if robot.hides_start and not (robot.drives_by_any_word or robot.hears_operator):
         return f"stands still{in_fault}, and {HIDES_START}"
     if not robot.drives_by_any_word:
-        count = " who may be counting down to a start" if robot.may_await_start else ""
-        return f"stands still{in_fault}, held by another operator{count}"
+        count = " that may be counting down to a start" if robot.may_await_start else ""
+        return f"stands still{in_fault}, held by another operator or terminal{count}"
     if in_fault:
         return f"stands still{in_fault}, was started, and drives once that is over: {who}"
     return f"drives already, {who}"
@@ -665,7 +665,7 @@ def _of_called_off(begun: Start) -> Verdict:
     taken = [a for a in begun.answers if a.robot_id in begun.dropouts.taken]
     words = f"Called off: {_why_called_off(begun)}."
     if taken:
-        words += f" {_names(taken)}: left to that operator."
+        words += f" {_names(taken)}: left to that start."
     if STOPPED in begun.dropouts.words.values():
         words += f" {_who_stopped(begun)}"
     untold = [a for a in begun.answers if a.robot_id in begun.untold]

@@ -60,7 +60,7 @@ STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 STANDING = ("stopped", "fault")
 # Of looking a name up: nobody knows whether there is a machine of it.
 UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
-NEVER_HEARD = "was never heard"
+NEVER_HEARD = "was not heard by this command"
 OLD_ANSWER = "no answer, and what is heard of it is old news"
 # It signs, and by its key: the packet with the signature was lost, or is late.
 UNSEALED = "answered, and its signed answer has not come"
