@@ -312,3 +312,29 @@ def test_a_cause_that_leaves_others_open_is_told_with_these(beside_a_twin):
     said = doubles(fleet, {1})
     assert "127.0.0.1 is this computer: if a twin or a recording speaks here, end it" in said
     assert said.endswith("if the robot itself does, it is the other one.")
+
+
+class Repeated(Bus):
+    """A robot and a relay, which begins with what was said before anybody listened here."""
+
+    LATE = 3  # of so many words
+
+    def __init__(self):
+        super().__init__(SLOWEST_S / 2)
+        self._words = [telemetry() for _ in range(self.LATE)]
+
+    def speak(self):
+        if self.sender == ROBOT:
+            self._words.append(telemetry())
+            self._hear("R01_LINK", link(time.monotonic()))
+        self._hear("R01_TELEMETRY", self._words[-1 if self.sender == ROBOT else -self.LATE])
+
+
+def test_a_relay_that_is_late_is_no_second_robot_to_who_has_just_begun_to_listen():
+    """All that it said at first was new here, and a start was refused."""
+    fleet = Fleet("", connect=lambda _: Repeated(), key=KEY)
+    tell.find(fleet, {1})
+    fleet.listen(2 * SLOWEST_S, lambda: fleet.robots[1].is_double)
+    assert fleet.robots[1].is_double
+    swarm_door.refuse_doubles(fleet, {1})
+    assert not fleet.robots[1].is_double

@@ -257,7 +257,13 @@ def hear_doubles(fleet: Fleet, robots: set[int]) -> list[Robot]:
     """Those of some robots that are two of one number. All that speak as them are heard by then."""
     known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
     fleet.listen(OTHERS_S, lambda: any(robot.is_double for robot in known))
+    _hear_copies(fleet, known)
     return [robot for robot in known if robot.is_double]
+
+
+def _hear_copies(fleet: Fleet, robots: list[Robot]) -> None:
+    """Those that are double turn out to be one on two ways, if what a relay repeats was heard."""
+    fleet.listen(FIND_S, lambda: not any(robot.is_double for robot in robots))
 
 
 def all_linked(fleet: Fleet, robots: set[int]) -> bool:
@@ -409,6 +415,7 @@ def _stop(
             break
     told = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
     fleet.listen(OTHERS_S, lambda: all(_says_since(robot, command.seq) for robot in told))
+    _hear_copies(fleet, told)
     # Nobody knows which copy a robot answered: one that was switched on since is not late by that.
     ask_clocks(fleet, {robot.robot_id for robot in told}, OTHERS_S)
     return answers(fleet, command, robots or set(fleet.robots))
