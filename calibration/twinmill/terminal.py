@@ -27,11 +27,16 @@ from twinmill.foreign_text import printable
 from twinmill.streams import STDERR_NAME, STDOUT_NAME, naming
 
 MOST_WIDE = 1000  # columns that no terminal has
+# Columns that some characters need (wcwidth(3)); in fewer rich shows less, and in none nothing.
+LEAST_WIDE = 2
+USUAL = (80, 25)  # columns and lines that rich takes where it cannot know
 BAR_FROM = 60  # columns of a terminal that has room for more than words and numbers
 
 
 class PlainConsole(Console):
     """A console in which no text is markup, and through which no control character gets.
+
+    It has room for text, be it that COLUMNS or LINES is 0.
 
     Args:
         options: as of rich's Console.
@@ -39,6 +44,8 @@ class PlainConsole(Console):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(markup=False, emoji=False, **options)
+        if self.width < LEAST_WIDE or self.height < 1:
+            self.size = USUAL
 
     def print(self, *objects: Any, **options: Any) -> None:
         """Rich's; an OSError names the stream."""

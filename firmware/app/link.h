@@ -30,6 +30,7 @@ enum link_status
     LINK_STATUS_LATCH_LOST = 8192,
     LINK_STATUS_DRY_RUN = 16384,
     LINK_STATUS_AWAITS_START = 32768,
+    LINK_STATUS_TELLS_START = 65536,
 };
 
 // One control step: what telemetry says, and the counters that explain it.

@@ -91,7 +91,7 @@ static void pass_on(struct reporter *reporter, const struct message *message)
         say("another robot of this number is on the network: give one of them another");
     }
     reporter->is_double = is_double;
-    report.status_flags |= is_double ? LINK_STATUS_DOUBLE : 0;
+    report.status_flags |= LINK_STATUS_TELLS_START | (is_double ? LINK_STATUS_DOUBLE : 0);
     report.ignored_count = atomic_load(&reporter->radio.ignored_count);
     report.status_flags |= has_lost_rows(reporter) ? LINK_STATUS_LOG_LOST : 0;
     telemetry_publish(&reporter->telemetry, &report);

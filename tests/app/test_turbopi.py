@@ -333,6 +333,7 @@ def test_robot_without_its_log_is_on_the_network_and_says_so(tmp_path):
     flags = [turbopi.telemetry_t.decode(event.data).status_flags for event in events]
     assert code == 4 and "io_tsv: /proc/io.tsv" in said
     assert flags[-1] & lost
+    assert all(flag & turbopi.telemetry_t.STATUS_TELLS_START for flag in flags)
 
 
 LOGS = [("--io-tsv", "{}"), ("--lcm-url", "file://{}?mode=w")]

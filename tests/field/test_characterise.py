@@ -67,7 +67,7 @@ def test_script_above_the_cap_is_refused_before_anything_moves(session):
 def test_a_robot_that_another_holds_is_left_alone(session):
     held = session["held_by_another"]
     assert held["code"] == 1 and held["mode_after"] == "running"
-    assert "held by another operator; it is left alone" in held["complaint"]
+    assert "held by another operator or terminal; it is left alone" in held["complaint"]
 
 
 def test_cap_counts_what_inputs_make_of_the_wheels(tmp_path):

@@ -144,24 +144,28 @@ FAULTS = {
     ),
     "taken_over": Fault(
         "another operator starts R01 while it is held; then Ctrl-C of the first",
-        ("R01 was taken over by another operator", "start at", "All stand; R01 was taken over"),
+        (
+            "R01 was taken over by another operator or terminal",
+            "start at",
+            "All stand; R01 was taken over",
+        ),
         1,
         is_brief=True,
     ),
     "taken_over_by_one_who_is_killed": Fault(
         "another operator starts R01 and is killed (R01); then Ctrl-C of the first",
         (
-            "R01 was taken over by another operator",
+            "R01 was taken over by another operator or terminal",
             "start at",
-            "then it had lost its link to that operator.",
-            "All stand; R01 stood before: taken over by another operator",
+            "then it had lost its link to that command.",
+            "All stand; R01 stood before: taken over by another operator or terminal",
         ),
         1,
         LINK_LOST_S,
     ),
     "selected_by_another": Fault(
         "another operator selects a behaviour for R01; then Ctrl-C",
-        ("R01 drives: another operator said select milling", "All stand."),
+        ("R01 drives: another operator or terminal said select milling", "All stand."),
         130,
     ),
     "stopped_and_armed_by_another": Fault(
@@ -253,8 +257,8 @@ FAULTS = {
     "another_starts_in_the_countdown": Fault(
         "another operator starts the same robots in the countdown; then Ctrl-C of the second",
         (
-            "Called off: R01, R02 were taken over by another operator (start at",
-            "R01, R02: left to that operator.",
+            "Called off: R01, R02 were taken over by another operator or terminal (start at",
+            "R01, R02: left to that start.",
         ),
         1,
         is_brief=True,
@@ -262,8 +266,8 @@ FAULTS = {
     "another_starts_while_it_sleeps": Fault(
         "the same while the first's laptop sleeps; then Ctrl-C of the second",
         (
-            "Called off: R01, R02 were taken over by another operator",
-            "R01, R02: left to that operator.",
+            "Called off: R01, R02 were taken over by another operator or terminal",
+            "R01, R02: left to that start.",
         ),
         1,
         is_brief=True,
@@ -271,8 +275,8 @@ FAULTS = {
     "another_starts_while_it_sleeps_through_its_instant": Fault(
         "the same, and the first wakes after its instant",
         (
-            "Called off: R01, R02 were taken over by another operator",
-            "R01, R02: left to that operator.",
+            "Called off: R01, R02 were taken over by another operator or terminal",
+            "R01, R02: left to that start.",
         ),
         1,
     ),
@@ -450,7 +454,11 @@ FAULTS = {
     ),
     "never_heard": Fault(
         "`swarm stop` to a robot that is not there",
-        ("NOT ALL STAND: R09: no stop was confirmed.", "R09: was never heard.", "--host"),
+        (
+            "NOT ALL STAND: R09: no stop was confirmed.",
+            "R09: was not heard by this command.",
+            "--host",
+        ),
         1,
         NEVER,
         is_brief=True,
@@ -642,7 +650,9 @@ def test_one_robot_that_drops_out_does_not_end_the_others(session):
 def test_who_takes_over_is_told_that_somebody_drove(session):
     """By whom the robot was held is said before it is started; then that the first stopped it."""
     code, said = session["taken_over"]["second"]
-    assert said.index("R01 drives already, held by another operator") < said.index("Started at")
+    assert said.index("R01 drives already, held by another operator or terminal") < said.index(
+        "Started at"
+    )
     assert code == 0 and "All stand: R01: stopped by another command." in said
 
 
@@ -658,7 +668,9 @@ def test_of_two_countdowns_the_last_is_the_one_that_starts(session):
     code, said = row["second"]
     assert row["stood"] and row["drove"] and code == 130 and "All stand." in said
     told = said.index("Started at")
-    assert re.search("for a start and begins? by [a-z]+, held by another operator", said[:told])
+    assert re.search(
+        "for a start and begins? by [a-z]+, held by another operator or terminal", said[:told]
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in RUN if "while_it_sleeps" in name])

@@ -71,7 +71,7 @@ def test_who_signs_that_the_start_is_what_it_was_told_last_stays(accepted):
         ({"session": SESSION + 1, "session_us": 0}, "started anew"),
         ({"armed": False}, STOPPED),
         ({"status_flags": TELEMETRY.STATUS_LINK_LOST}, "without word from this command"),
-        ({"counter": OWN + 1}, "another operator who was not heard"),
+        ({"counter": OWN + 1}, "another operator or terminal whose words"),
     ],
 )
 def test_who_signs_something_else_since_drops_out(accepted, says, words):
@@ -319,7 +319,9 @@ def test_a_start_that_others_drive_by_is_not_said_to_be_begun(monkeypatch):
     monkeypatch.setattr(tell, "stop", lambda *given: said.append(given))
     begun = tell.start(fleet, {1, 2}, "", ahead_s=0.6, partial=False)
     assert begun.called_off and begun.dropouts.taken == {1, 2} and not said
-    words = "Called off: R01, R02 were taken over by another operator (start at 12:00:01)."
+    words = (
+        "Called off: R01, R02 were taken over by another operator or terminal (start at 12:00:01)."
+    )
     assert of_start(begun).sentence.startswith(words) and not fleet.held
 
 

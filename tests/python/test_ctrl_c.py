@@ -8,14 +8,19 @@ import signal
 import subprocess
 import sys
 import termios
+import time
 
 import pytest
+
+from twinmill.defaults import URL
+from twinmill_cli import swarm_signals
 
 HOLD = """
 import os, signal, sys, time
 from twinmill.robots.fleet import Fleet
 from twinmill_cli.ctrl_c import kept_free
-from twinmill_cli.swarm_signals import ended_by_signals
+from twinmill.defaults import URL
+from twinmill_cli.swarm_signals import WhatEnds, ended_by_signals
 
 class Bus:
     def subscribe(self, *_): pass
@@ -35,9 +40,10 @@ if "behind" in sys.argv and not os.fork():  # another has the terminal
     os._exit(0)
 while "behind" in sys.argv and os.tcgetpgrp(0) == os.getpgrp():
     time.sleep(0.01)
+ends = WhatEnds(URL, None, lambda words: print("news:", words, flush=True))
 try:
-    with ended_by_signals(fleet, lambda: None), kept_free(fleet):
-        print("holds", flush=True)
+    with ended_by_signals(fleet, ends.look), kept_free(fleet):
+        print("holds:", ends(), flush=True)
         fleet.listen(5)
     print("nothing came")
 except KeyboardInterrupt:
@@ -116,6 +122,33 @@ def test_a_key_that_was_quoted_before_robots_are_held_swallows_none(terminal):
     terminal.type(CTRL_C)
     assert b"ended by Ctrl-C" in terminal.end()
     assert termios.tcgetattr(terminal.far) == terminal.before
+
+
+def test_what_stops_the_robots_is_said_anew_once_ctrl_c_does_no_more(terminal):
+    """As `stty -F TTY -isig` from elsewhere has it: "Ctrl-C stops them" stayed on the screen."""
+    terminal.wait_for(b"holds: Ctrl-C stops them")
+    attributes = termios.tcgetattr(terminal.far)
+    for isig, words in ((0, b"No Ctrl-C reaches this command: "), (termios.ISIG, b"Ctrl-C stops")):
+        attributes[3] = attributes[3] & ~termios.ISIG | isig
+        termios.tcsetattr(terminal.far, termios.TCSANOW, attributes)
+        terminal.wait_for(b"news: " + words)
+    terminal.type(CTRL_C)
+    assert b"ended by Ctrl-C" in terminal.end()
+
+
+def test_a_terminal_that_is_handed_on_and_back_is_no_news(monkeypatch):
+    """A shell does so around each of its commands; whoever takes it for long is told of once."""
+    now, is_ours, said = [0.0], True, []
+    monkeypatch.setattr(swarm_signals, "key_reaches", lambda: is_ours)
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    ends = swarm_signals.WhatEnds(URL, None, said.append)
+    ends.look()
+    assert ends("calls that off") == "Ctrl-C calls that off" and not said
+    for is_ours in [True] * 9 + [False, True] * 9 + [False] * 9:  # noqa: B007 (key_reaches)
+        now[0] += swarm_signals.LASTS_S / 2
+        ends.look()
+    (told,) = said
+    assert told.startswith("No Ctrl-C reaches this command") and told.endswith("calls that off.")
 
 
 @pytest.mark.parametrize("terminal", [("behind",)], indirect=True)

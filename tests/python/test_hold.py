@@ -12,6 +12,7 @@ from twinmill.robots import hold
 from twinmill.robots.fleet import TELEMETRY, Fleet, Heard, Robot
 from twinmill.robots.hold import DOUBLE, Held
 from twinmill.robots.tell import SIGNED_VERBS, VERBS, Answer, Start, answers
+from twinmill_cli.swarm_end import of_stops
 from twinmill_cli.swarm_screen import answer_table
 
 SESSION, OWN = 7, 100  # and the counter of the start
@@ -30,7 +31,7 @@ def held(monkeypatch):
     """One robot that was started, and a function that has it say how it is."""
     monkeypatch.setattr(hold, "SETTLE_S", 0.0)
     fleet = Fleet("", connect=lambda _: Nowhere())
-    robot = fleet.robots[3] = Robot(3)
+    robot = fleet.robots[3] = Robot(3, heard_s=time.monotonic())
     answer = Answer(3, True, True, "", "running", False, False, [])
 
     def say(mode, said_mode=None, *, stands=True, session=SESSION, flags=0, counter=OWN):
@@ -188,7 +189,7 @@ def test_a_start_of_another_operator_takes_a_robot_over(held):
     robots, robot, words = held
     hear(robot, VERBS.VERB_START, "start milling at 12:00:01")
     said = words(TABLE, stands=False, counter=OWN + 1)
-    assert "taken over by another operator (start milling at 12:00:01)" in said
+    assert "taken over by another operator or terminal (start milling at 12:00:01)" in said
     assert robots._fleet.held == set() and not robots.is_over
     (state,) = robots.states.values()
     assert not state.is_meant
@@ -197,7 +198,7 @@ def test_a_start_of_another_operator_takes_a_robot_over(held):
 @pytest.mark.parametrize(
     ("says", "reason"),
     [
-        ({"flags": TELEMETRY.STATUS_LINK_LOST}, "then it had lost its link to that operator"),
+        ({"flags": TELEMETRY.STATUS_LINK_LOST}, "then it had lost its link to that command"),
         ({"flags": TELEMETRY.STATUS_LATCHED}, "then stopped by another command"),
     ],
 )
@@ -218,8 +219,8 @@ def test_an_arm_lets_a_robot_forget_a_stop_and_is_no_press_of_its_button(held, v
     if is_heard:
         hear(robot, verb, "arm at 12:00:01")
     said = words(STOPPED, counter=OWN + 1)
-    heard = "another operator said arm at 12:00:01"
-    unheard = "it obeyed another operator whose words were not heard here"
+    heard = "another operator or terminal said arm at 12:00:01"
+    unheard = "it obeyed another operator or terminal whose words were not heard here"
     assert (heard if is_heard else unheard) in said and "button" not in said
     assert robots.is_over
 
@@ -251,7 +252,10 @@ def test_who_waits_for_another_operators_start_is_not_over(held, before):
     session = before.get("session", SESSION)
     hear(robot, VERBS.VERB_START, "start at 12:00:01", session=session)
     said = words(STOPPED, counter=OWN + 1, session=session)
-    assert "was taken over by another operator (start at 12:00:01), and is not held" in said
+    assert (
+        "was taken over by another operator or terminal (start at 12:00:01), and is not held"
+        in said
+    )
     assert not robots.is_over
     assert words(TABLE, stands=False, counter=OWN + 1, session=session) == ""
     assert "then its button was pressed" in words(STOPPED, counter=OWN + 1, session=session)
@@ -262,7 +266,7 @@ def test_one_in_a_fault_is_told_to_be_anothers_as_soon_as_it_is(held):
     robots, robot, words = held
     hear(robot, VERBS.VERB_START, "start at 12:00:01")
     said = words(FAULT, counter=OWN + 1, flags=TELEMETRY.STATUS_CAMERA_LOST)
-    assert "taken over by another operator (start at 12:00:01)" in said
+    assert "taken over by another operator or terminal (start at 12:00:01)" in said
     assert robots._fleet.held == set() and not robots.is_over
 
 
@@ -277,7 +281,7 @@ def test_what_takes_nothing_over_leaves_the_robot_held(held, verb):
     robots, robot, words = held
     hear(robot, verb, "select milling at 12:00:01")
     said = words(TABLE, stands=False, counter=OWN + 1)
-    assert "drives: another operator said select milling at 12:00:01" in said
+    assert "drives: another operator or terminal said select milling at 12:00:01" in said
     assert robots._fleet.held == {3} and robots.states["R03"].is_meant
 
 
@@ -336,3 +340,18 @@ def test_only_who_is_heard_and_is_one_is_said_to_stand(silent_s, double, stands)
     assert answer.last_heard_s == pytest.approx(silent_s, abs=0.5)
     Console(width=100, file=(said := io.StringIO())).print(answer_table([answer]))
     assert ("not heard for 10 s" in said.getvalue()) == (silent_s > 1)
+
+
+@pytest.mark.parametrize(("flags", "is_told"), [(TELEMETRY.STATUS_LATCHED, True), (0, False)])
+def test_from_where_a_stop_came_is_told_where_it_ended_a_hold(held, flags, is_told):
+    """A log that was played had the stop in it: "stopped by another command", and nobody's name."""
+    robots, _, words = held
+    words(TABLE, stands=False)
+    words(STOPPED, flags=flags)
+    fleet, stop = robots._fleet, turbopi.swarm_command_t()
+    stop.verb, stop.robot_id = VERBS.VERB_STOP, -1
+    assert of_stops(fleet, robots.states) == ""
+    fleet.bus.sender = ("10.0.0.9", 40000)
+    fleet._on_message("SWARM_COMMAND", stop.encode())
+    told = of_stops(fleet, robots.states)
+    assert told.startswith("A stop came from 10.0.0.9 at ") if is_told else told == ""

@@ -15,6 +15,7 @@ from twinmill.robots.countdown import (
     STOPPED,
     UNHEARD,
 )
+from twinmill.robots.fleet import AWAITS_START, HIDES_START
 from twinmill_cli import several
 
 COMMAND = Path(__file__).parents[2] / "firmware" / "core" / "command.c"
@@ -30,6 +31,8 @@ WORDS = {
     ),
     "was started anew, and has forgotten it",
     "a start that it waits for plays milling",
+    f"stands still, and {HIDES_START}",
+    f"stands still, {AWAITS_START}, and has not signed yet for whom",
 }
 # A start, a command or another operator is one.
 OF_SOMETHING_ELSE = (

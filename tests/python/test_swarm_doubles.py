@@ -272,3 +272,69 @@ def test_of_two_programs_of_which_nothing_is_known_both_remedies_are_told(beside
     for sender in (ROBOT, PLAYER):
         speak(sender, 1, source="robot")
     assert doubles(fleet, {1}).endswith("flash HOST=ID`.")
+
+
+def telemetry(flags=0) -> bytes:
+    said = turbopi.telemetry_t()
+    said.utime_us, said.status_flags = time.time_ns() // 1000, flags
+    return said.encode()
+
+
+@pytest.mark.parametrize("lost", ["none", "the robot's", "the relay's"])
+def test_one_robot_on_two_ways_is_no_second_one(lost):
+    """A relay repeated all that it said, and "a twin or a recording" was told as the cause."""
+    fleet = Fleet("", connect=lambda _: Bus(0.0), key=KEY)
+
+    def hear(sender, data):
+        fleet.bus.sender = sender
+        fleet.bus._hear("R01_TELEMETRY", data)
+
+    for k in range(9):
+        data = telemetry(TELEMETRY.STATUS_DOUBLE)  # it hears itself, as repeated
+        for sender, name in ((ROBOT, "the robot's"), (PLAYER, "the relay's")):
+            if name != lost or k % 2 == 0:
+                hear(sender, data)
+    known, ways = fleet.robots[1], f"({ROBOT[0]}, {PLAYER[0]})"
+    assert not known.is_double and doubles(fleet, {1}) == ""
+    assert known.alarms == [f"heard on two ways, as over a relay {ways}"]
+    for _ in range(2):
+        hear(("198.51.100.3", 7667), telemetry())
+        hear(ROBOT, telemetry())
+    assert known.is_double and "Two robots say that they are number 1" in doubles(fleet, {1})
+
+
+def test_a_cause_that_leaves_others_open_is_told_with_these(beside_a_twin):
+    """Here the operator worked on the robot itself, which was to be ended."""
+    fleet, speak = beside_a_twin
+    for _ in range(2):
+        speak(("127.0.0.1", 7667), 1)
+        speak(PLAYER, 1)
+    said = doubles(fleet, {1})
+    assert "127.0.0.1 is this computer: if a twin or a recording speaks here, end it" in said
+    assert said.endswith("if the robot itself does, it is the other one.")
+
+
+class Repeated(Bus):
+    """A robot and a relay, which begins with what was said before anybody listened here."""
+
+    LATE = 3  # of so many words
+
+    def __init__(self):
+        super().__init__(SLOWEST_S / 2)
+        self._words = [telemetry() for _ in range(self.LATE)]
+
+    def speak(self):
+        if self.sender == ROBOT:
+            self._words.append(telemetry())
+            self._hear("R01_LINK", link(time.monotonic()))
+        self._hear("R01_TELEMETRY", self._words[-1 if self.sender == ROBOT else -self.LATE])
+
+
+def test_a_relay_that_is_late_is_no_second_robot_to_who_has_just_begun_to_listen():
+    """All that it said at first was new here, and a start was refused."""
+    fleet = Fleet("", connect=lambda _: Repeated(), key=KEY)
+    tell.find(fleet, {1})
+    fleet.listen(2 * SLOWEST_S, lambda: fleet.robots[1].is_double)
+    assert fleet.robots[1].is_double
+    swarm_door.refuse_doubles(fleet, {1})
+    assert not fleet.robots[1].is_double

@@ -2,6 +2,7 @@
 """Before a command is said: who is missing, who drives already, and whom an operator holds."""
 
 import json
+import os
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import turbopi
+import typer
 
 from twinmill.robots import key as keys
 from twinmill.robots import tell
@@ -71,7 +73,7 @@ def hold(fleet: Fleet, robot_id: int, *, key=KEY, session=SESSION, made_us=0) ->
 
 
 def test_a_command_is_told_with_the_time_at_which_it_was_said():
-    """A laptop that wakes up hears late what another operator said while it slept."""
+    """A laptop that wakes up hears late what another operator or terminal said while it slept."""
     fleet = fleet_of(robot(1))
     command, sealed = turbopi.swarm_command_t(), turbopi.signed_command_t()
     command.verb, command.utime_us = VERBS_START, round((time.time() - 3600) * 1e6)
@@ -232,7 +234,7 @@ def test_who_drives_already_is_said_with_who_holds_it():
     fleet = fleet_of(held, alone, free)
     hold(fleet, 1)
     said = of_busy([held, alone, free])
-    assert "R01 drives already, held by another operator" in said
+    assert "R01 drives already, held by another operator or terminal" in said
     assert "R02 drives already, and no operator is heard who holds it" in said
     assert "R03 drives already, untethered" in said
 
@@ -302,7 +304,7 @@ def test_it_is_said_whom_a_command_was_for(monkeypatch, key_file, twinmill, verb
 @pytest.mark.parametrize(
     ("hosts", "words"),
     [
-        (("127.0.0.1", "10.9.0.2"), "127.0.0.1 is this computer: end what speaks here, a twin"),
+        (("127.0.0.1", "10.9.0.2"), "127.0.0.1 is this computer: if a twin or a recording speaks"),
         (("198.51.100.1", "198.51.100.2"), "give one another number"),  # RFC 5737: nobody has these
     ],
 )
@@ -331,7 +333,7 @@ def test_who_looks_or_stops_is_told_that_this_computer_is_one_of_the_two(
     for more in ([], ["--json"]):
         _, out, _ = twinmill("swarm", verb, *options, "--key", key_file, *more)
         said = json.loads(out)["sentence"] if more else " ".join(out.split())
-        assert said.count("127.0.0.1 is this computer: end what speaks here, a twin or a") == 1
+        assert said.count("127.0.0.1 is this computer: if a twin or a recording speaks") == 1
 
 
 def test_both_ends_of_a_start_name_a_clock_that_is_off(monkeypatch):
@@ -420,6 +422,19 @@ def test_a_home_folder_that_no_shell_has_put_in_is_named():
     """`--key=~/.config/swarm.key` names a folder `~` in the working directory."""
     with pytest.raises(ValueError, match=r"was .*key.*/swarm\.key.* meant\?"):
         keys.load(Path("~/.config/swarm.key"))
+
+
+def test_a_key_that_can_be_read_once_alone_is_told_with_what_to_do(tmp_path):
+    """`--key <(cat FILE)` "is no file", and nobody knew what that meant."""
+    os.mkfifo(tmp_path / "key", 0o600)
+    with pytest.raises(ValueError, match=r"a folder or a pipe.*name the file of a key itself"):
+        keys.load(tmp_path / "key")
+
+
+def test_what_a_terminal_does_not_show_of_a_list_is_named():
+    """A list with Windows' ends of lines had "1 : must be numbers" told of it."""
+    with pytest.raises(typer.BadParameter, match=r"^'1\\r': must be numbers"):
+        swarm_door.parse_robots("1\r")
 
 
 def drives_by_its_word(robot_id: int) -> Robot:
@@ -518,7 +533,7 @@ def test_whom_a_called_off_start_leaves_alone_stands_in_its_object(monkeypatch, 
     ended = swarm._drive(fleet, {1, 2}, "", voice, **kept, **options)
     voice.end(1, [])
     assert data["left_alone"] == sorted(taken | untold)
-    assert ("R01: left to that operator." in ended.sentence) == bool(taken)
+    assert ("R01: left to that start." in ended.sentence) == bool(taken)
     assert ("R02 was told nothing by this start and is left alone" in ended.sentence) == bool(
         untold
     )
@@ -599,7 +614,7 @@ def test_a_robot_whose_fault_keeps_it_standing_is_not_said_to_drive():
     held.telemetry.mode = MODES.index("fault")
     hold(fleet_of(held), 1)
     said = of_busy([held])
-    assert "R01 stands still in a fault" in said and "held by another operator" in said
+    assert "R01 stands still in a fault" in said and "held by another operator or terminal" in said
     assert "drives already" not in said
 
 
@@ -608,7 +623,7 @@ def test_a_robot_whose_fault_keeps_it_standing_is_not_said_to_drive():
     ("timeout_ms", "is_held", "who"),
     [
         (0, False, "untethered"),
-        (2000, True, "held by another operator"),
+        (2000, True, "held by another operator or terminal"),
         (2000, False, "and no operator is heard who holds them"),
     ],
 )
@@ -679,8 +694,8 @@ def test_one_that_was_stopped_or_started_anew_and_told_nothing_since_awaits_no_s
     held = robot(1)
     held.link.armed, held.link.counter = armed, counter
     hold(fleet_of(held), 1)
-    counting = " who may be counting down to a start" if may else ""
-    assert of_busy([held]) == f"R01 stands still, held by another operator{counting}"
+    counting = " that may be counting down to a start" if may else ""
+    assert of_busy([held]) == f"R01 stands still, held by another operator or terminal{counting}"
 
 
 @pytest.mark.parametrize(

@@ -326,6 +326,15 @@ def test_a_refused_value_is_named_once(twinmill):
     assert err.count("Invalid value") == 1
 
 
+def test_blanks_around_a_machines_name_are_no_part_of_it(monkeypatch, tmp_path, twinmill):
+    """As of a paste: an address with one was said to be no machine's name."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    words = ["stop", "--host", " 127.0.0.1 ", "--timeout-s", "0.5", "--lcm-url", "memq://"]
+    _, out, _ = twinmill("swarm", *words, "--json")
+    said = json.loads(out)["sentence"]
+    assert "Nothing was heard from 127.0.0.1: is" in said
+
+
 @pytest.mark.parametrize("name", ["", " "])
 def test_a_machine_without_a_name_stops_all_and_is_named(monkeypatch, tmp_path, twinmill, name):
     """As an unset variable of a script leaves; it was said that nothing was heard from `.`."""

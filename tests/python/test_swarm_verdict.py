@@ -178,13 +178,13 @@ SENTENCES = [
     ),
     (
         of_start(begun(GOOD, out={1: "taken over"}, taken=[1], stopped=[STANDS])),
-        "Called off: R01 was taken over. R01: left to that operator. The others were told to stop:"
+        "Called off: R01 was taken over. R01: left to that start. The others were told to stop:"
         " R02 stands.",
         1,
     ),
     (
         of_start(begun(GOOD, out={1: "taken over"}, taken=[1])),
-        "Called off: R01 was taken over. R01: left to that operator.",
+        "Called off: R01 was taken over. R01: left to that start.",
         1,
     ),
     (
@@ -331,7 +331,7 @@ def test_an_instant_is_told_only_where_a_robot_was_to_start_at_it(answers, optio
 
 def test_a_robot_that_was_never_heard_is_said_so_with_what_to_do():
     said = of_stop([UNHEARD, STANDS]).sentence
-    assert "R05: was never heard." in said and "--host" in said
+    assert "R05: was not heard by this command." in said and "--host" in said
 
 
 answers = st.builds(

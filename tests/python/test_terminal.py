@@ -9,13 +9,15 @@ import pytest
 import turbopi
 from PIL import Image
 from rich.console import Console
+from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from twinmill.report import show
 from twinmill.report.tables import Cell
 from twinmill.report.tables import Table as Shown
 from twinmill.robots.fleet import Robot
-from twinmill.terminal import Fitting, progress_bar, progress_words
+from twinmill.terminal import Fitting, PlainConsole, progress_bar, progress_words
 from twinmill_cli import main as cli
 from twinmill_cli.swarm_screen import status_table
 
@@ -88,6 +90,26 @@ def test_progress_keeps_its_words_and_numbers(columns, monkeypatch):
         shown = printed(made.get_renderable(), columns)
         assert [word for word in (*words.split(), *numbers) if word not in shown] == []
         assert max(map(len, shown.splitlines())) <= columns
+
+
+@pytest.mark.parametrize(("columns", "lines"), [(0, 50), (1, 50), (2, 50), (80, 0)])
+def test_what_must_be_told_is_told_in_no_columns_too(columns, lines, monkeypatch):
+    """With COLUMNS=0 nothing at all was said, as by a shell that had not asked its terminal yet."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setenv("LINES", str(lines))
+    words = "NOT ALL STAND: R02 水"
+    for what in (words, Text(words), Fitting(_of_one(words))):
+        console = PlainConsole(file=io.StringIO(), force_terminal=True, color_system=None)
+        with Live(console=console, auto_refresh=False) as live:
+            live.update(what, refresh=True)
+        shown = console.file.getvalue()
+        assert "".join(words.split()) in "".join(shown.split())
+
+
+def _of_one(words: str) -> Table:
+    table = Table(box=None, show_header=False)
+    table.add_row(words)
+    return table
 
 
 @pytest.mark.parametrize("columns", WIDTHS)

@@ -348,17 +348,17 @@ class Run:
 
     def _play(self, held: Held, end_s: float | None) -> None:
         robot, begin_s = self.fleet.robots[self.robot_id], time.monotonic()
-        while robot.mode == "script":
+        while robot.last_mode == "script":
             self.fleet.listen(0.1)
             held.news()
         passed_s = time.monotonic() - begin_s
-        if robot.mode == "fault":
+        if robot.last_mode == "fault":
             raise Abort("the robot reports a fault (camera, board or battery)")
         self.fleet.listen(LOST_S, lambda: not held.news() and held.is_over)
         (state,) = held.states.values()
         if state.stands and state != SCRIPT_OVER:
             raise Abort(state.words)
-        if robot.mode == "running" or (end_s is not None and passed_s < end_s - 1):
+        if robot.last_mode == "running" or (end_s is not None and passed_s < end_s - 1):
             raise Abort(f"the robot left the script after {passed_s:.1f} s")
 
     @contextmanager

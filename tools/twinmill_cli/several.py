@@ -19,6 +19,10 @@ OF_SEVERAL = {
     "its operator": "their operator",
     "holds it": "holds them",
     "it had": "they had",
+    "it was last heard": "they were last heard",
+    "it waited": "they waited",
+    "begin by itself": "begin by themselves",
+    "its version": "their versions",
     "it did": "they did",
     "it was halted": "they were halted",
     "it obeyed": "they obeyed",
@@ -41,6 +45,7 @@ OF_SEVERAL = {
     "and stands": "and stand",
     "waits for a start and begins by itself": "wait for a start and begin by themselves",
     "and has not confirmed": "and have not confirmed",
+    "and has not signed": "and have not signed",
     "and obeys": "and obey",
 }
 VERBS = {

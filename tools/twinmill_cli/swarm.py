@@ -37,11 +37,11 @@ from twinmill_cli.swarm_door import (
 )
 from twinmill_cli.swarm_signals import (
     OVER_SSH,
+    WhatEnds,
     commanding,
     ended_by_signals,
     is_over_ssh,
     told_of_signals,
-    what_ends,
 )
 from twinmill_cli.swarm_stop import LastStop, StopCommand, stop
 
@@ -56,11 +56,12 @@ if working():  # not for --help
     from twinmill_cli.swarm_double import doubles
     from twinmill_cli.swarm_end import (
         addressed,
-        awaiting,
         beside_all,
         clocks,
         driving,
         finish,
+        of_stops,
+        of_those_to_begin,
         placed,
         times,
     )
@@ -190,10 +191,13 @@ def _start(
             by_old_news = {i for i in old if f"R{i:02d}" not in told.standing}
             return "" if is_named else of_heard(sorted(asked - by_old_news), sorted(by_old_news))
 
-        def ends(*becomes: str) -> str:
-            return what_ends(lcm_url, channel_prefix, *becomes)
+        ends = WhatEnds(lcm_url, channel_prefix, voice.say_instead)
 
-        with ended_by_signals(fleet, voice.check_listener) as asked_to_end:
+        def check() -> None:
+            voice.check_listener()
+            ends.look()
+
+        with ended_by_signals(fleet, check) as asked_to_end:
             try:
                 with kept_free(fleet):
                     verdict = _drive(
@@ -268,7 +272,7 @@ def _drive(
             fleet.watch()  # the last that ends it, while robots drive on
             return said
         _hold(fleet, held, voice)
-        ended = of_end(begun, held.states, None)
+        ended = of_end(begun, held.states, None).more(of_stops(fleet, held.states))
         ended = ended.more(heard(ended)).beside(driving(fleet, asked))
         ended = beside_all(fleet, ended.more(times(fleet, asked, ended.standing)))
     except BaseException as error:
@@ -285,7 +289,8 @@ def _drive(
         data["left_alone"] = left
         ended = ended.beside([f"R{i:02d}" for i in left], LEFT_ALONE).more(_who_drives(fleet, left))
         ended = (
-            ended.more(told_of_signals(signals))
+            ended.more(of_stops(fleet, states))
+            .more(told_of_signals(signals))
             .more(of_remarks(given) if stopped.ok else "")
             .more(heard(ended))
             .beside(driving(fleet, asked))
@@ -442,7 +447,7 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         say(f"this computer has no network ({fleet.fault}).")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
-    odd = " ".join(filter(None, [awaiting(fleet), doubles(fleet, fleet.robots), odd]))
+    odd = " ".join(filter(None, [of_those_to_begin(fleet), doubles(fleet, fleet.robots), odd]))
     if as_json:
         data = {"verb": "status", "ok": heard.ok, "sentence": heard.more(odd).sentence}
         data |= addressed(fleet, fleet.robots)

@@ -63,7 +63,8 @@ def parse_robots(text: str | None) -> set[int]:
     except ValueError:
         robots = []
     if not robots or not set(robots) <= set(range(100)):
-        written = text or "an empty list"
+        # As the carriage return at the end of a list with Windows' ends of lines.
+        written = (text if text.isprintable() else repr(text)) or "an empty list"
         raise typer.BadParameter(
             f"{written}: must be numbers in 0..99 with commas, as 1,2,5.", param_hint="'--robots'"
         )

@@ -69,8 +69,8 @@ def _of_twin(host: str) -> str:
 
 def _of_player(host: str) -> str:
     return (
-        f"one program on {host} speaks as several robots, so it is a twin or a recording: "
-        f"{_end_twin()}"
+        f"one program on {host} speaks as several robots, as a twin, a recording that is played or "
+        f"a relay does: {_end_twin()}"
     )
 
 
@@ -87,8 +87,8 @@ def _of_here(hosts: Sequence[str]) -> str:
         return ""
     twin = option("channel_prefix", "TWIN_")
     return (
-        f"{own} is this computer: end what speaks here, a twin or a recording, or give the twin "
-        f"{twin}"
+        f"{own} is this computer: if a twin or a recording speaks here, end it, or give the twin "
+        f"{twin}; if the robot itself does, it is the other one"
     )
 
 

@@ -8,18 +8,27 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Group
 
+from twinmill.robots.hold import BY_COMMAND
 from twinmill.robots.tell import OTHERS_S, ask_once
 from twinmill.streams import STDOUT, leads_nowhere
 from twinmill_cli import done
 from twinmill_cli.output import deliver, say
 from twinmill_cli.swarm_double import doubles
 from twinmill_cli.swarm_screen import answer_table
-from twinmill_cli.swarm_verdict import of_addressed, of_busy, of_clocks_now, of_late, of_old_news
+from twinmill_cli.swarm_verdict import (
+    BY_HAND,
+    of_addressed,
+    of_busy,
+    of_clocks_now,
+    of_late,
+    of_old_news,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
 
     from twinmill.robots.fleet import Fleet
+    from twinmill.robots.hold import State
     from twinmill.robots.tell import Answer
     from twinmill_cli.swarm_verdict import Verdict
 
@@ -69,18 +78,43 @@ def times(fleet: Fleet, robots: Iterable[int], standing: Collection[str] = ()) -
     return " ".join(filter(None, [old, clocks(fleet, robots)]))
 
 
-def awaiting(fleet: Fleet) -> str:
-    """Sentence on robots that wait for a start, whoever was asked; empty if none does."""
-    known = [r for _, r in sorted(fleet.robots.items()) if r.awaits_start]
-    return f"{of_busy(known)}." if known else ""
+def of_stops(fleet: Fleet, states: dict[str, State]) -> str:
+    """Sentence on where a stop came from that was not said here; empty if none was obeyed or heard.
+
+    Args:
+        fleet: where the robots are.
+        states: of each that was held, by name.
+    """
+    stopped = {int(name[1:]) for name, state in states.items() if state is BY_COMMAND}
+    heard = fleet.stop_heard(stopped) if stopped else ""
+    return f"A stop came from {heard}." if heard else ""
+
+
+def of_those_to_begin(fleet: Fleet, standing: Collection[str] = ()) -> str:
+    """Sentence on robots that wait for a start, or fell silent and may drive; empty if none does.
+
+    Whoever was asked.
+
+    Args:
+        fleet: where they are.
+        standing: names of those that are said to stand, as they have signed.
+    """
+    known = [r for _, r in sorted(fleet.robots.items()) if f"R{r.robot_id:02d}" not in standing]
+    busy = [r for r in known if r.may_begin]
+    return f"{of_busy(busy, fleet.held)}." if busy else ""
 
 
 def beside_all(fleet: Fleet, verdict: Verdict) -> Verdict:
     """An outcome with a word on all robots, asked or not, of which that must be known.
 
-    They wait for a start and begin by themselves; or they are two of one number: then it is wrong.
+    They wait for a start and begin by themselves, or fell silent and may drive; or they are two of
+    one number: then it is wrong.
     """
-    verdict, told = verdict.more(awaiting(fleet)), doubles(fleet, fleet.robots)
+    if begins := of_those_to_begin(fleet, verdict.standing):
+        of_some = verdict.of_some()
+        is_silent = of_some != verdict and any(r.may_drive for r in fleet.robots.values())
+        verdict = of_some.more(begins).more(BY_HAND if is_silent else "")
+    told = doubles(fleet, fleet.robots)
     return replace(verdict.more(told), ok=False, ends_well=False) if told else verdict
 
 

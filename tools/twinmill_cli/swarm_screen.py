@@ -69,21 +69,28 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
     table.add_column("link", no_wrap=True)
     table.add_column("alarms")
     for robot in robots:
-        run = robot.run
+        run, alarms = robot.run, filter(None, [*robot.alarms, _late(robot), robot.may_drive])
         silent_s = time.monotonic() - robot.heard_s
         table.add_row(
             f"R{robot.robot_id:02d}",
             *map(Text, (robot.source, run.version, run.behavior) if run else ("?", "?", "?")),
-            Text(robot.mode or "?", {"fault": "red", "running": "green"}.get(robot.mode, "")),
+            _mode(robot),
             _battery(robot.telemetry),
             Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
             _sees(robot),
             _clock(robot),
             Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
             _link(robot) if has_key else Text("not checked: no key"),
-            Text("; ".join([*robot.alarms, *_late(robot)]), "bold red"),
+            Text("; ".join(alarms), "bold red"),
         )
     return Fitting(table)
+
+
+def _mode(robot: Robot) -> Text:
+    """Its mode of now, or, of one that fell silent, of then."""
+    if not robot.is_here and robot.last_mode and not robot.is_old_news:
+        return Text(f"was {robot.last_mode}", "red")
+    return Text(robot.mode or "?", {"fault": "red", "running": "green"}.get(robot.mode, ""))
 
 
 def _clock(robot: Robot) -> Text:
@@ -94,9 +101,9 @@ def _clock(robot: Robot) -> Text:
     return Text(f"{round(robot.clock_s, 2) + 0:+.2f} s", "red" if is_odd else "")
 
 
-def _late(robot: Robot) -> list[str]:
+def _late(robot: Robot) -> str:
     is_late = robot.late_s > CLOCK_WARN_S and robot.has_answered and not robot.is_old_news
-    return [f"network {robot.late_s:.2f} s late"] if is_late else []
+    return f"network {robot.late_s:.2f} s late" if is_late else ""
 
 
 def _link(robot: Robot) -> Text:
@@ -105,6 +112,8 @@ def _link(robot: Robot) -> Text:
         return Text("not signed", "red")
     if robot.is_old_news:
         return Text("signs no more" if robot.signs_no_more else "old news", "red")
+    if not robot.is_here:
+        return Text("not heard", "red")
     if not robot.is_armed:
         return Text("stopped: arm it", "yellow")
     if robot.is_held is False:

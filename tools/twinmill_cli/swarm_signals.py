@@ -7,6 +7,7 @@ import os
 import select
 import shlex
 import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
@@ -56,6 +57,7 @@ OVER_SSH = (
     "holds the robots on. `ClientAliveInterval 2` in its sshd_config ends the session then; else "
     "hold robots from a machine beside them."
 )
+LASTS_S = 0.3  # a shell that hands its terminal from one program to the next takes less
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 
 
@@ -80,6 +82,37 @@ def what_ends(lcm_url: str, channel_prefix: str | None, becomes: str = STOPS) ->
     how = f"`{stop}`, or here `kill {os.getpid()}`"
     how += ", or closing this terminal, nohup or not" if has_terminal() else ""
     return f"No Ctrl-C reaches this command: {how}, {becomes}"
+
+
+class WhatEnds:
+    """Words on what stops robots that this program holds, said anew where they change.
+
+    Others may take its terminal, or change the terminal's keys, while somebody relies on them.
+
+    Args:
+        lcm_url, channel_prefix: as of `what_ends`.
+        say: is told a sentence.
+    """
+
+    def __init__(
+        self, lcm_url: str, channel_prefix: str | None, say: Callable[[str], None]
+    ) -> None:
+        self._bus, self._say = (lcm_url, channel_prefix), say
+        self._becomes, self._told, self._same_s = STOPS, "", 0.0
+
+    def __call__(self, becomes: str = STOPS) -> str:
+        """Words of now, which are relied on from here on."""
+        self._becomes, self._same_s = becomes, time.monotonic()
+        self._told = what_ends(*self._bus, becomes)
+        return self._told
+
+    def look(self) -> None:
+        """Says the words of now, where those that were told have been wrong for a while."""
+        words, now_s = what_ends(*self._bus, self._becomes), time.monotonic()
+        if not self._told or words == self._told:
+            self._same_s = now_s
+        elif now_s - self._same_s > LASTS_S:
+            self._say(f"{self(self._becomes)}.")
 
 
 def told_of_signals(signals: Sequence[int]) -> str:

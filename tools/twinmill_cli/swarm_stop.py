@@ -162,7 +162,7 @@ def stop(
         with saying_nothing() as say:
             for words in filter(None, [misread, fault, deaf]):
                 say(words)
-            hosts = tell.Hosts([name for name in host or () if name.strip()])
+            hosts = tell.Hosts([name.strip() for name in host or () if name.strip()])
             given = tell.stop(
                 fleet,
                 asked,

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
@@ -12,7 +12,14 @@ from typing import Any
 from twinmill.data.bus import Reach
 from twinmill.foreign_text import printable
 from twinmill.robots.countdown import DOUBLE, NONE_BEGUN, STOPPED
-from twinmill.robots.fleet import AWAITS_START, DRIVING, DRY_RUN, SIGNED_S, Robot
+from twinmill.robots.fleet import (
+    AWAITS_START,
+    DRIVING,
+    DRY_RUN,
+    HIDES_START,
+    SIGNED_S,
+    Robot,
+)
 from twinmill.robots.hold import State
 from twinmill.robots.tell import (
     AHEAD_S,
@@ -69,10 +76,12 @@ class Verdict:
         """This outcome with a word on robots that were not told to stop, to go on behind names."""
         if not others:
             return self
+        return self.of_some().more(f"{', '.join(others)} {several.of(others, words)}.")
+
+    def of_some(self) -> Verdict:
+        """This outcome beside another robot that may drive: "All" are those that were told."""
         told = self.sentence.replace("All stand", "All that were told to stop stand", 1)
-        return replace(self, sentence=told).more(
-            f"{', '.join(others)} {several.of(others, words)}."
-        )
+        return replace(self, sentence=told)
 
     def behind(self, words: str) -> Verdict:
         """This outcome behind words without which it would be misread; they may be empty."""
@@ -338,34 +347,50 @@ def _joined(*sentences: str) -> str:
     return " ".join(filter(None, sentences))
 
 
-def of_busy(busy: list[Robot]) -> str:
-    """That robots drive already or are about to, and for whom; empty where none does."""
-    by: dict[tuple[str, str], list[str]] = {}
+def of_busy(busy: list[Robot], held: Collection[int] = frozenset()) -> str:
+    """That robots drive already, may, or are about to, and for whom; empty where none does.
+
+    Args:
+        busy: the robots.
+        held: those of them that this program holds.
+    """
+    by: dict[str, list[str]] = {}
     for robot in busy:
-        who = BY_ITS_WORD
-        if robot.link_timeout_s is not None:
-            holder = "by another operator" if robot.hears_other_operator else "from here"
-            who = {
-                None: "untethered",
-                True: f"held {holder}",
-                False: "and no operator is heard who holds it",
-            }[robot.is_held]
-        in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
-        if robot.awaits_start:
-            who = f"still{in_fault}, {AWAITS_START}, {who}"
-        elif not robot.drives_by_any_word:
-            who = f"still{in_fault}, held by another operator"
-            who += " who may be counting down to a start" if robot.may_await_start else ""
-        elif in_fault:
-            who = f"still{in_fault}, was started, and drives once that is over: {who}"
-        else:
-            who = f"already, {who}"
-        moves = robot.drives_by_any_word and not (in_fault or robot.awaits_start)
-        by.setdefault(("drive" if moves else "stand", who), []).append(f"R{robot.robot_id:02d}")
+        words = robot.may_drive or _of_busy(robot, _for_whom(robot, held))
+        by.setdefault(words, []).append(f"R{robot.robot_id:02d}")
     return "; ".join(
-        f"{', '.join(names)} {verb}{'s' * (len(names) == 1)} {several.of(names, who)}"
-        for (verb, who), names in by.items()
+        f"{', '.join(names)} {several.of(names, words)}" for words, names in by.items()
     )
+
+
+def _for_whom(robot: Robot, held: Collection[int]) -> str:
+    """Words on who holds one that drives or is about to, by all that is known yet."""
+    if robot.is_tethered is False:
+        return "untethered"
+    if robot.hears_other_operator:
+        return "held by another operator or terminal"
+    if robot.is_tethered is None:
+        return "and has not signed yet for whom" if robot.link else BY_ITS_WORD
+    if robot.robot_id in held:
+        return "held from here"
+    if robot.hears_operator:
+        return "and nobody else is heard yet who holds it"
+    return "and no operator is heard who holds it"
+
+
+def _of_busy(robot: Robot, who: str) -> str:
+    """Words on one that is heard to drive, to be about to or to be held, behind its name."""
+    in_fault = f" in a fault{_alarms([robot])}" if robot.mode == "fault" else ""
+    if robot.awaits_start:
+        return f"stands still{in_fault}, {AWAITS_START}, {who}"
+    if robot.hides_start and not (robot.drives_by_any_word or robot.hears_operator):
+        return f"stands still{in_fault}, and {HIDES_START}"
+    if not robot.drives_by_any_word:
+        count = " that may be counting down to a start" if robot.may_await_start else ""
+        return f"stands still{in_fault}, held by another operator or terminal{count}"
+    if in_fault:
+        return f"stands still{in_fault}, was started, and drives once that is over: {who}"
+    return f"drives already, {who}"
 
 
 def of_taking_over(busy: list[Robot]) -> str:
@@ -640,7 +665,7 @@ def _of_called_off(begun: Start) -> Verdict:
     taken = [a for a in begun.answers if a.robot_id in begun.dropouts.taken]
     words = f"Called off: {_why_called_off(begun)}."
     if taken:
-        words += f" {_names(taken)}: left to that operator."
+        words += f" {_names(taken)}: left to that start."
     if STOPPED in begun.dropouts.words.values():
         words += f" {_who_stopped(begun)}"
     untold = [a for a in begun.answers if a.robot_id in begun.untold]

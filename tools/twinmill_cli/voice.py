@@ -120,6 +120,11 @@ class Voice:
                 raise
             self._last = "" if sentence == self._last else self._last
 
+    def say_instead(self, sentence: str) -> None:
+        """A sentence in the place of what is shown, which is no longer so."""
+        self.clear()
+        self.say(sentence)
+
     def say_outcome(self, sentence: str) -> None:
         """A sentence on what became of robots, which has to be heard: see `end`."""
 

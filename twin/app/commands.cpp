@@ -152,7 +152,7 @@ int32_t Commands::StatusFlags(int id) const
 {
     const Robot &robot = robots_[static_cast<size_t>(id)];
     using turbopi::telemetry_t;
-    int32_t flags = swarm_.Output(id).status_flags;
+    int32_t flags = swarm_.Output(id).status_flags | telemetry_t::STATUS_TELLS_START;
     flags |= robot.start_pending ? telemetry_t::STATUS_AWAITS_START : 0;
     flags |= robot.link_lost ? telemetry_t::STATUS_LINK_LOST : 0;
     flags |= robot.running && robot.link_timeout_ms == 0 ? telemetry_t::STATUS_UNTETHERED : 0;

@@ -121,14 +121,43 @@ class Senders:
 
     def __init__(self):
         self._recent: deque[tuple[float, Address]] = deque()
+        self._said: deque[tuple[float, Address | None, bytes]] = deque()
+        self._copies: deque[tuple[float, tuple[Address, Address]]] = deque()
 
     def add(self, sender: Address | None) -> None:
         """Somebody spoke just now; None: the bus cannot tell who."""
         now_s = time.monotonic()
         if sender:
             self._recent.append((now_s, sender))
-        while self._recent and self._recent[0][0] < now_s - self.WINDOW_S:
-            self._recent.popleft()
+        self._forget(self._recent, now_s)
+
+    def is_copy(self, sender: Address | None, data: bytes) -> bool:
+        """These very bytes came before, as over a relay: whoever sent both is one program."""
+        now_s = time.monotonic()
+        self._forget(self._said, now_s)
+        first = next((said for said in self._said if said[2] == data), None)
+        if not first:
+            self._said.append((now_s, sender, data))
+            return False
+        if first[1] and sender and first[1] != sender:
+            self._copies.append((now_s, (min(first[1], sender), max(first[1], sender))))
+        return True
+
+    def _forget(self, heard: deque, now_s: float) -> None:
+        while heard and heard[0][0] < now_s - self.WINDOW_S:
+            heard.popleft()
+
+    @property
+    def on_two_ways(self) -> list[str]:
+        """Addresses from which the same bytes came, in order: one program's; empty: from none."""
+        self._forget(self._copies, time.monotonic())
+        return sorted({sender[0] for _, both in self._copies for sender in both})
+
+    def _program_of(self, sender: Address, pairs: list[tuple[Address, Address]]) -> Address:
+        """One address for all from which the same bytes came."""
+        for first, other in pairs:
+            sender = first if sender == other else sender
+        return sender
 
     @property
     def hosts(self) -> list[str]:
@@ -142,12 +171,14 @@ class Senders:
 
     @property
     def are_double(self) -> bool:
-        """One program spoke, then another, and then the one again.
+        """One program spoke, then another, and then the one again; not on two ways (`is_copy`).
 
         A program that was started anew, or has changed networks, speaks from another address and
         never again from the first.
         """
-        return len(list(groupby(sender for _, sender in self._recent))) > 2
+        self._forget(self._copies, time.monotonic())
+        pairs = sorted({both for _, both in self._copies}, key=lambda both: both[1], reverse=True)
+        return len(list(groupby(self._program_of(s, pairs) for _, s in self._recent))) > 2
 
 
 @dataclass

@@ -16,8 +16,8 @@ DOUBLE = "heard as two robots of one number"  # which refuses a start before it 
 NOT_BEGUN = "not driving when the others had begun"
 NONE_BEGUN = "not driving when the instant of the start was past"  # clocks may have been set
 NOT_HEARD_SINCE = "not heard since the instant of the start (a hang, or a late network)"
-UNHEARD = "told something by another operator who was not heard here"
-HELD_BY_ANOTHER = "taken over by another operator, whose command was not heard here"
+UNHEARD = "told something by another operator or terminal whose words were not heard here"
+HELD_BY_ANOTHER = "taken over by another operator or terminal, whose command was not heard here"
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _whose(fleet: Fleet, robot: Robot, ack: Any, link_timeout_ms: int | None) ->
         since = robot.signed_acks.get(start.seq)
         after_us = since.session_us if since else math.inf
         is_over = _obeyed_a_stop(fleet, robot, link.session, after_us=after_us)
-        return "" if is_over else f"taken over by another operator ({start.words})"
+        return "" if is_over else f"taken over by another operator or terminal ({start.words})"
     is_unheard = ack and ack.accepted and link.session == ack.session
     # A start alone changes that time; one that is untethered has nobody who says that he is there.
     is_of_start = link_timeout_ms is not None and link.link_timeout_ms != link_timeout_ms

@@ -50,6 +50,7 @@ ALARMS = (
 # A fault for which there is no flag: a button, lights or battery that cannot be read.
 OF_A_PART = "a part does not answer"
 AWAITS_START = "waits for a start and begins by itself"
+HIDES_START = "may wait for a start and begin by itself: its version cannot say"
 # A robot with one of these may be moving, or is about to, whatever it was told.
 MAY_MOVE = (
     TELEMETRY.STATUS_BOARD_LOST | TELEMETRY.STATUS_STOP_UNCONFIRMED | TELEMETRY.STATUS_AWAITS_START
@@ -136,6 +137,7 @@ class Heard:
         words: the command as a person would write it, and when it was said, by its sender's clock:
             a computer that slept hears it late.
         behavior: that it names.
+        start_utime_us: instant of a start, us since the Unix epoch, by its sender's clock.
     """
 
     seq: int
@@ -144,6 +146,7 @@ class Heard:
     counter: int
     words: str
     behavior: str = ""
+    start_utime_us: int = 0
 
     @property
     def starts(self) -> bool:
@@ -157,7 +160,8 @@ class Robot:
     """Last words of one robot.
 
     What it signed, or said, too long ago is old news (`is_old_news`), and tells nothing of now:
-    no mode, that it drives, is armed or held, who commands it, nor an alarm.
+    no mode, that it drives, is armed or held, who commands it, nor an alarm. Nor does what it said
+    before it fell silent (`tells_of_now`): then it may do what it was about to (`may_drive`).
 
     Attributes:
         telemetry, run: its newest messages.
@@ -196,11 +200,11 @@ class Robot:
 
     @property
     def mode(self) -> str:
-        """In words, or empty where nobody knows: before the first telemetry, or by old news."""
-        return "" if self.is_old_news else self._said_mode
+        """In words, or empty where nobody knows: before the first telemetry, or not of now."""
+        return self.last_mode if self.tells_of_now else ""
 
     @property
-    def _said_mode(self) -> str:
+    def last_mode(self) -> str:
         """As its newest telemetry says, however old that is."""
         return _mode_of(self.telemetry) if self.telemetry else ""
 
@@ -231,6 +235,45 @@ class Robot:
         return time.monotonic() - self.heard_s < GONE_S
 
     @property
+    def tells_of_now(self) -> bool:
+        """It said something just now that is new: by nothing else the present is told."""
+        return self.is_here and not self.is_old_news
+
+    @property
+    def may_drive(self) -> str:
+        """Words on one that fell silent as it drove or waited for a start, to go on behind a name.
+
+        Empty where it is heard, or stood when it was heard last.
+        """
+        if self.tells_of_now or self.is_old_news:
+            return ""
+        heard = f"when it was last heard, at {_time_of_day(1e6 * self._heard_utime_s)}"
+        modes = {self.last_mode, _mode_of(self.link) if self.link else ""}
+        if modes & {*DRIVING}:
+            return f"drove {heard}, and may drive on"
+        if "fault" in modes:
+            return f"had a fault {heard}, and may drive once that is over"
+        if not self._flags & TELEMETRY.STATUS_AWAITS_START:
+            return ""
+        instant_us = max((c.start_utime_us for c in self._starts), default=0)
+        if not instant_us:
+            return f"waited for a start {heard}, and may drive by now"
+        instant = _time_of_day(instant_us)
+        if time.time_ns() < 1000 * instant_us:
+            return f"waited for a start at {instant} {heard}, and may begin by itself then"
+        return f"may drive since {instant}: it waited for that start {heard}"
+
+    @property
+    def _heard_utime_s(self) -> float:
+        return time.time() - (time.monotonic() - self.heard_s)
+
+    @property
+    def _starts(self) -> list[Heard]:
+        """Starts that it has signed to obey in the session of its newest link."""
+        known = [c for c in self.commands.values() if c.starts and self.has_obeyed(c)]
+        return [c for c in known if self.link and c.session == self.link.session]
+
+    @property
     def says_that_it_drives(self) -> bool:
         """Its telemetry of just now does; not what it had said before it fell silent.
 
@@ -246,7 +289,7 @@ class Robot:
         """Its newest telemetry says so, its board obeys, and no start is to come."""
         t = self.telemetry
         return (
-            self._said_mode == "stopped"
+            self.last_mode == "stopped"
             and not t.status_flags & MAY_MOVE
             and not any(t.wheel_duty_pct)
         )
@@ -265,6 +308,7 @@ class Robot:
             and not link.status_flags & MAY_MOVE
             and self.stands
             and self.is_here
+            and self.awaits_start is False
             and not self.is_double
         )
 
@@ -361,7 +405,7 @@ class Robot:
             ack
             and ack.accepted
             and (later.stands if later else ack.stands)
-            and not (later and later.status_flags & MAY_MOVE)
+            and not (later and (later.status_flags & MAY_MOVE or _may_await(later)))
             and (self.stands or not self.telemetry)
         )
 
@@ -398,20 +442,47 @@ class Robot:
 
     @property
     def link_timeout_s(self) -> float | None:
-        """How long it goes on without its operator, 0: for ever; None as `is_tethered`."""
-        is_started = self.drives or (self.link and self.awaits_start)
-        return self.link.link_timeout_ms / 1e3 if is_started else None
+        """How long it goes on without its operator, 0: for ever; None as `is_tethered`.
+
+        By a link that itself tells of the start; one from before tells of no start, or of another.
+        """
+        link = self.link
+        if not (link and self.tells_of_now):
+            return None
+        awaits = bool(link.status_flags & TELEMETRY.STATUS_AWAITS_START)
+        is_older = any(c.counter > link.counter for c in self._starts)
+        is_started = awaits or link.mode != TELEMETRY.MODE_STOPPED
+        return link.link_timeout_ms / 1e3 if is_started and not is_older else None
 
     @property
     def is_armed(self) -> bool | None:
         """It may be started; None if it has not signed that."""
-        return bool(self.link.armed) if self.link and not self.is_old_news else None
+        return bool(self.link.armed) if self.link and self.tells_of_now else None
 
     @property
-    def awaits_start(self) -> bool:
-        """It stands and, as it says, signed or not, begins at the instant of a start to come."""
-        is_said = bool(self._flags & TELEMETRY.STATUS_AWAITS_START)
-        return is_said and not self.is_old_news and self._said_mode not in DRIVING
+    def awaits_start(self) -> bool | None:
+        """It stands and, as it says, signed or not, begins at the instant of a start to come.
+
+        None: nobody knows, as it fell silent, or its program is older than the word for that.
+        """
+        if not self.tells_of_now:
+            return None
+        if self.last_mode in DRIVING:
+            return False
+        if self._flags & TELEMETRY.STATUS_AWAITS_START:
+            return True
+        is_sure = self._flags & TELEMETRY.STATUS_TELLS_START or not self.may_await_start
+        return False if is_sure else None
+
+    @property
+    def hides_start(self) -> bool:
+        """It signs, stands, and its version cannot say whether it waits for a start."""
+        return bool(self.link) and self.tells_of_now and self.awaits_start is None
+
+    @property
+    def may_begin(self) -> bool:
+        """It waits for a start, or cannot say so, or fell silent and may drive."""
+        return bool(self.awaits_start or self.hides_start or self.may_drive)
 
     @property
     def may_await_start(self) -> bool:
@@ -431,13 +502,13 @@ class Robot:
         """It stands, as it has signed, because it had lost its operator."""
         link = self.link
         is_lost = bool(link) and bool(link.status_flags & TELEMETRY.STATUS_LINK_LOST)
-        return is_lost and not self.is_old_news and not self.drives
+        return is_lost and not self.is_old_news and link.mode == TELEMETRY.MODE_STOPPED
 
     @property
     def drives(self) -> bool:
         """It has signed so; one in a fault drives on once that is over."""
         is_moving = bool(self.link) and self.link.mode != TELEMETRY.MODE_STOPPED
-        return is_moving and not self.is_old_news
+        return is_moving and self.tells_of_now
 
     @property
     def drives_by_any_word(self) -> bool:
@@ -466,9 +537,13 @@ class Robot:
 
     @property
     def is_double(self) -> bool:
-        """Two robots speak as this one, as is heard here or by one of them."""
+        """Two robots speak as this one, as is heard here or by one of them.
+
+        One that is heard on two ways hears itself.
+        """
         flags = self.telemetry.status_flags if self.telemetry and not self.is_old_news else 0
-        return self.senders.are_double or bool(flags & TELEMETRY.STATUS_DOUBLE)
+        hears_one = bool(flags & TELEMETRY.STATUS_DOUBLE) and not self.senders.on_two_ways
+        return self.senders.are_double or hears_one
 
     @property
     def alarms(self) -> list[str]:
@@ -484,9 +559,12 @@ class Robot:
         flags = self._flags
         if flags & TELEMETRY.STATUS_CAMERA_LOST:  # which tells that there is no picture
             flags &= ~TELEMETRY.STATUS_FRAME_STALE
+        if self.senders.on_two_ways:
+            flags &= ~TELEMETRY.STATUS_DOUBLE
         told = self._double_alarm + [words for flag, words in ALARMS if flags & flag]
-        if self._said_mode == "fault" and not told:
+        if self.last_mode == "fault" and not told:
             told = [OF_A_PART]
+        told += [HIDES_START] if self.hides_start else []
         return [*told, AWAITS_START] if self.awaits_start else told
 
     @property
@@ -497,8 +575,10 @@ class Robot:
 
     @property
     def _double_alarm(self) -> list[str]:
-        hosts = ", ".join(self.senders.hosts)
-        return [f"TWO ROBOTS OF THIS NUMBER ({hosts})"] if self.senders.are_double else []
+        hosts, ways = (", ".join(h) for h in (self.senders.hosts, self.senders.on_two_ways))
+        if self.senders.are_double:
+            return [f"TWO ROBOTS OF THIS NUMBER ({hosts})"]
+        return [f"heard on two ways, as over a relay ({ways})"] if ways else []
 
     @property
     def clock_s(self) -> float:
@@ -601,7 +681,8 @@ class Robot:
             "version": run.version if run else None,
             "behavior": run.behavior if run else None,
             "mode": self.mode or None,
-            "stands": self.signs_that_it_stands,
+            "may_drive": self.may_drive or None,
+            "stands": None if self.hides_start else self.signs_that_it_stands,
             "alarms": self.alarms,
             "hosts": self.senders.hosts,
             "signed": self.link is not None,
@@ -623,12 +704,18 @@ class Robot:
         }
 
 
+def _may_await(link: Any) -> bool:
+    """It was told something since it was stopped, and cannot say that it is a start to come."""
+    tells = link.status_flags & TELEMETRY.STATUS_TELLS_START
+    return not tells and bool(link.armed and link.counter)
+
+
 def _mode_of(telemetry: Any) -> str:
     mode = telemetry.mode
     return MODES[mode] if 0 <= mode < len(MODES) else f"unknown mode {mode}"
 
 
-def _time_of_day(utime_us: int) -> str:
+def _time_of_day(utime_us: float) -> str:
     with suppress(ValueError, OverflowError, OSError):
         return f"{datetime.fromtimestamp(utime_us / 1e6):%H:%M:%S}"
     return f"{datetime.now():%H:%M:%S}"  # no calendar has that time
@@ -718,6 +805,8 @@ class Fleet:
         robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
         now_s = robot.heard_s = time.monotonic()
         sender = getattr(self.bus, "sender", None)
+        if kind == "TELEMETRY" and robot.senders.is_copy(sender, data):
+            return
         if kind in ("LINK", "SIGNED_ACK"):
             self._on_signed(robot, kind, message, data)
         elif kind == "ACK":
@@ -790,7 +879,8 @@ class Fleet:
             words = f"{COMMANDS.get(command.verb, '?')} {behavior}"
             words = f"{words.strip()} at {_time_of_day(command.utime_us)}"
             robot.commands[sealed.counter] = Heard(
-                *(command.seq, command.verb, sealed.session, sealed.counter, words, behavior)
+                *(command.seq, command.verb, sealed.session, sealed.counter, words, behavior),
+                start_utime_us=command.start_utime_us,
             )
 
     def _on_plain_command(self, data: bytes) -> None:

@@ -60,8 +60,8 @@ AWAITS = State(
     "waited for another start, unheard here",
 )
 DRIVES_AS_UNHEARD = State(
-    "drives, and obeyed another operator whose words were not heard here",
-    "had obeyed another operator whose words were not heard here",
+    "drives, and obeyed another operator or terminal whose words were not heard here",
+    "had obeyed another operator or terminal whose words were not heard here",
 )
 DRIVES_ANEW = State(
     "drives, though its program was started anew: it has autostart",
@@ -90,12 +90,14 @@ UNCONFIRMED = State(
 )
 RESTARTED = State("its program was started anew", stands=True)
 LINK_LOST = State("it had lost its link to this command", stands=True)
-LINK_LOST_TO_OTHER = State("it had lost its link to that operator", stands=True)
+LINK_LOST_TO_OTHER = State("it had lost its link to that command", stands=True)
 BY_COMMAND = State("stopped by another command", stands=True, is_meant=True)
 SCRIPT_OVER = State("its script is over, or its button was pressed", stands=True, is_meant=True)
 BY_BUTTON = State("its button was pressed", stands=True, is_meant=True)
 BY_UNHEARD = State(
-    "it obeyed another operator whose words were not heard here", stands=True, is_meant=True
+    "it obeyed another operator or terminal whose words were not heard here",
+    stands=True,
+    is_meant=True,
 )
 
 
@@ -104,7 +106,7 @@ def of_taken(command: Heard, then: State | None = None) -> State:
 
     One of which it is not may wait for the instant of his start.
     """
-    words = f"taken over by another operator ({command.words})"
+    words = f"taken over by another operator or terminal ({command.words})"
     if not then:
         return State(f"was {words}", f"was {words}", is_taken=True)
     became = LINK_LOST_TO_OTHER if then is LINK_LOST else then
@@ -126,7 +128,7 @@ class Held:
         known = [fleet.robots[a.robot_id] for a in begun.answers if a.robot_id in fleet.robots]
         signed = {a.robot_id: bool(a.accepted) for a in begun.answers if a.signed}
         linked = [r for r in known if r.link]
-        moving = {r.robot_id: r.mode != "stopped" and not r.is_old_news for r in linked}
+        moving = {r.robot_id: r.last_mode != "stopped" and not r.is_old_news for r in linked}
         self.robots = [r for r in linked if signed.get(r.robot_id, moving[r.robot_id])]
         self._sessions = {
             r.robot_id: begun.sessions.get(r.robot_id, r.link.session) for r in self.robots
@@ -208,7 +210,9 @@ class Held:
             return WAITS
         if not others:
             return BY_UNHEARD
-        return State(f"another operator said {others[0].words}", stands=True, is_meant=True)
+        return State(
+            f"another operator or terminal said {others[0].words}", stands=True, is_meant=True
+        )
 
     def _taken(self, robot: Robot) -> Heard | None:
         """The start of another operator that it obeyed last."""
@@ -218,7 +222,9 @@ class Held:
         """As was told from here, or as another operator told it."""
         link, others = robot.link, self._others(robot)
         if others and not self._is_overridden(robot, others[0]):
-            return State(f"drives: another operator said {others[0].words}", is_meant=True)
+            return State(
+                f"drives: another operator or terminal said {others[0].words}", is_meant=True
+            )
         known = max([self._fleet.counter, *(c.counter for c in robot.commands.values())])
         is_own = link.session == self._sessions[robot.robot_id]
         return DRIVES_AS_UNHEARD if is_own and link.counter > known else DRIVES

@@ -94,7 +94,10 @@ def load(path: Path | None = None) -> bytes:
             f"`twinmill robot flash HOST{named}`."
         )
     if not file.is_file():
-        raise ValueError(f"{told}: is no file; name the file of a key.")
+        raise ValueError(
+            f"{told}: is no file, which is read again, but a folder or a pipe, as `<(...)` makes "
+            "one; name the file of a key itself."
+        )
     mode = file.stat().st_mode & 0o777
     if mode & 0o077:
         raise ValueError(

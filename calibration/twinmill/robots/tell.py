@@ -60,7 +60,7 @@ STARTS = (VERBS.VERB_START, VERBS.VERB_SCRIPT)
 STANDING = ("stopped", "fault")
 # Of looking a name up: nobody knows whether there is a machine of it.
 UNASKED = (socket.EAI_AGAIN, socket.EAI_FAIL)
-NEVER_HEARD = "was never heard"
+NEVER_HEARD = "was not heard by this command"
 OLD_ANSWER = "no answer, and what is heard of it is old news"
 # It signs, and by its key: the packet with the signature was lost, or is late.
 UNSEALED = "answered, and its signed answer has not come"
@@ -236,22 +236,34 @@ def _unasked(fleet: Fleet, robots: set[int]) -> set[int]:
 
 
 def find_busy(fleet: Fleet, robots: set[int]) -> list[Robot]:
-    """Those of some robots that drive already, or wait for a start, or that an operator holds.
+    """Those of some robots that drive already, or may, or wait for a start, or that are held.
 
     Be it by a word that nobody can check: a robot of another key signs nothing. Who holds them is
     heard by then. To be asked before this program holds any.
     """
     known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
     fleet.listen(OTHERS_S, lambda: all(robot.hears_operator for robot in known))
-    fleet.listen(FIND_S, lambda: all(r.is_held is not False for r in known))
-    return [r for r in known if r.drives_by_any_word or r.awaits_start or r.hears_operator]
+    fleet.listen(FIND_S, lambda: all(_is_told_for_whom(r) for r in known))
+    return [r for r in known if r.drives_by_any_word or r.may_begin or r.hears_operator]
+
+
+def _is_told_for_whom(robot: Robot) -> bool:
+    """It is known who holds it, or that it needs nobody; or no signature of it can be checked."""
+    is_open = robot.link and (robot.drives or robot.awaits_start) and robot.is_tethered is None
+    return robot.is_held is not False and not is_open
 
 
 def hear_doubles(fleet: Fleet, robots: set[int]) -> list[Robot]:
     """Those of some robots that are two of one number. All that speak as them are heard by then."""
     known = [r for i in sorted(robots) if (r := fleet.robots.get(i))]
     fleet.listen(OTHERS_S, lambda: any(robot.is_double for robot in known))
+    _hear_copies(fleet, known)
     return [robot for robot in known if robot.is_double]
+
+
+def _hear_copies(fleet: Fleet, robots: list[Robot]) -> None:
+    """Those that are double turn out to be one on two ways, if what a relay repeats was heard."""
+    fleet.listen(FIND_S, lambda: not any(robot.is_double for robot in robots))
 
 
 def all_linked(fleet: Fleet, robots: set[int]) -> bool:
@@ -403,6 +415,7 @@ def _stop(
             break
     told = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
     fleet.listen(OTHERS_S, lambda: all(_says_since(robot, command.seq) for robot in told))
+    _hear_copies(fleet, told)
     # Nobody knows which copy a robot answered: one that was switched on since is not late by that.
     ask_clocks(fleet, {robot.robot_id for robot in told}, OTHERS_S)
     return answers(fleet, command, robots or set(fleet.robots))
@@ -711,7 +724,7 @@ def _not_begun(fleet: Fleet, command, given: list[Answer], patience_s: float) ->
         return {
             r.robot_id
             for r in accepted
-            if r.mode in STANDING or r.is_old_news or not r.says_since(command.start_utime_us)
+            if r.last_mode in STANDING or r.is_old_news or not r.says_since(command.start_utime_us)
         }
 
     fleet.listen(patience_s, lambda: not waiting())
@@ -754,7 +767,7 @@ def _answer(fleet: Fleet, robot: Robot, command) -> Answer:
     is_before = _changes(command, signed) and not robot.says_since(command.start_utime_us)
     is_unknown = (robot.is_old_news or is_before) and not stands
     signs_no_more = is_unknown and robot.signs_no_more
-    mode = MODES[TELEMETRY.MODE_STOPPED] if stands else robot.mode
+    mode = MODES[TELEMETRY.MODE_STOPPED] if stands else robot.last_mode
     return Answer(
         robot_id=robot.robot_id,
         accepted=bool(ack.accepted) if ack else None,
