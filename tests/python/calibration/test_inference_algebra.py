@@ -14,6 +14,7 @@ from scipy.special import logsumexp
 from scipy.stats import expon, multivariate_normal, norm
 
 from twinmill.inference import formal, hidden, moments
+from twinmill.inference.answer import Named, verdict_of
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import (
     OF_FORM,
@@ -328,6 +329,17 @@ def test_flat_evidence_leaves_the_prior_odds():
     odds = np.array([b.probability for b in found])
     assert odds.sum() == pytest.approx(1)
     assert odds / odds[0] == pytest.approx([1, PRIORS.effects / 10, q / 2 / (1 - q)])
+
+
+def test_where_no_name_is_sure_the_verdict_is_of_what_is_expected_to_take_most():
+    """As docs/inference.md says: a name takes 0.4 of a half, what has no name more or less."""
+    doubtful = Named("floor_patch", 0.4, ("floor_patch",), 0.4, "doubtful", 0.5, {})
+    certain = replace(doubtful, probability=0.95, group_probability=0.95, certainty="sure")
+    assert verdict_of(0.01, 0.19, [doubtful], refit=False) == "effect_missing"
+    assert verdict_of(0.01, 0.21, [doubtful], refit=False) == "outside_catalogue"
+    assert verdict_of(0.01, 0.99, [certain, doubtful], refit=False) == "effect_missing"
+    assert verdict_of(0.01, 0.0, [], refit=False) == "outside_catalogue"
+    assert verdict_of(0.4, 0.5, [], refit=False) == "cannot_tell"
 
 
 def test_what_one_block_alone_speaks_for_is_less_sure():
