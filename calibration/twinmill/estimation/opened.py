@@ -45,7 +45,6 @@ class NoiseFloor:
         offset_s: capture's clock less the robot's, of the base refitted to the log.
         heading_rad: that the robot holds where it was not recorded; else 0.
         independent: (3,) share of the errors of each channel that are.
-        best: model found, on the log's clock, whose errors are noise; None where none was sought.
         by_chance: between which scores 95 % of the draws of the noise lie, those of a right model.
     """
 
@@ -56,7 +55,6 @@ class NoiseFloor:
     offset_s: float = 0.0
     heading_rad: float = 0.0
     independent: np.ndarray = field(default_factory=lambda: np.ones(3))
-    best: native.Model | None = None
     by_chance: tuple[float, float] = (float("nan"), float("nan"))
 
     @classmethod
@@ -131,8 +129,7 @@ class Opened:
         """Measurement, model and noise, as reports and other tests look at them."""
         if isinstance(self.data, SteadyStates):
             return self.data.with_model(self.model)
-        best = self.known_floor.best or self.model
-        return ModelledLog.on_clock(self.run, self.model, best, clock_free=not self.same_clock)
+        return ModelledLog.on_clock(self.run, self.model, clock_free=not self.same_clock)
 
     def aligned(
         self,

@@ -99,7 +99,6 @@ def _floor(data: Trajectory, problem: PlanarProblem) -> NoiseFloor:
         keep,
         kind="noise",
         independent=independent_shares(np.concatenate(first), start_s),
-        best=likeliest.h.model,
         by_chance=(float(low), float(high)),
     )
 

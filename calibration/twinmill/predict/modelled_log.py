@@ -9,6 +9,7 @@ import twinmill_native as native
 from twinmill.data.measurement import Measurement
 from twinmill.data.track import command_at
 from twinmill.model.parameters import CLOCK, stated_names, take_alignment
+from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import Noise, fit_noise
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.whiteness import whiteness
@@ -43,21 +44,29 @@ class ModelledLog:
 
     @classmethod
     def on_clock(
-        cls, measurement: Measurement, model: native.Model, best: native.Model, clock_free: bool
+        cls, measurement: Measurement, model: native.Model, clock_free: bool
     ) -> "ModelledLog":
-        """A log with a robot's own model on the measurement's clock.
-
-        What another model, the best one, leaves is noise.
-        """
-        least = cls(measurement, best, StepGrid.of(measurement), clock_free)
-        noise = fit_noise(least.errors(), least._moving(), least.grid)
-        return replace(least, model=model, noise=noise)
+        """A log with a robot's own model on the measurement's clock, and the noise in the log."""
+        modelled = cls(measurement, model, StepGrid.of(measurement), clock_free)
+        modelled.noise = fit_noise(
+            unexplained(measurement, modelled.grid, model.get(CLOCK)),
+            modelled._moving(),
+            modelled.grid,
+        )
+        modelled.settle_noise()
+        return modelled
 
     def with_model(self, model: native.Model) -> "ModelledLog":
         """A copy with another model; measurement, clock and noise stay."""
         model = model.for_robot(self.measurement.track.robot_id)
         take_alignment(model, self.model)
         return replace(self, model=model)
+
+    def fitted(self, model: native.Model) -> "ModelledLog":
+        """A copy with a model of its own robot that was fitted to it, its clock included."""
+        modelled = replace(self, model=model)
+        modelled.settle_noise()
+        return modelled
 
     def errors(self) -> np.ndarray:
         """(S, 3) one-step errors of the model."""
@@ -73,6 +82,12 @@ class ModelledLog:
     def whiteness(self) -> float:
         """P-value that its one-step errors are noise: `twinmill.predict.whiteness`."""
         return whiteness(self.white_errors(), self.grid.period_s)
+
+    def settle_noise(self) -> None:
+        """Takes the noise that the model leaves, if it leaves less than any smooth response did."""
+        left = fit_noise([self.errors()], self._moving(), self.grid)
+        if left.loudness(self.grid.period_s) < self.known_noise.loudness(self.grid.period_s):
+            self.noise = left
 
     @property
     def noise_at_speed(self) -> Noise:

@@ -101,6 +101,11 @@ class Noise:
             "drive_turn_s": self.heading.memory_s,
         }
 
+    def loudness(self, period_s: float) -> float:
+        """Log of the one-step variance that remains when all memory is used, over channels."""
+        scales = [noise.whitening(period_s)[2] for noise in (self.position, self.heading)]
+        return float(4 * np.log(scales[0]) + 2 * np.log(scales[1]))
+
     def whiten(self, errors: np.ndarray, grid: StepGrid) -> np.ndarray:
         """(..., S, 3) one-step errors to whitened ones; zero where the filter still settles."""
         white = np.zeros_like(errors)
@@ -115,12 +120,12 @@ class Noise:
         return white
 
 
-def fit_noise(errors: np.ndarray, moving: np.ndarray, grid: StepGrid) -> Noise:
-    """Estimates the noise from what a model leaves.
+def fit_noise(errors: list[np.ndarray], moving: np.ndarray, grid: StepGrid) -> Noise:
+    """Estimates the noise from what a flexible model leaves.
 
     Args:
-        errors: (S, 3) one-step errors. A channel that was not measured (NaN) has the least noise of
-            all.
+        errors: (S, 3) one-step errors; their mean power is taken. A channel that was not measured
+            (NaN) has the least noise of all.
         moving: (S,) bool: the disturbance acts only then.
         grid: of the steps.
 
@@ -134,7 +139,7 @@ def fit_noise(errors: np.ndarray, moving: np.ndarray, grid: StepGrid) -> Noise:
         position, heading = (ChannelNoise(*least, LEAST_MEMORY_S) for least in LEAST)
         return Noise(position, heading)
     bins, taken = _bins(chunk)
-    power = _median_power(np.nan_to_num(errors), pieces, bins)
+    power = np.mean([_median_power(np.nan_to_num(e), pieces, bins) for e in errors], axis=0)
     return Noise(
         _fit_channel(power[:, :2].mean(1), taken, grid.period_s, LEAST[0]),
         _fit_channel(power[:, 2], taken, grid.period_s, LEAST[1]),

@@ -108,7 +108,7 @@ def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str
             f"{len(track.pose)} poses used, driven by {track.command_kind.replace('_', ' ')}",
         ),
         ("model", comparison.model_name),
-        ("noise", _noise(noise, track.has_heading)),
+        ("noise", _noise(noise, track.has_heading, wrong=robot.score > GOOD)),
         ("noise floor", robot.floor.reason or _floor(robot.floor)),
         ("residuals", _whiteness(robot.modelled.whiteness)),
         ("clocks", _clocks(robot)),
@@ -171,10 +171,11 @@ def _phases(robot: RobotComparison) -> list[tuple[str, str]]:
     return [("phases", f"the log begins at {', '.join(told)}, where the model fits best")]
 
 
-def _noise(noise: Noise, has_heading: bool) -> str:
+def _noise(noise: Noise, has_heading: bool, *, wrong: bool) -> str:
     """Standard deviations of the poses and of the robot's speed, in words.
 
-    No larger than fits assume at least is none.
+    No larger than fits assume at least is none. While the model is wrong its error is in what seems
+    to be noise of the speed.
     """
     channels = [
         ("speed", noise.position, 1000.0, " mm"),
@@ -190,7 +191,8 @@ def _noise(noise: Noise, has_heading: bool) -> str:
     of = "poses" if has_heading else "positions"
     told = [f"{of} {' and '.join(poses)}"] if poses else []
     told += [", ".join(moves)] if moves else []
-    return "; ".join(told) if told else "none found"
+    of_model = "; those of speed and turn rate include the model's error" if moves and wrong else ""
+    return f"{'; '.join(told)}{of_model}" if told else "none found"
 
 
 def _floor(floor: NoiseFloor) -> str:

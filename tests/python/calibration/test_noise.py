@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Noise of one-step errors: spectrum, whitening, and estimates of noise that was put in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import freqz, lfilter
 from scipy.stats import chi2
 
+from twinmill.data.track import command_at
 from twinmill.fitting.opening import open_measurements
+from twinmill.predict.flexible import unexplained
+from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
 from twinmill.predict.residual import StepGrid
 from twinmill.predict.whiteness import whiteness
@@ -97,7 +102,7 @@ def test_fit_recovers_the_noise_without_bias(position, heading, period_s):
         errors = np.column_stack(
             [drawn(c, count, period_s, random) for c in (position, position, heading)]
         )
-        noise = fit_noise(errors, np.ones(count, bool), even_grid(count, period_s))
+        noise = fit_noise([errors], np.ones(count, bool), even_grid(count, period_s))
         found.append(
             [
                 (
@@ -116,7 +121,7 @@ def test_fit_recovers_the_noise_without_bias(position, heading, period_s):
 def test_fit_of_sensor_noise_alone_finds_no_drive_noise_that_matters():
     period_s, sensor = 1 / 120, 3e-4
     errors = sensor * np.diff(np.random.default_rng(8).normal(size=(18_001, 3)), axis=0)
-    noise = fit_noise(errors, np.ones(18_000, bool), even_grid(18_000, period_s))
+    noise = fit_noise([errors], np.ones(18_000, bool), even_grid(18_000, period_s))
     assert noise.position.sensor == pytest.approx(sensor, rel=0.02)
     # Over half a second the fitted drive moves the robot by less than half the sensor's noise.
     position = noise.position
@@ -133,7 +138,7 @@ def test_noise_is_not_taken_from_stretches_at_rest():
     )
     moving = np.arange(count) // 3000 % 2 == 0
     errors[~moving] = 1e-6 * random.normal(size=(np.count_nonzero(~moving), 3))
-    noise = fit_noise(errors, moving, even_grid(count, period_s))
+    noise = fit_noise([errors], moving, even_grid(count, period_s))
     assert noise.position.sensor == pytest.approx(position.sensor, rel=0.05)
     assert noise.heading.drive == pytest.approx(heading.drive, rel=0.25)
 
@@ -145,25 +150,49 @@ def driven_log(request, tanh_robot, measure):
     return robot, measure(robot, 3, 90.0)
 
 
-def test_noise_is_what_the_best_model_leaves_whatever_the_robot_does(driven_log, model_file):
-    """A curve, a lag and coasting of another form leave the noise and little more.
+def test_unexplained_is_the_noise_whatever_the_robot_does(driven_log):
+    """A curve, a lag and coasting unknown to the regression leave the noise and little more.
 
     Sensors to 5 %. Drive, as its power at zero frequency which long horizons see: 20 % is the
-    scatter of one log of 90 s, and forms that differ leave as much again. It does not hang on the
-    model that is judged.
+    scatter of one log of 90 s, and its own regression leaves as much again of the physics.
     """
     robot, measurement = driven_log
-    guesses = [
-        model_file(),
-        model_file(("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.2, 0.3, 0.4, 0.5]"), ("0.05", "0.2")),
-    ]
-    noise, other = (open_measurements([measurement], g)[0].modelled().noise for g in guesses)
-    assert list(other.to_json().values()) == pytest.approx([*noise.to_json().values()], rel=0.02)
+    grid = StepGrid.of(measurement)
+    track = measurement.track
+    moving = np.any(command_at(grid.t_s, track.command_t_s, track.command) != 0, axis=1)
+    within, across = unexplained(measurement, grid, 0.0)
+    noise = fit_noise([within, across], moving, grid)
     assert noise.position.sensor == pytest.approx(robot.sensor_m, rel=0.05)
     assert noise.heading.sensor == pytest.approx(robot.sensor_rad, rel=0.05)
     for fitted, drive in ((noise.position, robot.drive_mps), (noise.heading, robot.drive_radps)):
         slow = fitted.drive**2 * fitted.memory_s / (drive**2 * robot.memory_s)
         assert 0.6 < slow < 1.6
+
+
+def test_overfitting_cancels_where_the_truth_is_only_noise(tanh_robot, measure):
+    """Errors that are white by making: what a fit takes away, its held-out errors give back."""
+    measurement = measure(tanh_robot(drive_mps=0, drive_radps=0, sensor_m=0, sensor_rad=0), 3, 60.0)
+    grid = StepGrid.of(measurement)
+    track = measurement.track
+    white = 1e-3 * np.random.default_rng(1).normal(size=track.pose.shape)
+    noisy = replace(measurement, track=replace(track, pose=np.cumsum(white, axis=0)))
+    # By medians, as the noise is taken: few steps, unlike all others, are predicted from nothing.
+    own = np.median(white[grid.source] ** 2)
+    within, across = (np.median(e**2) / own for e in unexplained(noisy, grid, 0.0))
+    assert within < 1 < across
+    assert (within + across) / 2 == pytest.approx(1, abs=0.06)
+
+
+def test_noise_of_a_scene_does_not_hang_on_the_model(driven_log, model_file):
+    _, measurement = driven_log
+    guesses = [
+        model_file(),
+        model_file(("[0, 0.1, 0.2, 0.3, 0.4]", "[0, 0.2, 0.3, 0.4, 0.5]"), ("0.05", "0.2")),
+    ]
+    first, second = (
+        ModelledLog.on_clock(measurement, g.model, clock_free=False).noise for g in guesses
+    )
+    assert first == second
 
 
 def test_p_values_of_white_noise_are_uniform_and_a_memory_has_a_small_one():
