@@ -199,6 +199,18 @@ def test_handlers_are_put_back_where_they_can_be(monkeypatch):
     assert given[signal.SIGABRT] is signal.SIG_DFL and signal.getsignal(signal.SIGINT) is was
 
 
+def test_a_signal_that_the_starter_had_blocked_asks_for_the_end_as_well():
+    """A blocked signal stays pending (sigprocmask(2)), and robots would drive on."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
+    try:
+        with counting_signals() as asked:
+            os.kill(os.getpid(), signal.SIGUSR1)
+        assert asked == [signal.SIGUSR1]
+        assert signal.SIGUSR1 in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 # A program at a terminal of its own, whose stdout and stderr lead to a reader that ends as it does.
 AT_TERMINAL = """
 import os, signal, sys

@@ -187,15 +187,19 @@ def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
     assert fleet.bus.said == []
 
 
-def test_a_stop_that_came_while_it_looked_is_not_undone_by_arm(monkeypatch, key_file, twinmill):
-    """Who had said it was told that all stand, and a second later they drove."""
+@pytest.mark.parametrize(
+    ("words", "not_done"), [(["start", "--arm"], "started"), (["arm"], "armed")]
+)
+def test_a_stop_that_came_while_it_looked_is_not_undone_by_arm(
+    monkeypatch, key_file, twinmill, words, not_done
+):
+    """Who had said it was told that all stand, and a second later they drove or might."""
     fleet = fleet_of(robot(1))
     fleet.bus.sender = ("10.0.0.2", 40000)
     fleet.bus.hear("SWARM_COMMAND", tell.make_command(turbopi.swarm_command_t.VERB_STOP).encode())
     monkeypatch.setattr(swarm_door, "Fleet", lambda *_, **__: fleet)
-    words = ["start", "--arm", "--robots", "1", "--key", key_file]
-    code, _, err = twinmill("swarm", *words)
-    assert code == 1 and "nothing was started: a stop came from 10.0.0.2 at " in err
+    code, _, err = twinmill("swarm", *words, "--robots", "1", "--key", key_file)
+    assert code == 1 and f"nothing was {not_done}: a stop came from 10.0.0.2 at " in err
     assert "ask there" in err and fleet.bus.said == []
 
 

@@ -172,7 +172,7 @@ def _start(
         refuse_doubles(fleet, asked)
         check_clocks(fleet, asked, in_s, may_differ=partial)
         busy = tell.find_busy(fleet, asked)
-        refuse_stopped(fleet, asked)
+        refuse_stopped(fleet, asked, "started", "you arm and start them again (--arm)")
         if busy:
             say(of_taking_over(busy))
         if timeout_ms and is_over_ssh():
@@ -359,6 +359,7 @@ def _arm(
         refuse_doubles(fleet, asked)
         say_old_news(fleet, asked)
         busy = tell.find_busy(fleet, asked)
+        refuse_stopped(fleet, asked, "armed", "you arm them")
         if busy:
             say(f"{of_busy(busy)}.")
         with telling(f"arming {names(asked)}, up to {tell.ARM_S:g} s until each has answered"):

@@ -198,13 +198,20 @@ def say_old_news(fleet: Fleet, robots: set[int]) -> None:
         say(old)
 
 
-def refuse_stopped(fleet: Fleet, robots: set[int]) -> None:
-    """Raises ValueError if somebody stopped some robots while this looked who is there."""
+def refuse_stopped(fleet: Fleet, robots: set[int], done: str, again: str) -> None:
+    """Refuses to loosen a stop that somebody said while this looked who is there.
+
+    Args:
+        fleet: where robots are.
+        robots: of which some were stopped.
+        done: what was not, as `started`.
+        again: what to ask about before it is done.
+
+    Raises:
+        ValueError: one was heard.
+    """
     if heard := fleet.stop_heard(robots):
-        raise ValueError(
-            f"nothing was started: a stop came from {heard}: ask there before you arm and start "
-            "them again (--arm)."
-        )
+        raise ValueError(f"nothing was {done}: a stop came from {heard}: ask there before {again}.")
 
 
 def check_clocks(fleet: Fleet, robots: set[int], ahead_s: float, *, may_differ: bool) -> None:

@@ -142,6 +142,8 @@ def counting_signals(numbers: Sequence[int] = ENDING) -> Iterator[list[int]]:
     asked: list[int] = []
     held_back = signal.pthread_sigmask(signal.SIG_BLOCK, OF_FAULTS)
     before = {number: signal.signal(number, lambda n, _: asked.append(n)) for number in numbers}
+    # One that this program's starter had blocked would come to nobody.
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, numbers)
     before[signal.SIGTTOU] = signal.signal(signal.SIGTTOU, signal.SIG_IGN)
     try:
         yield asked
