@@ -58,6 +58,8 @@ FEW_FILES = 5  # below, Python itself does not begin
 BUS_PORT = f":{7667:04X} "  # as /proc/net/udp has it
 OTHER_HANDLERS = {**os.environ, "PYTHONFAULTHANDLER": "1"}
 START = ("start", "--arm", "--robots", "1,2")
+LONG_S = "15"  # a countdown that what is done in it ends, however slow this machine is
+LONGER_S = "30"
 
 
 class Operator:
@@ -279,7 +281,7 @@ class Field:
     def terminal_halted_in_the_countdown_and_stopped(self) -> dict:
         """Nobody presses Ctrl-Q: the command ends all the same, and its last word is read."""
         begin_s = time.monotonic()
-        self.operator = operator = self._counting("--in-s", "5", terminal=True)
+        self.operator = operator = self._counting("--in-s", LONG_S, terminal=True)
         operator.type(CTRL_S)
         time.sleep(HALTED_S)
         tell.stop(Fleet(URL, key=self.key), set())
@@ -625,7 +627,7 @@ class Field:
 
     def selected_in_the_countdown(self) -> dict:
         """By another operator: told first that it may not be played, and last that it is not."""
-        counting = self._counting("--in-s", "6", "--behavior", "milling")
+        counting = self._counting("--in-s", LONG_S, "--behavior", "milling")
         self.operator = Operator(self.key_file, "select", "diffusing", terminal=False)
         code, begin_s = self.operator.end(), time.monotonic()
         counting.process.send_signal(signal.SIGINT)
@@ -826,7 +828,7 @@ class Field:
 
     def stopped_in_the_countdown(self) -> dict:
         """By another, once both have accepted; nothing starts at the instant."""
-        begin_s, fleet, ahead_s = time.monotonic(), Fleet(URL, key=self.key), 4.0
+        begin_s, fleet, ahead_s = time.monotonic(), Fleet(URL, key=self.key), 8.0
         self.operator = operator = self._counting("--json", "--in-s", str(ahead_s))
         said_s = time.monotonic()
         tell.stop(fleet, set())
@@ -851,13 +853,13 @@ class Field:
 
     def restarted_in_the_countdown(self) -> dict:
         """Its driver starts anew, and knows of no start."""
-        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", LONG_S)
         os.kill(self.robots[2].children()[0], signal.SIGKILL)
         return self._unmoved(begin_s, self.operator.end())
 
     def gone_in_the_countdown(self) -> dict:
         """As by its battery switch."""
-        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", LONG_S)
         self.robots[2].process.terminate()
         code = self.operator.end(40)
         row = self._unmoved(begin_s, code)
@@ -953,7 +955,7 @@ class Field:
 
     def another_starts_in_the_countdown(self) -> dict:
         """The last start counts: the first ends at once, and says whose the robots are."""
-        begin_s, first = time.monotonic(), self._counting("--in-s", "5")
+        begin_s, first = time.monotonic(), self._counting("--in-s", LONG_S)
         second = Operator(self.key_file, *START, "--in-s", "3", terminal=False)
         code = first.end()
         stood = not any(self.moved(i, begin_s) for i in IDS)
@@ -968,7 +970,7 @@ class Field:
 
     def another_starts_while_it_sleeps(self) -> dict:
         """Robots have lost the first by then, which wakes before its instant."""
-        return self._slept_through_another("--in-s", "14", before_s=LINK_TIMEOUT_S + 0.5)
+        return self._slept_through_another("--in-s", LONGER_S, before_s=LINK_TIMEOUT_S + 0.5)
 
     def another_starts_while_it_sleeps_through_its_instant(self) -> dict:
         """Robots drive when the first wakes, and not by its start."""
@@ -993,7 +995,7 @@ class Field:
         return row | {"second": [second_code, second.plain]}
 
     def ctrl_c_in_the_countdown(self) -> dict:
-        begin_s, self.operator = time.monotonic(), self._counting("--in-s", "4")
+        begin_s, self.operator = time.monotonic(), self._counting("--in-s", LONG_S)
         time.sleep(0.5)
         self.operator.process.send_signal(signal.SIGINT)
         return self._unmoved(begin_s, self.operator.end())
