@@ -46,6 +46,7 @@ class NoiseFloor:
         heading_rad: that the robot holds where it was not recorded; else 0.
         independent: (3,) share of the errors of each channel that are.
         by_chance: between which scores 95 % of the draws of the noise lie, those of a right model.
+        memories: (N, F) correlations of `twinmill.predict.whiteness` in each draw.
     """
 
     rms: np.ndarray
@@ -56,6 +57,7 @@ class NoiseFloor:
     heading_rad: float = 0.0
     independent: np.ndarray = field(default_factory=lambda: np.ones(3))
     by_chance: tuple[float, float] = (float("nan"), float("nan"))
+    memories: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
     @classmethod
     def none(cls, data: Trajectory, reason: str) -> "NoiseFloor":

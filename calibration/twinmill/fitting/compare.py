@@ -30,6 +30,7 @@ from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.regimes import Regime, where_it_fails
 from twinmill.predict.steady_errors import SteadyComparison, compare_steady
 from twinmill.predict.steady_states import SteadyStates
+from twinmill.predict.whiteness import memory, p_value
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, Windows, rms
 
 # Scores: stop; something is missing; the best model found is not good enough, or data leaked.
@@ -106,6 +107,11 @@ class RobotComparison:
         least = TELLING * max(uneven.values(), default=0.0)
         return {w: a for w, a in angles_rad.items() if uneven[w] >= least} or None
 
+    @property
+    def whiteness(self) -> float:
+        """P-value that its errors are noise: `twinmill.predict.whiteness`."""
+        return p_value(memory(self.errors), self.floor.memories)
+
     def error_rows(self) -> list[dict[str, Any]]:
         """errors[] of the interface: one row per channel and horizon."""
         found = rms(self.errors)
@@ -129,7 +135,7 @@ class RobotComparison:
             "log": self.measurement.log_name,
             "score": self.score,
             "score_by_chance": list(self.floor.by_chance),
-            "whiteness_p": self.modelled.whiteness,
+            "whiteness_p": self.whiteness,
             "floor_kind": self.floor.kind,
             "noise": self.modelled.known_noise.to_json(),
             "errors": self.error_rows(),

@@ -27,6 +27,7 @@ from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import CLOCK, HEADING
 from twinmill.predict.datasets import Trajectory
 from twinmill.predict.residual import rotate
+from twinmill.predict.whiteness import memory
 from twinmill.predict.windows import HORIZONS_S, rms
 
 DRAWS = 64  # of the noise: 90 s have 45 independent errors over 2 s, whose RMS 64 tell to 1.3 %
@@ -81,12 +82,14 @@ def _floor(data: Trajectory, problem: PlanarProblem) -> NoiseFloor:
         models, keep = settled(h, problem, view, sudden=False), np.ones(len(keep), bool)
         likeliest, _ = max(models, key=lambda m: m[1])
     seen = np.isfinite(data.measured) & keep[:, None, None]
-    random, first, each = np.random.default_rng(0), [], []
+    random = np.random.default_rng(0)
+    first, each, memories = [], [], []
     for best, share in models:
         drive, draws = _Drive(data, log, best), round(share * DRAWS)
         for k in range(draws):
             errors = np.where(seen, drive.errors(random), np.nan)
             each.append(rms(errors))
+            memories.append(memory(errors))
             first += [errors] if best is likeliest and k < FEW else []
     moves = rms(data.measured) > 1e-9
     floor = np.where(moves, np.sqrt(np.mean(np.square(each), axis=0)), np.nan)
@@ -100,6 +103,7 @@ def _floor(data: Trajectory, problem: PlanarProblem) -> NoiseFloor:
         kind="noise",
         independent=independent_shares(np.concatenate(first), start_s),
         by_chance=(float(low), float(high)),
+        memories=np.array(memories),
     )
 
 
@@ -153,7 +157,7 @@ class _Drive:
         off_rad = (begin[:, 2] + wrong_rad)[:, None]
         moved[..., 0] += off_rad * self._way[..., 1]
         moved[..., 1] -= off_rad * self._way[..., 0]
-        moved[..., 2] -= wrong_rad[:, None]
+        moved[..., 2] -= noise_rad[:, None]
         seen = rotate(moved[..., 0], moved[..., 1], -self._begin_rad[:, None])
         moved[..., 0], moved[..., 1] = seen
         start = random.normal(size=(len(begin), 1, 3)) * self._sensor * (1, 1, 0)

@@ -12,7 +12,6 @@ from twinmill.model.parameters import CLOCK, stated_names, take_alignment
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.noise import Noise, fit_noise
 from twinmill.predict.residual import StepGrid
-from twinmill.predict.whiteness import whiteness
 
 LEAST_SPEED_MPS = 1e-3  # below it a robot stands
 
@@ -77,11 +76,6 @@ class ModelledLog:
     def white_errors(self) -> np.ndarray:
         """(S, 3) the same, whitened."""
         return self.known_noise.whiten(self.errors(), self.grid)
-
-    @property
-    def whiteness(self) -> float:
-        """P-value that its one-step errors are noise: `twinmill.predict.whiteness`."""
-        return whiteness(self.white_errors(), self.grid.period_s)
 
     def settle_noise(self) -> None:
         """Takes the noise that the model leaves, if it leaves less than any smooth response did."""

@@ -59,8 +59,14 @@ class Windows:
         return Windows(self.starts[::every], self.ends[::every])
 
     def measured(self, measurement: Measurement) -> np.ndarray:
-        """(W, H, 3) displacement forward, left (m) and turn (rad), seen from the start."""
-        return self.seen(measurement.track, measurement.track.pose[self.ends])
+        """(W, H, 3) displacement forward, left (m) and turn (rad), seen from the start.
+
+        The turn is from reading to reading: a smoothed heading is late where a turn begins or ends.
+        """
+        track = measurement.track
+        found = self.seen(track, track.pose[self.ends])
+        found[..., 2] += (track.heading_smooth - track.heading_rad)[self.starts, None]
+        return found
 
     def predicted(self, measurement: Measurement, model: native.Model) -> np.ndarray:
         """(W, H, 3) the same as a model predicts it."""

@@ -16,7 +16,6 @@ from twinmill.fitting.fit import Held
 from twinmill.model.parameters import NORMAL_95, ParameterEstimate
 from twinmill.predict.noise import LEAST, Noise
 from twinmill.predict.regimes import HORIZON, Regime
-from twinmill.predict.whiteness import MEMORY_S
 from twinmill.predict.windows import CHANNELS, HORIZONS_S, rms
 
 Tone = Literal["", "good", "warn", "bad", "dim"]
@@ -37,7 +36,7 @@ SHOWN = {
 # Times the least noise that a fit assumes, which a log without any shares among sensor and drive.
 UNSEEN = 2
 WORST = 3  # regimes of a group
-NOT_WHITE, LEAST_P = 0.01, 0.001  # p-values: of the usual level, and of which no digits are shown
+NOT_WHITE = 0.02  # p-value: no draw of 64 remembers as much
 TOGETHER = (
     "Known only in combination: the log determines how such quantities go together (the "
     "covariance in the model file), as that one side is weaker, but none of them by itself."
@@ -110,7 +109,7 @@ def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading, wrong=robot.score > GOOD)),
         ("noise floor", robot.floor.reason or _floor(robot.floor)),
-        ("residuals", _whiteness(robot.modelled.whiteness)),
+        ("residuals", _whiteness(robot.whiteness)),
         ("clocks", _clocks(robot)),
         *_held_heading(robot),
         *_wheel_angles(robot),
@@ -204,8 +203,7 @@ def _floor(floor: NoiseFloor) -> str:
 
 def _whiteness(p_value: float) -> str:
     """Result of the test of whiteness, in words."""
-    tested = f"(Ljung-Box test over {MEMORY_S:g} s: p {'<' if p_value < LEAST_P else '='} "
-    tested += f"{number(max(p_value, LEAST_P), 1)})"
+    tested = f"(correlations of errors against those in draws of the noise: p = {p_value:.2f})"
     if p_value < NOT_WHITE:
         return f"not white {tested}: the noise alone does not explain them"
     return f"white {tested}: what the model leaves looks like noise"

@@ -9,12 +9,13 @@ from scipy.signal import freqz, lfilter
 from scipy.stats import chi2
 
 from twinmill.data.track import command_at
+from twinmill.fitting.compare import compare_robot
 from twinmill.fitting.opening import open_measurements
 from twinmill.predict.flexible import unexplained
 from twinmill.predict.modelled_log import ModelledLog
 from twinmill.predict.noise import TRANSIENT, ChannelNoise, Noise, fit_noise
 from twinmill.predict.residual import StepGrid
-from twinmill.predict.whiteness import whiteness
+from twinmill.predict.whiteness import memory, p_value
 
 TRUTHS = [
     (ChannelNoise(3e-4, 3e-3, 0.15), ChannelNoise(1.75e-3, 0.03, 0.15), 1 / 120),
@@ -195,16 +196,17 @@ def test_noise_of_a_scene_does_not_hang_on_the_model(driven_log, model_file):
     assert first == second
 
 
-def test_p_values_of_white_noise_are_uniform_and_a_memory_has_a_small_one():
-    """Level of the test by definition: 10 % of white logs are below 0.1, give or take 3 errors."""
-    random, period_s, logs = np.random.default_rng(3), 1 / 60, 300
-    white = random.normal(size=(logs, 3600, 3))
-    found = [whiteness(w, period_s) for w in white]
+def test_p_values_are_uniform_where_draws_are_of_the_noise_and_a_memory_has_a_small_one():
+    """Level of the test by definition: 10 % of logs are below 0.1, give or take 3 errors."""
+    random, logs, keep = np.random.default_rng(3), 300, 0.4  # of each error in the next
+
+    def drawn(count, kept):
+        new = random.normal(size=(count, 400, 5, 3))
+        return [memory(e) for e in lfilter([1], [1, -kept], new, axis=1)]
+
+    found = [p_value(m, np.array(drawn(64, keep))) for m in drawn(logs, keep)]
     assert np.mean(np.array(found) < 0.1) == pytest.approx(0.1, abs=3 * np.sqrt(0.09 / logs))
-    keep = 0.15  # of each error in the next, of one channel
-    remembered = white[0].copy()
-    remembered[:, 1] = lfilter([1], [1, -keep], white[0][:, 1])
-    assert whiteness(remembered, period_s) < 1e-6
+    assert p_value(drawn(1, keep + 0.2)[0], np.array(drawn(64, keep))) == 1 / 65
 
 
 def test_errors_of_the_right_model_are_white_and_those_without_its_lag_are_not(
@@ -213,5 +215,6 @@ def test_errors_of_the_right_model_are_white_and_those_without_its_lag_are_not(
     (own,) = open_measurements([measure(tanh_robot(), 3, 90.0)], true_model)
     quick = own.model.copy()
     quick.set("base.motor_lag_s", 0.0)
-    assert own.modelled().whiteness > 0.01
-    assert own.with_model(quick).modelled().whiteness < 1e-6
+    right, wrong = compare_robot(own), compare_robot(own.with_model(quick))
+    assert right.whiteness > 0.01
+    assert wrong.whiteness == 1 / 65
