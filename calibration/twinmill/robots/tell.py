@@ -450,6 +450,8 @@ def _has_done(fleet: Fleet, robot: Robot, seq: int) -> bool:
     It has signed that it stands; or says so, where no signature can be checked. One of which no
     signature has come may have another key, or its packets are lost: it is asked to the end.
     """
+    if robot.lost:
+        return False
     return robot.confirms(seq) or (not fleet.has_key and seq in robot.acks and robot.stands)
 
 
@@ -496,7 +498,7 @@ class Hosts:
     def tell(self, fleet: Fleet, command, robots: set[int]) -> None:
         """Says a command to them, and to the machines that speak as some robots, or all."""
         asked = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
-        speaking = {host for robot in asked for host in robot.senders.hosts}
+        speaking = {host for robot in asked for host in robot.hosts}
         for host in speaking - set(self._address_of.values()):
             with suppress(OSError):  # it shows in what is not answered
                 _say_to(fleet, command, robots, host)
@@ -510,7 +512,7 @@ class Hosts:
 
     def unheard(self, fleet: Fleet) -> list[str]:
         """Those from which no robot has spoken, and why they were not told, where they were not."""
-        heard = {host for robot in fleet.robots.values() for host in robot.senders.hosts}
+        heard = {host for robot in fleet.robots.values() for host in robot.hosts}
         unheard = [name for name, address in self._address_of.items() if address not in heard]
         return [
             f"{plain_line(name)} ({self._faults[name]})"
