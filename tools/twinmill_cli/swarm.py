@@ -444,8 +444,8 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         RUN_PERIOD_S - 1, lambda: bool(known) and all(r.is_source_known for r in known.values())
     )
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
-    if not robots and fleet.fault:
-        say(f"this computer has no network ({fleet.fault}).")
+    if not robots:
+        say(f"no robot was heard: {tell.why_unheard(fleet)}")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
     odd = " ".join(filter(None, [of_those_to_begin(fleet), doubles(fleet, fleet.robots), odd]))

@@ -123,7 +123,10 @@ class Saying:
     @property
     def hint(self) -> str:
         """Advice where a robot was not heard."""
-        other = "Robots of another --lcm-url or --channel-prefix hear none of it."
+        other = (
+            "Robots of another --lcm-url or --channel-prefix hear none of it; what one with ttl=0 "
+            "in its lcm_url says leaves it for no other computer."
+        )
         if self.is_deaf:
             return other
         if self.unheard:

@@ -229,6 +229,7 @@ class UdpBus:
     Attributes:
         sender: who sent the message that a handler was called for last, (host, port).
         reach: how far that got what was published; another one may be put in its place.
+        ttl: how many networks what is said may pass; by 0 none leaves this computer.
     """
 
     def __init__(self, url: str = "", *, hears: bool = True):
@@ -241,7 +242,7 @@ class UdpBus:
         Raises:
             RuntimeError: it is no such URL, or there can be no socket.
         """
-        self.group, self._ttl = _parse_url(url)
+        self.group, self.ttl = _parse_url(url)
         self.sender: Address | None = None
         self.reach = Reach()
         self._handlers: list[tuple[re.Pattern, Handler]] = []
@@ -251,7 +252,7 @@ class UdpBus:
         self._join_s = 0.0
         try:
             self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self._ttl)
+            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self.ttl)
             self._mouth.setblocking(False)
             self._names = _networks(self._mouth)
             if hears:
@@ -285,7 +286,7 @@ class UdpBus:
     def fault(self) -> str:
         """Why nothing leaves this computer; empty if something does, or nothing is meant to."""
         kinds = {name: self._kind(name) for name in _networks(self._mouth).values()}
-        if self._ttl == 0 or "out" in kinds.values():
+        if self.ttl == 0 or "out" in kinds.values():
             return ""
         return _not_connected(kinds)
 
@@ -359,7 +360,7 @@ class UdpBus:
         faults = [f"{n}: {why}" for n, why in errors.items() if self._kind(n) != "none"]
         faults += filter(None, [_not_connected(kinds)])
         out = {name for name, kind in kinds.items() if kind == "out"}
-        if self._ttl == 0 and took:
+        if self.ttl == 0 and took:
             out = {"this computer alone (ttl=0)"}
         elif not (out or faults):
             out = took

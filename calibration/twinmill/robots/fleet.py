@@ -1136,6 +1136,11 @@ class Fleet:
         """Why nobody outside of this computer can be heard now; empty if somebody may be."""
         return getattr(self.bus, "fault", "")
 
+    @property
+    def stays_here(self) -> bool:
+        """What is said from here is heard by programs of this computer alone."""
+        return getattr(self.bus, "ttl", 1) == 0
+
     def reach_anew(self) -> None:
         """From here on."""
         if hasattr(self.bus, "reach"):
