@@ -2,7 +2,8 @@
 """Rules of terminal output: foreign text as it is, tables and progress of any width uncut."""
 
 import errno
-from collections.abc import Iterable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rich.cells import cell_len
@@ -161,6 +162,28 @@ class Fitting:
         if self.caption:
             yield Text(str(self.caption), "dim")
         yield Text()
+
+
+class AsManyAsFit:
+    """Rows, as many of them as the terminal has lines for.
+
+    Args:
+        count: of all.
+        made: gives what is shown of so many of them, and a word on the others.
+    """
+
+    def __init__(self, count: int, made: Callable[[int], RenderableType]) -> None:
+        self.count, self.made = count, made
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        def lines(shown: int) -> int:
+            return len(console.render_lines(self.made(shown), options, pad=False))
+
+        if lines(min(self.count, console.height + 1)) <= console.height:
+            yield self.made(self.count)
+            return
+        few = range(min(self.count, console.height))  # each has a line or more
+        yield self.made(max(0, bisect_right(few, console.height, key=lines) - 1))
 
 
 def progress_bar(counted: bool = True) -> Progress:

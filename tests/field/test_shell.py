@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(
 )
 LIMIT_S, SLACK_S = 0.5, 0.5  # promised; for a machine that is busy with other tests
 NEVER = None  # no wheel turned
-NO_KEY = "No Ctrl-C reaches this command: `twinmill swarm stop`, or here `kill "
+NO_KEY = "No Ctrl-C reaches this command: `twinmill swarm stop`, or "
 BY_KEY = "Ctrl-C stops them; they stop by themselves"
 BY_SIGINT = -2  # a shell that dies so has ended its script: nothing of that follows
 

@@ -4,6 +4,7 @@
 import os
 import signal
 import sys
+import time
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the commands do, before numpy is loaded
 
@@ -263,3 +264,18 @@ def _coasting(
 def same_robot(tmp_path_factory) -> dict[str, Path]:
     """Logs of one robot on four days, by name; `model.toml` is beside them."""
     return make_days(tmp_path_factory.mktemp("days"))
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Both clocks of this computer, which stand until they are set forward by so many seconds."""
+    now = {name: getattr(time, name)() for name in ("monotonic", "time")}
+
+    def forward(s: float) -> None:
+        for name in now:
+            now[name] += s
+
+    for name in now:
+        monkeypatch.setattr(time, name, lambda name=name: now[name])
+    monkeypatch.setattr(time, "time_ns", lambda: round(1e9 * now["time"]))
+    return forward

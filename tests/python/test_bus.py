@@ -99,7 +99,7 @@ def test_how_far_a_message_got_is_what_the_kernel_says_of_the_networks_that_took
     """IFF_RUNNING is what tells a network without a carrier from one that carries."""
     bus, _ = bus
     monkeypatch.setattr(bus, "_kind", kinds.get)
-    bus._ttl, bus.reach = ttl, Reach()
+    bus.ttl, bus.reach = ttl, Reach()
     bus._note(took, errors)
     assert (bus.reach.out, bus.reach.networks, bus.reach.fault) == says and bus.reach.said == 1
 

@@ -174,6 +174,26 @@ def test_where_this_computer_has_no_network_no_robot_is_asked_for(
     assert "switched on" not in err
 
 
+@pytest.mark.parametrize("words", [["start"], ["status", "--once"]])
+def test_that_nothing_leaves_a_computer_by_its_ttl_is_named_where_nobody_is_heard(
+    monkeypatch, key_file, twinmill, words
+):
+    """It is 0 in LCM's and a robot's defaults, and all else was asked about."""
+    for module in (swarm, swarm_door):
+        monkeypatch.setattr(module, "Fleet", lambda *_, **__: fleet_of())
+    code, _, err = twinmill("swarm", *words, "--key", key_file)
+    assert code == 1 and "what is said with ttl=0 leaves no computer" in err
+
+
+@pytest.mark.parametrize("ttl", [0, 1])
+def test_a_robot_that_hears_nothing_from_here_is_named_with_the_ttl_as_cause(ttl):
+    fleet = fleet_of(robot(1))
+    fleet.bus.ttl = ttl
+    given = tell.answers(fleet, tell.make_command(VERBS_START), {1})
+    cause = "R01: no answer; by ttl=0 in lcm_url nothing left this computer."
+    assert (cause in of_stop(given).sentence) == (ttl == 0)
+
+
 @pytest.mark.parametrize("arm", [[], ["--arm"]])
 def test_a_robot_that_is_missing_is_refused_before_anybody_is_told(
     monkeypatch, key_file, twinmill, arm

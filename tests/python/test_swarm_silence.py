@@ -29,21 +29,6 @@ class Bus:
         return False
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """Both clocks of this computer, which stand until they are set forward by so many seconds."""
-    now = {name: getattr(time, name)() for name in ("monotonic", "time")}
-
-    def forward(s: float) -> None:
-        for name in now:
-            now[name] += s
-
-    for name in now:
-        monkeypatch.setattr(time, name, lambda name=name: now[name])
-    monkeypatch.setattr(time, "time_ns", lambda: round(1e9 * now["time"]))
-    return forward
-
-
 def robot(*, mode=TELEMETRY.MODE_STOPPED, flags=0, timeout_ms=0, counter=COUNTER) -> Robot:
     """R03, which has just said and signed all that it is."""
     link, telemetry = turbopi.link_t(), turbopi.telemetry_t()

@@ -270,6 +270,17 @@ def test_who_refused_a_start_and_drives_drives_for_somebody_else():
     assert "without having confirmed" not in told
 
 
+@pytest.mark.parametrize("given", [(UNHEARD,), (REFUSED, UNHEARD), (STANDS, UNHEARD)])
+def test_who_is_not_heard_where_nobody_starts_may_drive(given):
+    """Only that nobody was heard to start was said, and read as that nobody drives."""
+    assert of_start(begun(*given)).sentence.endswith(" R05 may drive all the same.")
+
+
+def test_who_is_not_heard_beside_one_that_starts_may_drive():
+    said = of_start(begun(GOOD, UNHEARD)).sentence
+    assert f"R05 was not heard to start ({NEVER_HEARD}), and may drive all the same. " in said
+
+
 def test_a_fault_is_told_apart_from_driving():
     said = of_start(begun(FAULTY, GOOD)).sentence
     assert "but not all: R06 with a fault" in said

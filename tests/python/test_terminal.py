@@ -3,6 +3,8 @@
 
 import io
 import json
+import re
+import time
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from twinmill.report.tables import Table as Shown
 from twinmill.robots.fleet import Robot
 from twinmill.terminal import Fitting, PlainConsole, progress_bar, progress_words
 from twinmill_cli import main as cli
-from twinmill_cli.swarm_screen import status_table
+from twinmill_cli.swarm_screen import live_table, status_table
 
 WIDTHS = [40, 48, 80, 200]
 
@@ -121,6 +123,40 @@ def test_the_state_of_robots_is_told_whole(columns):
     for word in ("R07", "0.1.0", "milling_cmaes", "7.43", "stopped"):
         assert word in told
     assert "…" not in told
+
+
+def shown(robots, columns, lines) -> list[str]:
+    """Lines of a terminal on which robots are looked at."""
+    console = PlainConsole(file=io.StringIO(), width=columns, height=lines)
+    console.print(live_table(robots))
+    return console.file.getvalue().splitlines()
+
+
+def robots_of(*ids, heard_s) -> list[Robot]:
+    robots = [Robot(i, heard_s=heard_s, link_s=heard_s) for i in ids]
+    for robot in robots:
+        robot.telemetry, robot.link = turbopi.telemetry_t(), turbopi.link_t()
+        robot.link.armed, robot.link.utime_us = 1, round(1e6 * time.time())
+    return robots
+
+
+@pytest.mark.parametrize(("columns", "lines"), [(40, 10), (80, 24), (200, 10)])
+def test_who_has_no_line_left_is_told_of_and_trouble_is_shown_first(clock, columns, lines):
+    """R77 was silent, and stood below the end of the terminal."""
+    now_s = time.monotonic()
+    robots = [*robots_of(*range(30), heard_s=now_s), *robots_of(77, heard_s=now_s - 60)]
+    said = shown(robots, columns, lines)
+    first = next(line for line in said if "R" in line)
+    assert len(said) <= lines and "77" in first and "…" not in "".join(said)
+    names = {name for line in said for name in re.findall(r"R\d\d", line)}
+    assert said[-1] == f"and {len(robots) - len(names)} more: all stopped"
+    assert len(shown(robots[:2], columns, lines)) <= lines
+
+
+def test_of_several_kinds_that_have_no_line_left_each_is_told_by_name(clock):
+    now_s = time.monotonic()
+    robots = [*robots_of(1, 2, heard_s=now_s), *robots_of(77, heard_s=now_s - 60)]
+    assert shown(robots, 200, 1) == ["and 3 more: R77 in trouble; R01, R02 stopped"]
 
 
 @pytest.mark.parametrize("columns", WIDTHS)

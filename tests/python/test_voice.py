@@ -16,9 +16,11 @@ from contextlib import suppress
 
 import pytest
 
+from twinmill.defaults import URL
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.terminal import PlainConsole
+from twinmill_cli import swarm_signals
 from twinmill_cli.swarm_signals import ENDING, HARMLESS, OF_FAULTS, commanding, ended_by_signals
 from twinmill_cli.voice import Voice
 
@@ -75,6 +77,15 @@ def test_a_reader_that_is_gone_silences_no_other_sentence(monkeypatch, capfd):
             pipe.close()
     os.close(writes)
     assert "robots stand" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "where"), [(0, "here"), (1, "inside its container")])
+def test_the_number_of_a_program_is_told_with_where_it_is_that(monkeypatch, number, where):
+    """Outside a container `kill 1` is for another program."""
+    pids = [os.readlink("/proc/self/ns/pid"), "pid:[1]"]
+    monkeypatch.setattr(swarm_signals, "MACHINE_PIDS", pids[number])
+    monkeypatch.setattr(swarm_signals, "key_reaches", lambda: False)
+    assert f"or {where} `kill {os.getpid()}`" in swarm_signals.what_ends(URL, None)
 
 
 def test_a_command_leaves_the_bus_however_it_ends():

@@ -65,7 +65,7 @@ if working():  # not for --help
         placed,
         times,
     )
-    from twinmill_cli.swarm_screen import countdown, status_table
+    from twinmill_cli.swarm_screen import countdown, live_table, status_table
     from twinmill_cli.swarm_verdict import (
         LEFT_ALONE,
         NOBODY_TOLD,
@@ -335,7 +335,7 @@ def _hold(fleet: Fleet, held: Held, voice: Voice) -> None:
             fleet.listen(0.1)
             for sentence in held.news():
                 voice.say(sentence)
-            voice.show(lambda: status_table(held.robots))
+            voice.show(lambda: live_table(held.robots))
     finally:
         voice.clear()
 
@@ -433,7 +433,7 @@ def _show(fleet: Fleet) -> None:
             fleet.listen(0.25)
             tell.ask_once(fleet, {i for i, r in fleet.robots.items() if r.link})
             robots = [fleet.robots[i] for i in sorted(fleet.robots)]
-            live.update(status_table(robots, has_key=fleet.has_key), refresh=True)
+            live.update(live_table(robots, has_key=fleet.has_key), refresh=True)
 
 
 def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
@@ -444,8 +444,8 @@ def _print(fleet: Fleet, key_fault: str, *, as_json: bool) -> int:
         RUN_PERIOD_S - 1, lambda: bool(known) and all(r.is_source_known for r in known.values())
     )
     robots = [fleet.robots[i] for i in sorted(fleet.robots)]
-    if not robots and fleet.fault:
-        say(f"this computer has no network ({fleet.fault}).")
+    if not robots:
+        say(f"no robot was heard: {tell.why_unheard(fleet)}")
     tell.ask_clocks(fleet, set(fleet.robots))
     heard, odd = placed(fleet, fleet.robots, of_status(robots)), clocks(fleet, fleet.robots)
     odd = " ".join(filter(None, [of_those_to_begin(fleet), doubles(fleet, fleet.robots), odd]))

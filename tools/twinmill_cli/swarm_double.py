@@ -24,7 +24,7 @@ def doubles(fleet: Fleet, robots: Iterable[int]) -> str:
 
 
 def _told(robot: Robot, several: set[str]) -> str:
-    hosts = robot.senders.hosts
+    hosts = robot.hosts
     who = "A robot and a twin" if robot.source == "robot, twin" else "Two robots"
     return (
         f"{who} say that they are number {robot.robot_id} ({', '.join(hosts)}): "
@@ -39,7 +39,7 @@ def _remedy(robot: Robot, several: set[str]) -> str:
         robot: that is two.
         several: machines on which one program speaks as several robots.
     """
-    hosts = robot.senders.hosts
+    hosts = robot.hosts
     return (
         _of_here(hosts)
         or "; ".join(itertools.starmap(_of_old, sorted(robot.older_s.items())))
@@ -51,7 +51,7 @@ def _remedy(robot: Robot, several: set[str]) -> str:
 
 def _of_several_numbers(fleet: Fleet) -> set[str]:
     """Addresses of machines on which one program speaks as several robots: none of them does."""
-    spoken = Counter(p for robot in fleet.robots.values() for p in robot.senders.programs)
+    spoken = Counter(p for robot in fleet.robots.values() for p in robot.programs)
     return {program[0] for program, numbers in spoken.items() if numbers > 1}
 
 

@@ -4,15 +4,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from rich import box
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from twinmill.robots.fleet import GONE_S, Robot
 from twinmill.robots.tell import CLOCK_WARN_S, Answer
-from twinmill.terminal import Fitting
+from twinmill.terminal import AsManyAsFit, Fitting
 
 
 def countdown(robots: set[int], ahead_s: float, ends: str) -> str:
@@ -59,7 +61,48 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
         robots: to be shown.
         has_key: what they sign could be checked.
     """
-    if not robots:
+    return _table([_row(robot, has_key) for robot in robots])
+
+
+def live_table(robots: list[Robot], *, has_key: bool = True) -> AsManyAsFit:
+    """Robots that are looked at, those in trouble first; the last line tells of whom has no room.
+
+    All is asked of the robots at once: another thread may draw.
+
+    Args:
+        robots: to be shown.
+        has_key: as of `status_table`.
+    """
+    known = [(robot.mode or "?", _row(robot, has_key)) for robot in robots]
+    known.sort(key=lambda of_one: not _is_troubled(of_one[1]))
+    rows = [row for _, row in known]
+    words = [(str(row[0]), "in trouble" if _is_troubled(row) else mode) for mode, row in known]
+
+    def of_first(shown: int) -> RenderableType:
+        if shown == len(rows):
+            return _table(rows)
+        rest = Text(_of_others(words[shown:]), "bold")
+        return Group(_table(rows[:shown]), rest) if shown else rest
+
+    return AsManyAsFit(len(rows), of_first)
+
+
+def _of_others(words: list[tuple[str, str]]) -> str:
+    """Line on robots that have no room, by their names and how they are."""
+    by: dict[str, list[str]] = {}
+    for name, how in words:
+        by.setdefault(how, []).append(name)
+    each = "; ".join(f"{', '.join(names)} {how}" for how, names in by.items())
+    return f"and {len(words)} more: {f'all {next(iter(by))}' if len(by) == 1 else each}"
+
+
+def _is_troubled(row: Sequence[Text]) -> bool:
+    """Something of it is shown red."""
+    return any("red" in str(cell.style) for cell in row if cell)
+
+
+def _table(rows: list[list[Text]]) -> Fitting | Text:
+    if not rows:
         return Text("No robot is heard.")
     table = Table(box=None, padding=(0, 1, 0, 0))
     for column in ("robot", "source", "version", "behaviour", "mode", "battery", "camera"):
@@ -68,22 +111,26 @@ def status_table(robots: list[Robot], *, has_key: bool = True) -> Fitting | Text
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("link", no_wrap=True)
     table.add_column("alarms")
-    for robot in robots:
-        run, alarms = robot.run, filter(None, [*robot.alarms, _late(robot), robot.may_drive])
-        silent_s = time.monotonic() - robot.heard_s
-        table.add_row(
-            f"R{robot.robot_id:02d}",
-            *map(Text, (robot.source, run.version, run.behavior) if run else ("?", "?", "?")),
-            _mode(robot),
-            _battery(robot.telemetry),
-            Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
-            _sees(robot),
-            _clock(robot),
-            Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
-            _link(robot) if has_key else Text("not checked: no key"),
-            Text("; ".join(alarms), "bold red"),
-        )
+    for row in rows:
+        table.add_row(*row)
     return Fitting(table)
+
+
+def _row(robot: Robot, has_key: bool) -> list[Text]:
+    run, alarms = robot.run, filter(None, [*robot.alarms, _late(robot), robot.may_drive])
+    silent_s = time.monotonic() - robot.heard_s
+    return [
+        Text(f"R{robot.robot_id:02d}"),
+        *map(Text, (robot.source, run.version, run.behavior) if run else ("?", "?", "?")),
+        _mode(robot),
+        _battery(robot.telemetry),
+        Text(robot.camera, "red" if robot.camera in ("lost", "no frames") else ""),
+        _sees(robot),
+        _clock(robot),
+        Text(f"{silent_s:.1f} s", "" if robot.is_here else "red"),
+        _link(robot) if has_key else Text("not checked: no key"),
+        Text("; ".join(alarms), "bold red"),
+    ]
 
 
 def _mode(robot: Robot) -> Text:

@@ -57,6 +57,7 @@ OVER_SSH = (
     "holds the robots on. `ClientAliveInterval 2` in its sshd_config ends the session then; else "
     "hold robots from a machine beside them."
 )
+MACHINE_PIDS = "pid:[4026531836]"  # Linux's first namespace of numbers: PROC_PID_INIT_INO
 LASTS_S = 0.3  # a shell that hands its terminal from one program to the next takes less
 KEYS = {signal.SIGINT, signal.SIGQUIT, signal.SIGTSTP}  # Ctrl-C, Ctrl-\\, Ctrl-Z
 
@@ -79,9 +80,17 @@ def what_ends(lcm_url: str, channel_prefix: str | None, becomes: str = STOPS) ->
     bus = ["--lcm-url", lcm_url] if lcm_url != URL else []
     bus += ["--channel-prefix", channel_prefix] if channel_prefix else []
     stop = shlex.join(["twinmill", "swarm", "stop", *bus])
-    how = f"`{stop}`, or here `kill {os.getpid()}`"
+    where = "here" if _has_pid_of_machine() else "inside its container"
+    how = f"`{stop}`, or {where} `kill {os.getpid()}`"
     how += ", or closing this terminal, nohup or not" if has_terminal() else ""
     return f"No Ctrl-C reaches this command: {how}, {becomes}"
+
+
+def _has_pid_of_machine() -> bool:
+    """Its number is not one of a container's own, which another program has outside."""
+    with suppress(OSError):
+        return os.readlink("/proc/self/ns/pid") == MACHINE_PIDS
+    return False
 
 
 class WhatEnds:

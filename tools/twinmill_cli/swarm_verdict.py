@@ -36,6 +36,7 @@ from twinmill_cli.swarm_signals import BY_KEY, KEYS
 
 BY_HAND = "SWITCH OFF BY HAND what still drives."
 BY_ITS_WORD = "by its word, which nobody can check"
+UNHEARD = "may drive all the same"
 LEFT_ALONE = "was told nothing by this start and is left alone"
 
 
@@ -122,7 +123,10 @@ class Saying:
     @property
     def hint(self) -> str:
         """Advice where a robot was not heard."""
-        other = "Robots of another --lcm-url or --channel-prefix hear none of it."
+        other = (
+            "Robots of another --lcm-url or --channel-prefix hear none of it; what one with ttl=0 "
+            "in its lcm_url says leaves it for no other computer."
+        )
         if self.is_deaf:
             return other
         if self.unheard:
@@ -565,7 +569,7 @@ def _of_start(begun: Start, ends: str, drove_before: Iterable[int]) -> Verdict:
         _refused([a for a in refusing if a.stands], ", and stands"),
         _refused([a for a in refusing if not a.stands]),
         f"{_names(idle)} did not{_because(idle) or _alarms(idle)}" if idle else "",
-        _unheard(silent) + _because(silent) if silent else "",
+        f"{_unheard(silent)}{_because(silent)}, and {UNHEARD}" if silent else "",
         f"{_unheard(begun.late)} in time{_alarms(begun.late)}, told to stop" if begun.late else "",
         f"refused it{_because(going)}: {_as_before(going)}" if going else "",
         _why_dropped_out(begun),
@@ -695,15 +699,18 @@ def _of_nobody(begun: Start, at: str, ends: str) -> str:
         stopped = of_stop(begun.late, is_of_some=True).sentence
         words = f"{_unheard(begun.late)} in time{_alarms(begun.late)}. Told to stop: {stopped}"
         return f"NOBODY WAS HEARD TO START: {words}"
+    unheard = [a for a in begun.answers if a.is_silent and a.accepted is None]
+    more = f"{_names(unheard)} {UNHEARD}." if unheard else ""
     if len(_disobeyed(begun.answers)) == len(begun.answers):
-        is_sure = not any(a.is_silent and a.accepted is None for a in begun.answers)
-        return f"NOBODY {'STARTED' if is_sure else 'WAS HEARD TO START'}: {_why(begun.answers)}."
+        started = "WAS HEARD TO START" if unheard else "STARTED"
+        return _joined(f"NOBODY {started}: {_why(begun.answers)}.", more)
     waiting = [a for a in begun.answers if a.accepted and a.signed]
     is_unheard = any(a.is_silent for a in waiting)
     drives = "WAS HEARD TO DRIVE" if is_unheard else "DRIVES"
     may = "drive, unheard over a late network, or " if is_unheard else ""
     words = f"accepted the start, and may {may}begin late by a clock that is behind"
-    return f"NOBODY {drives}, though it is {at}: {_names(waiting)} {words}. {ends}."
+    told = f"NOBODY {drives}, though it is {at}: {_names(waiting)} {words}. {ends}."
+    return _joined(told, more)
 
 
 def of_end(

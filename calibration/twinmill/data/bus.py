@@ -15,7 +15,7 @@ import socket
 import struct
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -33,6 +33,7 @@ HEADER = struct.Struct(">4sI")
 CHANNEL_MAX = 63
 DATAGRAM_MAX = 65535
 RECEIVE_BUFFER_BYTES = 2 << 20
+PAIRS_MAX = 100  # of addresses from which the same bytes came: anybody can be many
 SKIP_S = 0.01  # beyond a time-out, to get past what nobody subscribed to
 REJOIN_S = 1.0  # networks come and go: Wi-Fi is made anew, a cable is unplugged
 KINDS = ("udpm", "tcpq", "memq", "file")  # of buses that LCM's library has
@@ -122,7 +123,7 @@ class Senders:
     def __init__(self):
         self._recent: deque[tuple[float, Address]] = deque()
         self._said: deque[tuple[float, Address | None, bytes]] = deque()
-        self._copies: deque[tuple[float, tuple[Address, Address]]] = deque()
+        self._copies: dict[tuple[Address, Address], float] = {}
 
     def add(self, sender: Address | None) -> None:
         """Somebody spoke just now; None: the bus cannot tell who."""
@@ -140,7 +141,11 @@ class Senders:
             self._said.append((now_s, sender, data))
             return False
         if first[1] and sender and first[1] != sender:
-            self._copies.append((now_s, (min(first[1], sender), max(first[1], sender))))
+            both = (min(first[1], sender), max(first[1], sender))
+            self._copies.pop(both, None)
+            self._copies[both] = now_s
+            if len(self._copies) > PAIRS_MAX:
+                del self._copies[next(iter(self._copies))]
         return True
 
     def _forget(self, heard: deque, now_s: float) -> None:
@@ -150,14 +155,22 @@ class Senders:
     @property
     def on_two_ways(self) -> list[str]:
         """Addresses from which the same bytes came, in order: one program's; empty: from none."""
-        self._forget(self._copies, time.monotonic())
-        return sorted({sender[0] for _, both in self._copies for sender in both})
+        since_s = time.monotonic() - self.WINDOW_S
+        now = [both for both, heard_s in self._copies.items() if heard_s >= since_s]
+        return sorted({sender[0] for both in now for sender in both})
 
-    def _program_of(self, sender: Address, pairs: list[tuple[Address, Address]]) -> Address:
-        """One address for all from which the same bytes came."""
-        for first, other in pairs:
-            sender = first if sender == other else sender
-        return sender
+    def program_of(self, sender: Address | None) -> Address | None:
+        """One address for all from which the same bytes ever came."""
+        return self._programs_of([sender])[0]
+
+    def _programs_of(self, senders: Iterable[Address | None]) -> list[Address | None]:
+        pairs = sorted(self._copies, key=lambda both: both[1], reverse=True)
+        found = []
+        for sender in senders:
+            for first, other in pairs:
+                sender = first if sender == other else sender
+            found.append(sender)
+        return found
 
     @property
     def hosts(self) -> list[str]:
@@ -176,9 +189,7 @@ class Senders:
         A program that was started anew, or has changed networks, speaks from another address and
         never again from the first.
         """
-        self._forget(self._copies, time.monotonic())
-        pairs = sorted({both for _, both in self._copies}, key=lambda both: both[1], reverse=True)
-        return len(list(groupby(self._program_of(s, pairs) for _, s in self._recent))) > 2
+        return len(list(groupby(self._programs_of(s for _, s in self._recent)))) > 2
 
 
 @dataclass
@@ -218,6 +229,7 @@ class UdpBus:
     Attributes:
         sender: who sent the message that a handler was called for last, (host, port).
         reach: how far that got what was published; another one may be put in its place.
+        ttl: how many networks what is said may pass; by 0 none leaves this computer.
     """
 
     def __init__(self, url: str = "", *, hears: bool = True):
@@ -230,7 +242,7 @@ class UdpBus:
         Raises:
             RuntimeError: it is no such URL, or there can be no socket.
         """
-        self.group, self._ttl = _parse_url(url)
+        self.group, self.ttl = _parse_url(url)
         self.sender: Address | None = None
         self.reach = Reach()
         self._handlers: list[tuple[re.Pattern, Handler]] = []
@@ -240,7 +252,7 @@ class UdpBus:
         self._join_s = 0.0
         try:
             self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self._ttl)
+            self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self.ttl)
             self._mouth.setblocking(False)
             self._names = _networks(self._mouth)
             if hears:
@@ -274,7 +286,7 @@ class UdpBus:
     def fault(self) -> str:
         """Why nothing leaves this computer; empty if something does, or nothing is meant to."""
         kinds = {name: self._kind(name) for name in _networks(self._mouth).values()}
-        if self._ttl == 0 or "out" in kinds.values():
+        if self.ttl == 0 or "out" in kinds.values():
             return ""
         return _not_connected(kinds)
 
@@ -348,7 +360,7 @@ class UdpBus:
         faults = [f"{n}: {why}" for n, why in errors.items() if self._kind(n) != "none"]
         faults += filter(None, [_not_connected(kinds)])
         out = {name for name, kind in kinds.items() if kind == "out"}
-        if self._ttl == 0 and took:
+        if self.ttl == 0 and took:
             out = {"this computer alone (ttl=0)"}
         elif not (out or faults):
             out = took

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import turbopi
 
 from twinmill.arguments import option
-from twinmill.data.bus import Reach, Senders, open_bus, why_no_socket
+from twinmill.data.bus import Address, Reach, Senders, open_bus, why_no_socket
 from twinmill.defaults import URL
 from twinmill.foreign_text import LINE_MAX, NAME_MAX, plain_line
 from twinmill.robots import key as keys
@@ -177,6 +177,10 @@ class Robot:
         hold_s: when an operator was heard last, or said from here, that somebody is there.
         other_hold_s: when another operator was.
         commands: that operators were heard to sign for it, by their counters.
+        speakers: what is last known of each that speaks as it, as of a robot of its own; by its
+            session, or by its address where it signs nothing.
+        sessions: that were signed last, by the address from which.
+        addresses: from which a speaker spoke.
     """
 
     robot_id: int
@@ -197,6 +201,9 @@ class Robot:
     hold_s: float = 0.0
     other_hold_s: float = -math.inf
     commands: dict[int, Heard] = field(default_factory=dict)
+    speakers: dict[int | Address | None, "Robot"] = field(default_factory=dict)
+    sessions: dict[Address | None, int] = field(default_factory=dict)
+    addresses: set[Address] = field(default_factory=set)
 
     @property
     def mode(self) -> str:
@@ -216,7 +223,7 @@ class Robot:
     @property
     def is_twin(self) -> bool:
         """All that speak as it have said that they are no robot."""
-        return self.source == "twin" and self.senders.programs <= self.runs["twin"]
+        return self.source == "twin" and self.programs <= self.runs["twin"]
 
     @property
     def twins(self) -> list[str]:
@@ -227,7 +234,65 @@ class Robot:
     def is_source_known(self) -> bool:
         """All that speak as it have said what they are."""
         said = set().union(*self.runs.values())
-        return bool(said) and self.senders.programs <= said
+        return bool(said) and self.programs <= said
+
+    @property
+    def programs(self) -> set[Address]:
+        """Addresses of those that speak as it, or did and may drive unheard."""
+        return self.senders.programs.union(self.addresses, *(s.addresses for s in self.lost))
+
+    @property
+    def hosts(self) -> list[str]:
+        """Machines of its `programs`, in order."""
+        return sorted({program[0] for program in self.programs})
+
+    def speaker(self, sender: Address | None, session: int | None = None) -> "Robot":
+        """Finds whoever said something as it, or adds that one.
+
+        Args:
+            sender: from where that came; None: the bus cannot tell.
+            session: in which it was signed; None: it was not, and whoever last signed from there
+                said it.
+        """
+        if session is not None:
+            self.sessions[sender] = session
+        who = self._who(sender)
+        if who not in self.speakers:
+            shared = {"first_s": time.monotonic(), "commands": self.commands}
+            self.speakers[who] = Robot(self.robot_id, **shared)
+            unsigned = [known for known in self.speakers if not isinstance(known, int)]
+            if len(unsigned) > ROBOTS_MAX:  # anybody can be many
+                del self.speakers[unsigned[0]]
+        if sender:
+            self.speakers[who].addresses.add(sender)
+        return self.speakers[who]
+
+    def _who(self, sender: Any) -> Any:
+        """Session that was signed from an address last, or one address of all its program has.
+
+        By now: it may have been known under another one before. Any other name is its own.
+        """
+        return self.sessions.get(sender, self.senders.program_of(sender))
+
+    def is_anew(self, before: "Robot") -> bool:
+        """This speaker is another one, started anew: on its machine, and silent before this began.
+
+        What is signed has its successor only in what is.
+        """
+        return (
+            self.first_s > before.heard_s
+            and {*self.hosts} <= {*before.hosts}
+            and bool(self.link or not before.link)
+            and not self.is_old_news
+        )
+
+    @property
+    def lost(self) -> list["Robot"]:
+        """Of several that speak as it, those that fell silent and may drive."""
+        named = {self._who(who): speaker for who, speaker in self.speakers.items()}
+        known = [self.speakers.get(who, speaker) for who, speaker in named.items()]
+        alive = [s for s in known if not any(other.is_anew(s) for other in known)]
+        return [s for s in alive if s.may_drive] if len(alive) > 1 else []
 
     @property
     def is_here(self) -> bool:
@@ -243,8 +308,10 @@ class Robot:
     def may_drive(self) -> str:
         """Words on one that fell silent as it drove or waited for a start, to go on behind a name.
 
-        Empty where it is heard, or stood when it was heard last.
+        Empty where it is heard, or stood when it was heard last; so each of several that speak.
         """
+        if lost := self.lost:
+            return " and ".join(f"(one{_at(s.hosts)}) {s.may_drive}" for s in lost)
         if self.tells_of_now or self.is_old_news:
             return ""
         heard = f"when it was last heard, at {_time_of_day(1e6 * self._heard_utime_s)}"
@@ -375,6 +442,14 @@ class Robot:
             return "its clock is ahead, and it answers nothing: nobody knows when it said that"
         how = "at most" if self.answered_now else "if its clock is right"
         return f"by what it signed {self.signed_ago_s:.0f} s ago, {how}"
+
+    def take(self, step: Step) -> None:
+        """Telemetry came. A speaker that signs is heard by what it signs: all else is anybody's."""
+        self.telemetry = step.telemetry
+        self.heard_s = self.heard_s if self.link else step.heard_s
+        self.recent.append(step)
+        while self.recent[0].heard_s < step.heard_s - WINDOW_S:
+            self.recent.popleft()
 
     def says_since(self, utime_us: int) -> bool:
         """Its newest telemetry was said after an instant, us since the Unix epoch.
@@ -537,13 +612,13 @@ class Robot:
 
     @property
     def is_double(self) -> bool:
-        """Two robots speak as this one, as is heard here or by one of them.
+        """Two robots speak as this one, as is heard here or by one of them, or one of them is lost.
 
         One that is heard on two ways hears itself.
         """
         flags = self.telemetry.status_flags if self.telemetry and not self.is_old_news else 0
         hears_one = bool(flags & TELEMETRY.STATUS_DOUBLE) and not self.senders.on_two_ways
-        return self.senders.are_double or hears_one
+        return self.senders.are_double or hears_one or bool(self.lost)
 
     @property
     def alarms(self) -> list[str]:
@@ -575,8 +650,8 @@ class Robot:
 
     @property
     def _double_alarm(self) -> list[str]:
-        hosts, ways = (", ".join(h) for h in (self.senders.hosts, self.senders.on_two_ways))
-        if self.senders.are_double:
+        hosts, ways = (", ".join(h) for h in (self.hosts, self.senders.on_two_ways))
+        if self.senders.are_double or self.lost:
             return [f"TWO ROBOTS OF THIS NUMBER ({hosts})"]
         return [f"heard on two ways, as over a relay ({ways})"] if ways else []
 
@@ -684,7 +759,7 @@ class Robot:
             "may_drive": self.may_drive or None,
             "stands": None if self.hides_start else self.signs_that_it_stands,
             "alarms": self.alarms,
-            "hosts": self.senders.hosts,
+            "hosts": self.hosts,
             "signed": self.link is not None,
             "armed": self.is_armed,
             "awaits_start": self.awaits_start,
@@ -708,6 +783,10 @@ def _may_await(link: Any) -> bool:
     """It was told something since it was stopped, and cannot say that it is a start to come."""
     tells = link.status_flags & TELEMETRY.STATUS_TELLS_START
     return not tells and bool(link.armed and link.counter)
+
+
+def _at(hosts: list[str]) -> str:
+    return f" at {', '.join(hosts)}" if hosts else ""
 
 
 def _mode_of(telemetry: Any) -> str:
@@ -808,28 +887,29 @@ class Fleet:
         if kind == "TELEMETRY" and robot.senders.is_copy(sender, data):
             return
         if kind in ("LINK", "SIGNED_ACK"):
-            self._on_signed(robot, kind, message, data)
+            if self._has_signed(robot, data):
+                robot.signed_s = now_s
+                for known in (robot, robot.speaker(sender, message.session)):
+                    self._on_signed(known, kind, message)
         elif kind == "ACK":
             robot.acks[message.seq] = message
         elif kind == "RUN":
             robot.run = message
             robot.runs.setdefault(message.source, set()).add(sender)
         else:
-            robot.telemetry = message
             waited_s = max(0.0, now_s - self._empty_s)
             host = sender[0] if sender else ""
             step = Step(now_s, time.time(), message, waited_s, host)
             if not robot.has_newer(step):
                 robot.senders.add(sender)
-            robot.recent.append(step)
-            while robot.recent[0].heard_s < now_s - WINDOW_S:
-                robot.recent.popleft()
+            for known in (robot, robot.speaker(sender)):
+                known.take(step)
 
-    def _on_signed(self, robot: Robot, kind: str, message: Any, data: bytes) -> None:
-        """Believes what the robot of that number has signed; copies of older words are no news."""
-        if not self.key or not keys.is_signed(keys.of_robot(self.key, robot.robot_id), data):
-            return
-        robot.signed_s = time.monotonic()
+    def _has_signed(self, robot: Robot, data: bytes) -> bool:
+        return bool(self.key) and keys.is_signed(keys.of_robot(self.key, robot.robot_id), data)
+
+    def _on_signed(self, robot: Robot, kind: str, message: Any) -> None:
+        """Believes what was signed as a robot, or as one speaker; older words are no news."""
         if kind == "SIGNED_ACK":
             robot.signed_acks[message.seq] = message
             self._on_answer(robot, message)
@@ -842,7 +922,8 @@ class Fleet:
                 and robot.session_us < (message.session_us - FRESH_US)
             ):  # what was heard before was a recording; so were the holds that were fresh by it
                 robot.hold_s, robot.other_hold_s = 0.0, -math.inf
-            robot.link, robot.link_s = message, time.monotonic()
+            robot.link = message
+            robot.link_s = robot.heard_s = time.monotonic()
             if robot.answered_now and robot.signed_ago_s < 0:
                 robot.answered = None  # this computer slept, and its clock did not go on
 
@@ -1054,6 +1135,11 @@ class Fleet:
     def fault(self) -> str:
         """Why nobody outside of this computer can be heard now; empty if somebody may be."""
         return getattr(self.bus, "fault", "")
+
+    @property
+    def stays_here(self) -> bool:
+        """What is said from here is heard by programs of this computer alone."""
+        return getattr(self.bus, "ttl", 1) == 0
 
     def reach_anew(self) -> None:
         """From here on."""

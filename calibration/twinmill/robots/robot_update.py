@@ -262,7 +262,7 @@ def _hear(
             "robot the same number?",
         )
     if robot.is_double:
-        hosts = ", ".join(robot.senders.hosts)
+        hosts = ", ".join(robot.hosts)
         raise RemoteError("two robots", f"two robots say that they are this one: {hosts}.")
     if not _wait(lambda: robot.link is not None, CAMERA_S):
         raise RemoteError("not signed", "runs, but does not sign with the key that it was brought.")

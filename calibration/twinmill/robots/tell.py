@@ -185,17 +185,20 @@ def find(fleet: Fleet, robots: set[int]) -> set[int]:
         return robots
     fleet.listen(FIND_S)
     if not fleet.here():
-        if fleet.fault:
-            raise ValueError(
-                f"no robot was heard in {FIND_S:g} s: this computer has no network ({fleet.fault})."
-            )
-        raise ValueError(
-            f"no robot was heard in {FIND_S:g} s; are they switched on and on this network, is "
-            f"{option('lcm_url')} that of their configuration, and does the network carry "
-            "multicast? Where it "
-            f"does not, `twinmill swarm stop` with {option('host')} stops a robot by its address."
-        )
+        raise ValueError(f"no robot was heard in {FIND_S:g} s: {why_unheard(fleet)}")
     return fleet.here()
+
+
+def why_unheard(fleet: Fleet) -> str:
+    """Words on what may keep robots from being heard, and what to do."""
+    if fleet.fault:
+        return f"this computer has no network ({fleet.fault})."
+    return (
+        f"are they switched on and on this network, is {option('lcm_url')} that of their "
+        "configuration, with ttl=1 in both (what is said with ttl=0 leaves no computer), and does "
+        "the network carry multicast? Where it does not, `twinmill swarm stop` with "
+        f"{option('host')} stops a robot by its address."
+    )
 
 
 def ask_clocks(fleet: Fleet, robots: set[int], within_s: float = ASK_S) -> None:
@@ -450,6 +453,8 @@ def _has_done(fleet: Fleet, robot: Robot, seq: int) -> bool:
     It has signed that it stands; or says so, where no signature can be checked. One of which no
     signature has come may have another key, or its packets are lost: it is asked to the end.
     """
+    if robot.lost:
+        return False
     return robot.confirms(seq) or (not fleet.has_key and seq in robot.acks and robot.stands)
 
 
@@ -496,7 +501,7 @@ class Hosts:
     def tell(self, fleet: Fleet, command, robots: set[int]) -> None:
         """Says a command to them, and to the machines that speak as some robots, or all."""
         asked = [fleet.robots[i] for i in robots or fleet.robots if i in fleet.robots]
-        speaking = {host for robot in asked for host in robot.senders.hosts}
+        speaking = {host for robot in asked for host in robot.hosts}
         for host in speaking - set(self._address_of.values()):
             with suppress(OSError):  # it shows in what is not answered
                 _say_to(fleet, command, robots, host)
@@ -510,7 +515,7 @@ class Hosts:
 
     def unheard(self, fleet: Fleet) -> list[str]:
         """Those from which no robot has spoken, and why they were not told, where they were not."""
-        heard = {host for robot in fleet.robots.values() for host in robot.senders.hosts}
+        heard = {host for robot in fleet.robots.values() for host in robot.hosts}
         unheard = [name for name, address in self._address_of.items() if address not in heard]
         return [
             f"{plain_line(name)} ({self._faults[name]})"
@@ -757,7 +762,7 @@ def _answer(fleet: Fleet, robot: Robot, command) -> Answer:
     if signed and (signed.command_utime_us, signed.verb) != (command.utime_us, command.verb):
         signed = None
     ack = signed or robot.acks.get(command.seq)
-    reason = ack.reason if ack else _why_silent(robot, unsigned)
+    reason = ack.reason if ack else _why_silent(fleet, robot, unsigned)
     if ack and not signed:
         is_known = robot.link or robot.signed_acks
         unsealed = SIGNS_NO_MORE if robot.signs_no_more else UNSEALED
@@ -832,14 +837,17 @@ def _stood_ago_s(fleet: Fleet, robot: Robot, command, signed) -> float | None:
     return robot.confirmed_ago_s(command.seq, fleet.said.get(command.seq, -math.inf))
 
 
-def _why_silent(robot: Robot, unsigned: str) -> str:
+def _why_silent(fleet: Fleet, robot: Robot, unsigned: str) -> str:
     if not robot.heard_s:
         return NEVER_HEARD
     if not (robot.link or robot.signed_acks):
         return unsigned
     if robot.signs_no_more:
         return SIGNS_NO_MORE
-    return OLD_ANSWER if robot.is_old_news else "no answer"
+    if robot.is_old_news:
+        return OLD_ANSWER
+    kept = f"; by ttl=0 in {option('lcm_url')} nothing left this computer"
+    return f"no answer{kept if fleet.stays_here else ''}"
 
 
 def _unanswered(fleet: Fleet, command, robots: set[int]) -> set[int]:
