@@ -122,7 +122,7 @@ SPREADS = ("idiosyncrasy.theta_a1_std", "idiosyncrasy.theta_a2_std")  # of robot
 NAMES = ((list, tuple, set, frozenset), "a list of names")
 BY_NAME = (Mapping, "a dictionary by name")
 NUMBER = (Real, "a number")
-NOT_WRITTEN = "Not written yet: `model.save(path)` of this result does that."
+NOT_WRITTEN = "Not written yet: `.model.save(path)` of this result does that."
 OF_ROBOTS = ((Real, Mapping), "a number, or a dictionary of numbers by robot")
 PAIRS = "a list of pairs of robots, as [(1, 2)]"
 SWITCH = (bool, "True or False")
@@ -400,7 +400,10 @@ class Log(Shown):
         return _rows(self._logs, _poses)
 
     def commands(self) -> pd.DataFrame:
-        """All commands, as they were recorded.
+        """All commands that the robots were sent, by their own clock.
+
+        Duties of imported tables and arrays are repeated every 22 ms while they are held, as robots
+        tell them: of rows that change nothing there may be more here.
 
         Returns:
             log, robot_id, t_s (robot's clock), kind, and by kind fl_pct, fr_pct, rl_pct, rr_pct

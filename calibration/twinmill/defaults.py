@@ -21,7 +21,7 @@ BATCH = 36
 EMITTERS = 3
 PER_GENERATION = BATCH * EMITTERS
 
-# What a diagnosis says of a model, and of an effect that it names.
+# What a diagnosis says of a model, and of an effect that it names: see docs/inference.md.
 Verdict = Literal[
     "model_adequate",
     "refit_enough",

@@ -18,6 +18,7 @@ from twinmill.data.measurement import Measurement
 from twinmill.diagnosis.fleet import Fleet
 from twinmill.diagnosis.infer import Inference
 from twinmill.fitting.compare import Comparison, comparison
+from twinmill.fitting.fit import noise_of
 from twinmill.fitting.opening import open_measurements
 from twinmill.inference.duties import refined, written_on
 from twinmill.inference.found_model import found_model, with_formula
@@ -86,7 +87,8 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
     fitted, added = _fitted(found, model_file, found.before.score)
     child = child_of(model_file, fitted, path, command)
     after = comparison(child, open_measurements(found.measurements, child))
-    child = child_of(model_file, replace(fitted, score_after=after.score), path, command)
+    fitted = replace(fitted, score_after=after.score, noise=noise_of(after))
+    child = child_of(model_file, fitted, path, command)
     kept = with_its_error(child, found.measurements)
     return Better(kept, added, found.before, after, found, fitted.estimates)
 

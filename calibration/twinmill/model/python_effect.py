@@ -12,12 +12,13 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import twinmill_native as native
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import FORMULA_NUMBERS, effect_names
 
 PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # names that the twin's formulas can have
@@ -133,6 +134,15 @@ def _number(value: Any) -> str:
     return f"({number!r})" if number < 0 else repr(number)
 
 
+class OfFile(Protocol):
+    """A model of Python's, such as `tm.Model`."""
+
+    @property
+    def file(self) -> ModelFile:
+        """Its file."""
+        ...
+
+
 class PythonEffect:
     """An effect that a Python function describes; made by `python_effect`.
 
@@ -188,13 +198,14 @@ class PythonEffect:
         ends = {name: (n.low, n.high) for name, n in self.numbers.items()}
         return {name: pair for name, pair in ends.items() if pair != (-math.inf, math.inf)}
 
-    def names(self, model: native.Model) -> dict[str, str]:
+    def names(self, model: "native.Model | OfFile") -> dict[str, str]:
         """Names of its numbers in a model, as `equation#air.drag`, by their own names.
 
         Raises:
             ValueError: the model does not have the effect.
         """
-        for instance, texts in zip(effect_names(model), model.texts, strict=True):
+        own = model if isinstance(model, native.Model) else model.file.model
+        for instance, texts in zip(effect_names(own), own.texts, strict=True):
             if all(texts.get(key) == text for key, text in self.texts.items()):
                 return {name: f"{instance}.{name}" for name in self.numbers}
         raise ValueError(f"{self.name}: the model does not have this effect; add it first.")
