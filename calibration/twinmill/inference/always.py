@@ -5,8 +5,8 @@ A fitted base is of another form than the robot. What it leaves in its own log (
 of the base's numbers leaves out, a coupling of turns, a slow wander, single moments) is no news in
 the next one. It is found by the same evidence that judges later logs: the likeliest set of effects,
 then kernel after kernel while the posterior odds rise. It enters their prior: a function of speed,
-heading or the past with its weights, one of time or place with its size alone, and with the
-probability of each size, so that a wander too small to be sure of here is half expected there
+heading or the past with its weights, one of time or place with its size alone, and both with the
+probability of each size, so that what is too small to be sure of here is half expected there
 (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63).
 """
 
@@ -22,6 +22,7 @@ from twinmill.inference import moments
 from twinmill.inference.discrepancy import CHANCE, SIZES, Kernel, dependence_of
 from twinmill.inference.hidden import Hidden
 from twinmill.inference.hypothesis import Hypothesis
+from twinmill.inference.lasting import Lasting
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import usual_after
 from twinmill.inference.planar import PlanarProblem, problem_of
@@ -29,11 +30,12 @@ from twinmill.inference.prior import Always, weight_labels
 from twinmill.inference.problem import View
 from twinmill.inference.search import Search, evidence
 from twinmill.inference.settings import PRIORS
-from twinmill.inference.table import WORTH, noise_of
+from twinmill.inference.table import BEYOND, WORTH, noise_of
 from twinmill.model.model_file import ModelFile
 from twinmill.model.parameters import catalogue, catalogue_name, is_local, with_role
 
 MOST = 8  # kernels: more are parts of each other
+NEGLIGIBLE = np.exp(-BEYOND)  # probability that decides nothing
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     if beside := each[0].kernels:
         each.append(_grown(p, h, p.view(noise_of(h, p, _columns(beside)))))
     likely = max(each, key=lambda g: g.log_evidence)
-    return _conditioned(p, h, likely, _wander(p, h, each, _sizes(p, h, likely)))
+    return _conditioned(p, h, likely, _chances(p, h, each, _sizes(p, h, likely)))
 
 
 def _columns(found: list[tuple[Kernel, float]]) -> np.ndarray | None:
@@ -120,7 +122,7 @@ def _white(view: View, found: list[tuple[Kernel, float]]) -> np.ndarray:
     return np.concatenate([view.stacked.columns[:0], *own])
 
 
-def _wander(
+def _chances(
     p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], sizes: dict[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """(S,) shares of each kernel and size in the probability of its dependence."""
@@ -133,9 +135,9 @@ def _wander(
 
 
 def _sizes(p: PlanarProblem, h: Hypothesis, grown: _Grown) -> dict[str, np.ndarray]:
-    """(S,) posterior probabilities of the sizes of each kernel that is not lasting.
+    """(S,) posterior probabilities of the sizes of each kernel.
 
-    A wander may have several forms: each is as probable as not before, beside all others found.
+    A dependence may have several forms: each is as probable as not before, beside all others found.
     """
     found, view = {k.name for k, _ in grown.kernels}, grown.view
 
@@ -145,10 +147,9 @@ def _sizes(p: PlanarProblem, h: Hypothesis, grown: _Grown) -> dict[str, np.ndarr
 
     beside, out = gains(""), {}
     for f, kernel in enumerate(p.kernels):
-        if not kernel.lasting:
-            own = gains(kernel.name)[f] if kernel.name in found else beside[f]
-            logs = np.log(CHANCE) + own
-            out[kernel.name] = np.exp(logs - logsumexp([0.0, *logs]))
+        own = gains(kernel.name)[f] if kernel.name in found else beside[f]
+        logs = np.log(CHANCE) + own
+        out[kernel.name] = np.exp(logs - logsumexp([0.0, *logs]))
     return out
 
 
@@ -169,7 +170,7 @@ def _probability(p: PlanarProblem, h: Hypothesis, each: Sequence[_Grown], word: 
 
 
 def _conditioned(
-    p: PlanarProblem, h: Hypothesis, grown: _Grown, wander: dict[str, np.ndarray]
+    p: PlanarProblem, h: Hypothesis, grown: _Grown, chances: dict[str, np.ndarray]
 ) -> Always:
     """The base's and the effects' numbers and the lasting weights, given the base's own log."""
     size = {k.name: s for k, s in grown.kernels}
@@ -185,13 +186,19 @@ def _conditioned(
     cov = root @ linear.covariance @ root.T
     hidden = Hidden.of(p.columns(h), linear, view.fitter.whiten, root)
     kept = [k for k, n in enumerate(labels) if k < len(h.labels) or n in lasting]
+    unseen = {
+        k.name: Lasting.of(chances[k.name], view.white(f), linear, root)
+        for f, k in enumerate(p.kernels)
+        if k.lasting and k.name not in size and chances[k.name].max() > NEGLIGIBLE
+    }
     return Always(
         effects=h.effects,
         labels=tuple(labels[k] for k in kept),
         mean=mean[kept],
         cov=cov[np.ix_(kept, kept)],
         kernels=tuple((k.name, size[k.name]) for k in there if not k.log_share),
-        wander=wander,
+        wander={k.name: chances[k.name] for k in p.kernels if not k.lasting},
+        lasting={n: replace(of, shift=of.shift[kept]) for n, of in unseen.items()},
         rate=grown.rate,
         usual=p.motion.usual,
         top=p.motion.top,

@@ -10,6 +10,7 @@ import tomlkit
 
 from twinmill.arguments import option
 from twinmill.inference.hidden import Hidden
+from twinmill.inference.lasting import Lasting
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Usual
 from twinmill.inference.prior import Always
@@ -40,6 +41,7 @@ def kept(model_file: ModelFile) -> Always | None:
             cov=low @ low.T,
             kernels=tuple((str(name), float(size)) for name, size in table["kernels"].items()),
             wander={str(name): np.array(p, float) for name, p in table["wander"].items()},
+            lasting={n: _lasting(of, len(low)) for n, of in table.get("lasting", {}).items()},
             rate=Rate(**table["rate"]),
             usual=np.array(table["usual"], float),
             top=np.array(table["top"], float),
@@ -72,6 +74,7 @@ def as_table(always: Always, logs: Sequence[str]) -> dict[str, Any]:
         "effects": list(always.effects),
         "kernels": dict(always.kernels),
         "wander": {name: _short(p) for name, p in always.wander.items()},
+        "lasting": {name: _of_lasting(of) for name, of in always.lasting.items()},
         "rate": {k: _short([getattr(always.rate, k)])[0] for k in ("there", "on", "off")},
         "usual": _short(always.usual),
         "top": _short(always.top),
@@ -92,17 +95,40 @@ def as_table(always: Always, logs: Sequence[str]) -> dict[str, Any]:
 
 def _hidden(table: dict[str, Any], numbers: int) -> Hidden:
     """Effects that the base may have lacked; `numbers` of the base and beside it."""
-    count = len(table["names"])
-    gram = np.zeros((count, count))
-    for k, row in enumerate(table["gram"]):
-        gram[k, : k + 1] = gram[: k + 1, k] = row
     return Hidden(
         tuple(map(str, table["names"])),
         np.array(table["unit"], float),
-        gram,
+        _symmetric(table["gram"]),
         np.array(table["push"], float),
-        np.array(table["shift"], float).reshape(numbers, count),
+        np.array(table["shift"], float).reshape(numbers, len(table["names"])),
     )
+
+
+def _of_lasting(kernel: Lasting) -> dict[str, Any]:
+    return {
+        "chance": _short(kernel.chance),
+        "gram": [_short(row[: k + 1]) for k, row in enumerate(kernel.gram)],
+        "push": _short(kernel.push),
+        "shift": [_short(row) for row in kernel.shift],
+    }
+
+
+def _lasting(table: dict[str, Any], numbers: int) -> Lasting:
+    """A kernel that the base may have; `numbers` of the base and beside it."""
+    return Lasting(
+        np.array(table["chance"], float),
+        _symmetric(table["gram"]),
+        np.array(table["push"], float),
+        np.array(table["shift"], float).reshape(numbers, len(table["push"])),
+    )
+
+
+def _symmetric(rows: Sequence[Sequence[float]]) -> np.ndarray:
+    """(K, K) matrix of its lower triangle."""
+    found = np.zeros((len(rows),) * 2)
+    for k, row in enumerate(rows):
+        found[k, : k + 1] = found[: k + 1, k] = row
+    return found
 
 
 def _short(values: Iterable[float]) -> list[float]:

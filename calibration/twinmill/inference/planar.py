@@ -15,6 +15,7 @@ from twinmill.inference.differ import SPREAD
 from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.duties import refined
 from twinmill.inference.hypothesis import Fitter, Guess, Hypothesis
+from twinmill.inference.lasting import Lasting
 from twinmill.inference.noise import FINEST, Course, Noise, Usual, first_noise
 from twinmill.inference.prior import Always, Prior, base_prior, labels_of, with_always
 from twinmill.inference.problem import Kinds, Missed, Problem, flexible_noise
@@ -83,9 +84,19 @@ class PlanarProblem(Problem):
         """With the numbers that the base's own log gives."""
         if self.always is None or not self.always.hidden.knows(effects):
             return None
-        labels = labels_of(self.prior, self.always, self.kernels)
-        known = np.array([labels.index(n) if n in labels else -1 for n in self.always.labels])
-        return self.always.hidden.explained(h, effects, known)
+        return self.always.hidden.explained(h, effects, self._known(self.always))
+
+    def lasting(self, kernel: str, slopes: np.ndarray) -> tuple[Lasting, np.ndarray] | None:
+        """Numbers that this log has not, such as weights of no use in it, have no slopes."""
+        if self.always is None or kernel not in self.always.lasting:
+            return None
+        known = self._known(self.always)
+        return self.always.lasting[kernel], slopes[known] * (known >= 0)[:, None]
+
+    def _known(self, always: Always) -> np.ndarray:
+        """(N,) places of the own log's numbers among those of this log; -1 where it has them not."""
+        labels = labels_of(self.prior, always, self.kernels)
+        return np.array([labels.index(n) if n in labels else -1 for n in always.labels])
 
     def of_moments(self) -> np.ndarray:
         """Gains of travel and turning, and two pushes, up to each of the bins."""

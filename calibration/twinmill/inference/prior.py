@@ -12,6 +12,7 @@ from twinmill.inference.candidate import FAR, size_std
 from twinmill.inference.discrepancy import Kernel, dependence_of
 from twinmill.inference.duties import TABLE, refined
 from twinmill.inference.hidden import Hidden
+from twinmill.inference.lasting import Lasting
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Usual
 from twinmill.inference.settings import PRIORS
@@ -52,6 +53,7 @@ class Always:
         kernels: name and size of each kernel of the discrepancy.
         wander: probabilities of each of SIZES, by kernel whose function holds for one log alone;
             what is left of one is the probability of none.
+        lasting: kernels whose function holds for every log, and which its own does not ask for.
         rate: of moments.
         usual, top: scale of the kernels, see `Motion`.
         noise: as it may be in another log.
@@ -64,6 +66,7 @@ class Always:
     cov: np.ndarray
     kernels: tuple[tuple[str, float], ...]
     wander: dict[str, np.ndarray]
+    lasting: dict[str, Lasting]
     rate: Rate
     usual: np.ndarray
     top: np.ndarray

@@ -17,6 +17,7 @@ from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import Kernel
 from twinmill.inference.evidence import Bank, Linear
 from twinmill.inference.hypothesis import Fitter, Hypothesis
+from twinmill.inference.lasting import Lasting
 from twinmill.inference.moments import Rate
 from twinmill.inference.noise import Noise, Usual, fit_noise, weights_of
 from twinmill.inference.prior import Prior
@@ -163,6 +164,20 @@ class Problem(ABC):
         """A hypothesis some of whose effects the base always lacked, and their Bayes factor.
 
         None where no log that the base was fitted to tells of them.
+        """
+        return None
+
+    def lasting(self, kernel: str, slopes: np.ndarray) -> tuple[Lasting, np.ndarray] | None:
+        """Evidence of the base's own log on a kernel of this name that was not found in it.
+
+        None where there is none.
+
+        Args:
+            kernel: its name.
+            slopes: (N, R) white ones of a hypothesis' numbers.
+
+        Returns:
+            That, and (N', R) the slopes of the numbers that the own log had.
         """
         return None
 

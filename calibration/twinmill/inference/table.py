@@ -582,21 +582,41 @@ class _Comparison:
     def _with_words(self, beside: _Beside, own: Evidence) -> list[Entry]:
         """Entries with each dependence that is not beside already.
 
-        As far as the robot wanders with time or place by itself it is no news.
+        As far as the base may always have had it, it is no news.
         """
-        out, usual = [], self.problem.wander
+        out = []
         for word in self.words:
             if word not in (MOMENTS, *beside.words):
                 at = [k for k, kernel in enumerate(self.view.kernels) if kernel.depends_on == word]
-                names = [self.view.kernels[k].name for k in at]
-                of_each = {beside.words: [usual.get(name, 0 * CHANCE) for name in names],
-                           (*beside.words, word): [CHANCE / len(at)] * len(at)}  # fmt: skip
-                for words, chance in of_each.items():
-                    if np.any(chance):
-                        out.append(
-                            self._with_word(beside, own, at, chance=np.array(chance), words=words)
-                        )
+                usual = np.array([self._as_always(own, k) for k in at])
+                new = own.gains[at] + np.log(CHANCE / len(at))
+                for words, likely in ((beside.words, usual), ((*beside.words, word), new)):
+                    if np.isfinite(likely).any():
+                        out.append(self._with_word(beside, own, at, likely=likely, words=words))
         return out
+
+    def _as_always(self, own: Evidence, f: int) -> np.ndarray:
+        """(S,) log odds of a kernel that the base always had with each size, over none.
+
+        One that gains nothing as news explains nothing.
+        """
+        name, white = self.view.kernels[f].name, self.view.white(f)
+        chance, gains = self.problem.wander.get(name, 0 * CHANCE), own.gains[f]
+        if gains.max() > 0 and (told := self.problem.lasting(name, self._slopes)):
+            lasting, slopes = told
+            columns = lasting.columns(white, slopes)
+            columns = columns - columns @ own.span.T @ own.span
+            chance, gains = lasting.chance, lasting.gains(own.linear, columns)
+        with np.errstate(divide="ignore"):
+            return gains + np.log(chance)
+
+    @cached_property
+    def _slopes(self) -> np.ndarray:
+        """(N, R) white slopes of all numbers."""
+        named, fitter = self.h.named, self.view.fitter
+        found = np.empty((len(named), self._rows.shape[1]))
+        found[named], found[~named] = self._rows[: named.sum()], fitter.always
+        return found
 
     def _of_noise(self, beside: _Beside) -> list[Entry]:
         """An entry in which the noise itself is a thing that comes and goes, and new."""
@@ -624,11 +644,10 @@ class _Comparison:
         own: Evidence,
         at: list[int],
         *,
-        chance: np.ndarray,
+        likely: np.ndarray,
         words: tuple[str, ...],
     ) -> Entry:
-        """With a dependence, told in these words, whose kernels have (F, S) chances of sizes."""
-        likely = own.gains[at] + np.log(np.maximum(chance, 1e-300))
+        """With a dependence, told in these words, whose kernels have (F, S) log odds by size."""
         total = float(np.logaddexp.reduce(likely, axis=None))
         mimicked: np.ndarray | float = beside.log_relative if beside.words else -np.inf
         if words and not beside.words:

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag, toeplitz
 from scipy.special import logsumexp
 from scipy.stats import expon, multivariate_normal, norm
 
-from twinmill.inference import formal, hidden, moments
+from twinmill.inference import formal, hidden, lasting, moments
 from twinmill.inference.answer import Named, verdict_of
 from twinmill.inference.candidate import Candidate
 from twinmill.inference.discrepancy import (
@@ -301,6 +301,31 @@ def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_log
     fitter = SimpleNamespace(whiten=flat, always=none, gram_always=none @ none.T)
     there, new = (each.log_evidence(each.linear(fitter)) for each in (always, h))
     assert there + log_factor - new == pytest.approx(joint(True) - joint(False), abs=1e-5)
+
+
+def test_a_dependence_that_was_always_there_is_told_by_the_joint_evidence_of_both_logs(monkeypatch):
+    """Two logs share a base and the weights of a kernel; the gain is that in the later log alone."""
+    monkeypatch.setattr(lasting, "PRIORS", replace(PRIORS, sheet=0.0))
+    random = np.random.default_rng(12)
+    own, later = random.normal(size=(5, 30)), random.normal(size=(5, 40))  # three of the base
+    own[3:] *= 3
+    truth = np.array([0.3, -1.0, 0.5, 0.2, -0.3])
+    y_own, y_later = (truth @ x + random.normal(size=x.shape[1]) for x in (own, later))
+
+    def log_density(y, x, size):
+        scaled = x * np.r_[np.ones(3), np.full(2, size)][:, None]
+        return multivariate_normal(cov=scaled.T @ scaled + np.eye(len(y))).logpdf(y)
+
+    def of_later(size):
+        both = np.r_[y_own, y_later], np.concatenate([own, later], axis=1)
+        return log_density(*both, size) - log_density(y_own, own, size)
+
+    base = Linear.of(y_own, own[:3])
+    told = lasting.Lasting.of(np.ones(4), own[3:], base, np.eye(3))
+    root = np.linalg.cholesky(base.covariance)
+    known = Linear.of(y_later - base.mean @ later[:3], root.T @ later[:3])
+    found = told.gains(known, told.columns(later[3:], later[:3]))
+    assert found == pytest.approx([of_later(size) - of_later(0.0) for size in SIZES])
 
 
 OF_TIME = ("battery_sag", "heat_gain", "abrupt_loss", "transient_loss")
