@@ -226,21 +226,26 @@ class Fitter:
                 slopes = self._slopes(replace(h, value=value), kept)
             take(np.flatnonzero(h.named & fresh), slopes)
             curved = gram + precision
-            pull = white @ self.whiten(errors) - precision @ (value - h.mean)
-            fell = 0.0
-            for _ in range(TRIES):
-                step = np.linalg.solve(curved + damping * np.diag(np.diag(curved)), pull)
-                trial = np.clip(value + step, h.low, h.high)
-                then, cost_then = self._cost(h, trial, precision)
-                if cost_then < cost:
-                    fell = cost - cost_then
-                    value, errors, cost, damping = trial, then, cost_then, damping / 10
+            stays = True
+            for _ in range(ROUNDS):  # with these slopes, which cost most
+                pull = white @ self.whiten(errors) - precision @ (value - h.mean)
+                if 0.5 * pull @ np.linalg.solve(curved, pull) < SETTLED:
                     break
-                damping *= 10
-            if fell > 0:
-                slopes = None
-            if fell < SETTLED:
+                fell = 0.0
+                for _ in range(TRIES):
+                    step = np.linalg.solve(curved + damping * np.diag(np.diag(curved)), pull)
+                    trial = np.clip(value + step, h.low, h.high)
+                    then, cost_then = self._cost(h, trial, precision)
+                    if cost_then < cost:
+                        fell, stays = cost - cost_then, False
+                        value, errors, cost, damping = trial, then, cost_then, damping / 10
+                        break
+                    damping *= 10
+                if fell < SETTLED:
+                    break
+            if stays:
                 break
+            slopes = None
         return self.at(replace(h, value=value), errors, kept if slopes is None else slopes)
 
     def at(
