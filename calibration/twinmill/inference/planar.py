@@ -94,7 +94,7 @@ class PlanarProblem(Problem):
         return self.always.lasting[kernel], slopes[known] * (known >= 0)[:, None]
 
     def _known(self, always: Always) -> np.ndarray:
-        """(N,) places of the own log's numbers among those of this log; -1 where it has them not."""
+        """(N,) places of the own log's numbers among those of this log; -1 where it has none."""
         labels = labels_of(self.prior, always, self.kernels)
         return np.array([labels.index(n) if n in labels else -1 for n in always.labels])
 

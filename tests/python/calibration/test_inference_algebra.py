@@ -304,7 +304,7 @@ def test_always_there_against_new_is_the_ratio_of_the_joint_evidence_of_both_log
 
 
 def test_a_dependence_that_was_always_there_is_told_by_the_joint_evidence_of_both_logs(monkeypatch):
-    """Two logs share a base and the weights of a kernel; the gain is that in the later log alone."""
+    """Two logs share a base and the weights of a kernel; the gain is that in the later log."""
     monkeypatch.setattr(lasting, "PRIORS", replace(PRIORS, sheet=0.0))
     random = np.random.default_rng(12)
     own, later = random.normal(size=(5, 30)), random.normal(size=(5, 40))  # three of the base
