@@ -5,6 +5,9 @@ PYTHON := .venv/bin/python
 # One more test than there are cores: many wait for a robot's program most of the time.
 CTEST := ctest --test-dir build --output-on-failure --no-tests=error \
 	    --parallel $(shell expr $$(nproc) + 1)
+# At the very end, what failed: ctest prints that where it happens, far above.
+FORGET_FAILED := rm -f build/Testing/Temporary/LastTestsFailed.log
+SHOW_FAILED := { status=$$?; scripts/show_failed; exit $$status; }
 
 .PHONY: bench build check check-long clean demo docs format lint paper rivals tests wheel \
     wheel-aarch64
@@ -28,11 +31,11 @@ tests:
 
 # All tests in C, C++ and Python, and the lint.
 check: tests
-	@$(CTEST) --label-exclude '^long$$'
+	@$(FORGET_FAILED); $(CTEST) --label-exclude '^long$$' || $(SHOW_FAILED)
 
 # What takes minutes and seldom fails: the emulated robot with a newer kernel and a whole system.
 check-long: tests
-	@$(CTEST) --label-regex '^long$$'
+	@$(FORGET_FAILED); $(CTEST) --label-regex '^long$$' || $(SHOW_FAILED)
 
 # What was published of these swarms, part by part, checked, with figures. Most of it is MuJoCo's: with
 # 20 seeds a cell an hour of two cores. It goes on where it was; MUJOCO_SEEDS=0 leaves it out.

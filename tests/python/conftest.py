@@ -18,17 +18,25 @@ import pytest
 import turbopi
 import twinmill_native as native
 
+from twinmill import api
 from twinmill.data.importers.import_log import ImportOptions, import_log
 from twinmill.data.log import RobotLog
-from twinmill.diagnosis import diagnose
+from twinmill.diagnosis import diagnose, infer
+from twinmill.experiment import design
+from twinmill.inference import always
 from twinmill.robots.key import load_or_make
 from twinmill_cli import ending, main
 
 sys.path.insert(0, str(Path(__file__).parent))
-from asked_once import AskedOnce
+from asked_once import AlwaysOnce, AskedOnce, DesignedOnce
 from same_robot import make_days
 
-JUDGES = {name: AskedOnce(getattr(diagnose, name)) for name in ("infer", "judge_fleet")}
+ALWAYS, DESIGN = AlwaysOnce(), DesignedOnce()
+ONCE = (
+    *((diagnose, name, AskedOnce(getattr(diagnose, name))) for name in ("infer", "judge_fleet")),
+    *((module, "always_of", ALWAYS) for module in (always, infer)),
+    *((module, "design", DESIGN) for module in (design, api)),
+)
 
 NOISE = """
 [noise]
@@ -173,8 +181,8 @@ def own_ctrl_c():
 def asked_once() -> Iterator[None]:
     """Diagnoses of the same logs by the same model are made once, for all modules that use this."""
     with pytest.MonkeyPatch.context() as patch:
-        for name, judge in JUDGES.items():
-            patch.setattr(diagnose, name, judge)
+        for module, name, once in ONCE:
+            patch.setattr(module, name, once)
         yield
 
 

@@ -25,6 +25,7 @@ from twinmill_lab.claims import (
     prediction,
     process,
     rows,
+    swarms,
 )
 from twinmill_lab.claims.actuation import _spread_interval, actuation
 from twinmill_lab.claims.claims import CLAIMS
@@ -34,17 +35,31 @@ SEEDS = 100
 
 
 @pytest.fixture(scope="module", autouse=True)
-def published_once():
-    """Published equations depend on their arguments alone: each result is computed once."""
+def computed_once():
+    """Published equations and swarms depend on their arguments alone: each is computed once."""
     run_anew = claims.Points.run
     run_once = cache(run_anew)
+    parts_anew, part_anew, known = swarms.run_here, fidelity.run_part, {}
 
     def run_points(points, *args, **more):
         many = np.ndim(points.v_mps)  # arrays cannot be looked up
         return (run_anew if many else run_once)(points, *args, **more)
 
+    def run_parts(request, parts, workers):
+        if request.sha256 not in known:
+            known[request.sha256] = dict(parts_anew(request, parts, workers))
+        return known[request.sha256].items()
+
+    def run_part(request, worlds):
+        key = request.sha256, worlds
+        if key not in known:
+            known[key] = part_anew(request, worlds)
+        return known[key]
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(claims.Points, "run", run_points)
+        patch.setattr(swarms, "run_here", run_parts)
+        patch.setattr(fidelity, "run_part", run_part)
         yield
 
 
@@ -175,8 +190,8 @@ def test_what_is_added_comes_nearer_to_the_robot_and_then_to_its_swarms():
 
 def test_true_robots_agree_with_themselves_as_samples_of_one_distribution_do(tmp_path):
     """Against NumPy's multinomial with the shares of both samples together."""
-    model = tmp_path / "m.toml"
-    model.write_text(ModelFile.load("turbopi.toml").text)
+    model = tmp_path / "truth.toml"  # named and made as there, whose runs are these
+    model.write_text(ModelFile.load("turbopi.toml").text + fidelity.COASTING)
     a, b = (fidelity._shares(model, first) for first in (1, 100_001))
     random, expected = np.random.default_rng(1), []
     for x, y in zip(a, b, strict=True):
@@ -187,7 +202,13 @@ def test_true_robots_agree_with_themselves_as_samples_of_one_distribution_do(tmp
     assert abs(ours - sums.mean()) < 3.5 * sums.std()
 
 
-def test_the_four_steps_run_as_typed_and_find_what_was_planted():
+def test_the_four_steps_run_as_typed_and_find_what_was_planted(monkeypatch):
+    """Of the last step a part: fewer models are drawn, and fewer runs made in MuJoCo."""
+    *others, (last, (predict, score)) = process.STEPS.items()
+    whole, part = "--cells 6 --repeats 2 --draws 20", "--cells 3 --repeats 1 --draws 5"
+    assert whole in predict
+    steps = {**dict(others), last: [predict.replace(whole, part), score]}
+    monkeypatch.setattr(process, "STEPS", steps)
     claim = process.process(0)
     assert claim.agrees and claim.count == (1, 1)
     assert [title for title, _ in claim.transcript] == list(process.STEPS)

@@ -122,11 +122,13 @@ def _run(action: Action, mjcf: Mjcf, part: slice, own: np.ndarray) -> tuple[Any,
     lead = stiff * lead_q + damping * lead_v
     data.qpos[:], data.qvel[:] = lead_q[0], lead_v[0]
     q, v, pull = np.empty_like(lead_q), np.empty_like(lead_v), np.empty_like(lead_q)
+    # Views, made once: making them takes as long as a step of a small robot.
+    now_q, now_v, told, pushed = data.qpos, data.qvel, data.ctrl, data.qfrc_applied
     for k in range(len(t_s)):
-        q[k], v[k] = data.qpos, data.qvel
-        data.ctrl[:] = ctrl[k]
-        pull[k] = lead[k] - stiff * q[k] - damping * v[k]
-        data.qfrc_applied[:] = pull[k] + force[k]
+        q[k], v[k] = now_q, now_v
+        told[:] = ctrl[k]
+        pull[k] = lead[k] - stiff * now_q - damping * now_v
+        np.add(pull[k], force[k], out=pushed)
         mujoco.mj_step(model, data)
     return CubicHermiteSpline(t_s, q, v), make_interp_spline(t_s, pull, k=1)
 

@@ -95,6 +95,7 @@ def test_motions_within_limits_keep_them_when_mujoco_runs_them(tmp_path, kind, m
 def test_speeds_that_the_log_lacks_part_forms_of_friction(tmp_path, monkeypatch):
     """At one speed its forms are the same; algebra: c v and c v |v| are told by two speeds."""
     told: list[str] = []
+    monkeypatch.setattr(design, "TRIED", 16)
     monkeypatch.setattr(design, "time", SimpleNamespace(monotonic=lambda: 2.0 * motions(told)))
     path = carriage(tmp_path, more='forcerange="-60 60" ctrlrange="-60 60"')
     log = recorded(path, slow(), push=lambda v: -8 * v)
@@ -105,7 +106,7 @@ def test_speeds_that_the_log_lacks_part_forms_of_friction(tmp_path, monkeypatch)
         wanted = np.interp(T_S, found.log.t_s, found.log.qpos[:, 0])
         again = recorded(path, wanted, push=lambda v: -8 * v)
         after = diagnose_joints([log, again], path).answer
-    assert "motion 21 of 40, 40 s left" in told  # 20 more of 2 s each
+    assert "motion 9 of 16, 16 s left" in told  # 8 more of 2 s each
     assert any("viscous_friction@x" in pair for pair in found.odds)
     assert max(found.odds.values()) > max(found.before.values())
     assert after.findings[0].effect == "viscous_friction@x"

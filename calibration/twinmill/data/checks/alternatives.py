@@ -34,6 +34,7 @@ TWIST_LEVER_M = 0.2  # where there are no wheels
 ONE_FLIP = ((-1, -1, -1, -1), (-1, 1, -1, 1), (1, -1, 1, -1))  # all, the left, the right wheels
 POSE_SIGNS = ((1, False), (-1, True), (-1, False), (1, True))  # of headings; mirrored
 TRIED = 4  # lags and shifts
+TOGETHER = 32  # shifts whose sums are compared at once: all of them would be large
 LATES_S = np.arange(EARLY_S, LATE_S + STEP_S / 2, STEP_S)
 NEAR_S = np.arange(-0.06, 0.061, 0.03)  # about a shift that was found
 
@@ -528,18 +529,24 @@ def _left_by_first(
     power, along, total = sums
     left = np.cumsum(total)[counts - 1]
     halves = np.arange(2) == fold[:, None]  # (B, 2)
-    split, channel = np.ogrid[: len(counts), : power.shape[3]]
     found = np.empty((len(power), len(counts)))
-    for at_shift, *both in zip(found, power, along, strict=True):  # all at once would be large
+    for some in np.array_split(np.arange(len(power)), len(power) // TOGETHER + 1):
         (p, other_p), (m, other_m) = (
-            np.cumsum(s[None] * halves.T[:, :, None, None], axis=1)[:, counts - 1] for s in both
+            np.moveaxis(
+                np.cumsum(s[some, None] * halves.T[:, :, None, None], axis=2)[:, :, counts - 1],
+                1,
+                0,
+            )
+            for s in (power, along)
         )
-        at_shift[:] = left
+        found[some] = left
         for here_p, here_m, of_p, of_m in ((p, m, other_p, other_m), (other_p, other_m, p, m)):
             gain = np.maximum(of_m, 0) / np.maximum(of_p, 1e-12)
-            shape = np.argmax(gain * of_m, axis=1)  # (K, C)
-            best, own_p, own_m = (v[split, shape, channel] for v in (gain, here_p, here_m))
-            at_shift += (best**2 * own_p - 2 * best * own_m).sum(axis=1)
+            shape = np.argmax(gain * of_m, axis=2)[:, :, None]  # (A, K, 1, C)
+            best, own_p, own_m = (
+                np.take_along_axis(v, shape, axis=2)[:, :, 0] for v in (gain, here_p, here_m)
+            )
+            found[some] += (best**2 * own_p - 2 * best * own_m).sum(axis=2)
     return found
 
 
