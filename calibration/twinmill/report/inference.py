@@ -14,7 +14,7 @@ from rich.text import Text
 from twinmill.arguments import option
 from twinmill.diagnosis.infer import Inference
 from twinmill.fitting.compare import LACKING
-from twinmill.inference.answer import LIKELY, Answer, Named, units_of
+from twinmill.inference.answer import LIKELY, PASSES, Answer, Named, units_of
 from twinmill.inference.settings import PRIORS
 from twinmill.listing import listed
 from twinmill.model.parameters import catalogue
@@ -62,7 +62,10 @@ def sentence(answer: Answer, nothing: str = NOTHING) -> str:
 
 def sentence_on(result: Inference) -> str:
     """The sentence on one robot or on tables: what its own log shows, too, is nothing new."""
-    return sentence(result.answer, "Nothing new is missing" if _no_news(result) else NOTHING)
+    told = sentence(result.answer, "Nothing new is missing" if _no_news(result) else NOTHING)
+    if result.answer.verdict in PASSES and result.always and (lacked := result.always.effects):
+        return f"{told} It always lacked {listed(lacked)}, which `explain` writes."
+    return told
 
 
 def _verdict(answer: Answer, nothing: str) -> str:

@@ -27,6 +27,7 @@ from twinmill.inference.robots import shared
 from twinmill.inference.screening import nearby, screened
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile
+from twinmill.report.inference import sentence_on
 
 from .conftest import STEP_S
 
@@ -312,6 +313,8 @@ def test_what_the_base_misses_in_its_own_log_is_no_news(
     assert news.answer.nothing < 1e-6
     assert known.answer.nothing > 1e3 * news.answer.nothing
     assert not [f for f in known.answer.findings if f.certainty == "sure"]
+    adequate = replace(known, answer=replace(known.answer, verdict="model_adequate"))
+    assert "always lacked" in sentence_on(adequate) and "yaw_lever" in sentence_on(adequate)
 
 
 def test_a_speed_that_the_fit_hardly_told_leaves_a_covariance(one_clock_base, measure, tmp_path):
