@@ -224,7 +224,8 @@ class Log(Shown):
                 right (of every axle), three are omni wheels, four are front left, front right,
                 rear left, rear right. `steering`: vx_mps, steering_rad.
             kind: of the commands.
-            same_clock: one clock stamped poses and commands; False: their offset is fitted.
+            same_clock: one clock stamped poses and commands; False: their offset is fitted, but
+                where the model's file has it from another log (`[clock]`).
             robot_id: 0 to 99.
             wheelbase_m: distance of the axles, for `steering`.
             name: of the log in tables and sentences.
@@ -273,7 +274,8 @@ class Log(Shown):
                 right_radps (or w1_radps, w2_radps) of two; or vx_mps, steering_rad; robot_id as
                 in poses.
             kind: which group; by default the one that is there.
-            same_clock: one clock stamped poses and commands; False: their offset is fitted.
+            same_clock: one clock stamped poses and commands; False: their offset is fitted, but
+                where the model's file has it from another log (`[clock]`).
             robot_id: of frames that do not say.
             wheelbase_m: distance of the axles, for steering angles.
             name: of the log in tables and sentences.
