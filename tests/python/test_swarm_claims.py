@@ -203,7 +203,7 @@ def test_true_robots_agree_with_themselves_as_samples_of_one_distribution_do(tmp
 
 
 def test_the_four_steps_run_as_typed_and_find_what_was_planted(monkeypatch):
-    """Of the last step a part: fewer models are drawn, and fewer runs made in MuJoCo."""
+    """The last step in part: fewer models are drawn, and fewer runs made in MuJoCo."""
     *others, (last, (predict, score)) = process.STEPS.items()
     whole, part = "--cells 6 --repeats 2 --draws 20", "--cells 3 --repeats 1 --draws 5"
     assert whole in predict

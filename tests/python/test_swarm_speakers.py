@@ -147,7 +147,7 @@ def test_a_robot_that_changed_its_address_is_no_second_one(air, clock):
 
 
 def test_a_relay_that_ended_is_no_second_robot(air, clock):
-    """What signs nothing is known as one by the same bytes from both."""
+    """Two addresses that sign nothing are known as one by the same bytes from both."""
     fleet, speak, _ = air
     for order in ((CLONE, ROBOT), (ROBOT, CLONE)):  # the relay's copy may come first
         said = turbopi.telemetry_t()

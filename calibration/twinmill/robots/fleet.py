@@ -288,7 +288,7 @@ class Robot:
 
     @property
     def lost(self) -> list["Robot"]:
-        """Of several that speak as it, those that fell silent and may drive."""
+        """Those of several speakers that fell silent and may drive."""
         named = {self._who(who): speaker for who, speaker in self.speakers.items()}
         known = [self.speakers.get(who, speaker) for who, speaker in named.items()]
         alive = [s for s in known if not any(other.is_anew(s) for other in known)]
@@ -1138,7 +1138,7 @@ class Fleet:
 
     @property
     def stays_here(self) -> bool:
-        """What is said from here is heard by programs of this computer alone."""
+        """Packets from here reach programs of this computer alone."""
         return getattr(self.bus, "ttl", 1) == 0
 
     def reach_anew(self) -> None:
