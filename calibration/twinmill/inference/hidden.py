@@ -62,9 +62,7 @@ class Hidden:
                 unit += [PRIORS.size * (p.value - p.usual) for p in own]
                 white.append(PRIORS.size * whiten(c.columns))
         stacked = np.concatenate(white)
-        gram, push = linear.projected(stacked, stacked @ stacked.T)
-        shift = -root @ linear.covariance @ (linear.x @ stacked.T)
-        return cls(tuple(names), np.array(unit), gram, push, shift)
+        return cls(tuple(names), np.array(unit), *told_beside(linear, stacked, root))
 
     def knows(self, effects: Sequence[str]) -> bool:
         """True if the own log tells of all of these; of a second of a kind it does not."""
@@ -93,6 +91,24 @@ class Hidden:
         told = replace(h, mean=h.mean + slope @ (mean * unit), cov=rest + slope @ cov @ slope.T)
         within = h.log_share(told.mean, told.cov) - h.log_share(h.mean, h.cov)
         return told, log_factor + within
+
+
+def told_beside(
+    linear: Linear, white: np.ndarray, root: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Evidence of a log on columns beside a model, once its N numbers have taken their part.
+
+    Args:
+        linear: the model.
+        white: (K, R) the columns.
+        root: (N, N) Cholesky factor of the prior of its numbers.
+
+    Returns:
+        (K, K), (K,) products of the columns, and with what is left; (N, K) change of the numbers
+        with a unit of each column.
+    """
+    gram, push = linear.projected(white, white @ white.T)
+    return gram, push, -root @ linear.covariance @ (linear.x @ white.T)
 
 
 def _place(h: Any, name: str) -> int:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A hypothesis: a base model with some effects, fitted, and linear about its best numbers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ SETTLED = 0.1  # units of the log posterior: less decides nothing
 LIMIT_SPREAD = 0.5  # prior of a limit about its start on the grid, relative: twice the grid's step
 LIMIT_STEP = 0.02  # of finite differences in a limit, relative: what it cuts off bends with it
 NO_SLOPES = np.zeros((0, 1, 1))
+CostAt = Callable[[np.ndarray], tuple[np.ndarray, float]]
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,35 @@ def next_of_kind(effects: tuple[str, ...], name: str) -> str:
 
 
 @dataclass(frozen=True)
+class _Point:
+    """Numbers (N,) that a fit has come to, its (W, 3) errors, cost, and damping of the next step."""
+
+    value: np.ndarray
+    errors: np.ndarray
+    cost: float
+    damping: float
+
+
+def _stepped(h: Guess, at: _Point, pull: np.ndarray, curved: np.ndarray, cost_at: CostAt) -> _Point:
+    """After a step of Levenberg and Marquardt, damped until it is likelier there, if it is.
+
+    Args:
+        h: for its bounds.
+        at: where the step begins.
+        pull, curved: (N,), (N, N) gradient and curvature of the log posterior there.
+        cost_at: errors and cost at some numbers.
+    """
+    for _ in range(TRIES):
+        step = np.linalg.solve(curved + at.damping * np.diag(np.diag(curved)), pull)
+        value = np.clip(at.value + step, h.low, h.high)
+        errors, cost = cost_at(value)
+        if cost < at.cost:
+            return _Point(value, errors, cost, at.damping / 10)
+        at = replace(at, damping=10 * at.damping)
+    return at
+
+
+@dataclass(frozen=True)
 class Fitter:
     """Fits hypotheses to the steps of a log under a noise.
 
@@ -206,9 +237,9 @@ class Fitter:
             known: (N, W, 3) all slopes at its numbers, where they are known.
         """
         precision = np.linalg.inv(h.cov)
-        value, damping = np.clip(h.value, h.low, h.high), 1e-3
-        errors, cost = self._cost(h, value, precision)
-        count = len(value)
+        cost_at = partial(self._cost, h, precision=precision)
+        value = np.clip(h.value, h.low, h.high)
+        at, count = _Point(value, *cost_at(value), damping=1e-3), len(value)
         white, gram = np.zeros((count, self.always.shape[1])), np.zeros((count, count))
         white[~h.named], gram[np.ix_(~h.named, ~h.named)] = self.always, self.gram_always
         fresh = np.arange(count) >= len(kept)
@@ -223,30 +254,20 @@ class Fitter:
         slopes = known
         for _ in range(rounds):
             if slopes is None:
-                slopes = self._slopes(replace(h, value=value), kept)
+                slopes = self._slopes(replace(h, value=at.value), kept)
             take(np.flatnonzero(h.named & fresh), slopes)
-            curved = gram + precision
-            stays = True
+            curved, cost = gram + precision, at.cost
             for _ in range(ROUNDS):  # with these slopes, which cost most
-                pull = white @ self.whiten(errors) - precision @ (value - h.mean)
+                pull = white @ self.whiten(at.errors) - precision @ (at.value - h.mean)
                 if 0.5 * pull @ np.linalg.solve(curved, pull) < SETTLED:
                     break
-                fell = 0.0
-                for _ in range(TRIES):
-                    step = np.linalg.solve(curved + damping * np.diag(np.diag(curved)), pull)
-                    trial = np.clip(value + step, h.low, h.high)
-                    then, cost_then = self._cost(h, trial, precision)
-                    if cost_then < cost:
-                        fell, stays = cost - cost_then, False
-                        value, errors, cost, damping = trial, then, cost_then, damping / 10
-                        break
-                    damping *= 10
-                if fell < SETTLED:
+                before, at = at, _stepped(h, at, pull, curved, cost_at)
+                if before.cost - at.cost < SETTLED:
                     break
-            if stays:
+            if at.cost == cost:
                 break
             slopes = None
-        return self.at(replace(h, value=value), errors, kept if slopes is None else slopes)
+        return self.at(replace(h, value=at.value), at.errors, kept if slopes is None else slopes)
 
     def at(
         self, h: Guess, errors: np.ndarray | None = None, kept: np.ndarray = NO_SLOPES

@@ -82,11 +82,11 @@ def as_table(always: Always, logs: Sequence[str]) -> dict[str, Any]:
         "noise_cov": [[_short(row) for row in cov] for cov in always.noise.cov],
         "labels": list(always.labels),
         "mean": _short(always.mean),
-        "cholesky": [_short(row[: k + 1]) for k, row in enumerate(low)],
+        "cholesky": _lower(low),
         "hidden": {
             "names": list(always.hidden.names),
             "unit": _short(always.hidden.unit),
-            "gram": [_short(row[: k + 1]) for k, row in enumerate(always.hidden.gram)],
+            "gram": _lower(always.hidden.gram),
             "push": _short(always.hidden.push),
             "shift": [_short(row) for row in always.hidden.shift],
         },
@@ -107,7 +107,7 @@ def _hidden(table: dict[str, Any], numbers: int) -> Hidden:
 def _of_lasting(kernel: Lasting) -> dict[str, Any]:
     return {
         "chance": _short(kernel.chance),
-        "gram": [_short(row[: k + 1]) for k, row in enumerate(kernel.gram)],
+        "gram": _lower(kernel.gram),
         "push": _short(kernel.push),
         "shift": [_short(row) for row in kernel.shift],
     }
@@ -121,6 +121,11 @@ def _lasting(table: dict[str, Any], numbers: int) -> Lasting:
         np.array(table["push"], float),
         np.array(table["shift"], float).reshape(numbers, len(table["push"])),
     )
+
+
+def _lower(matrix: np.ndarray) -> list[list[float]]:
+    """Rows of a matrix's lower triangle."""
+    return [_short(row[: k + 1]) for k, row in enumerate(matrix)]
 
 
 def _symmetric(rows: Sequence[Sequence[float]]) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from twinmill.inference.discrepancy import SIZES
 from twinmill.inference.evidence import Linear
+from twinmill.inference.hidden import told_beside
 from twinmill.inference.settings import PRIORS
 
 
@@ -44,8 +45,7 @@ class Lasting:
             linear: the base's model with all that was found, N numbers.
             root: (N, N) Cholesky factor of the prior of these.
         """
-        gram, push = linear.projected(white, white @ white.T)
-        return cls(chance, gram, push, -root @ linear.covariance @ (linear.x @ white.T))
+        return cls(chance, *told_beside(linear, white, root))
 
     def columns(self, white: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """(K, R) white columns of a later log, with what the base's numbers change beside them.
