@@ -109,7 +109,7 @@ def facts(comparison: Comparison, robot: RobotComparison) -> list[tuple[str, str
         ("model", comparison.model_name),
         ("noise", _noise(noise, track.has_heading, wrong=robot.score > GOOD)),
         ("noise floor", robot.floor.reason or _floor(robot.floor)),
-        ("residuals", _whiteness(robot.whiteness)),
+        *_whiteness(robot.whiteness),
         ("clocks", _clocks(robot)),
         *_held_heading(robot),
         *_wheel_angles(robot),
@@ -201,12 +201,14 @@ def _floor(floor: NoiseFloor) -> str:
     return f"{of_best}; 95 of 100 right models score {low:.2f} to {high:.2f} in such a log"
 
 
-def _whiteness(p_value: float) -> str:
-    """Result of the test of whiteness, in words."""
+def _whiteness(p_value: float) -> list[tuple[str, str]]:
+    """Result of the test of whiteness, in words; none where the log gives no floor."""
+    if np.isnan(p_value):
+        return []
     tested = f"(correlations of errors against those in draws of the noise: p = {p_value:.2f})"
     if p_value < NOT_WHITE:
-        return f"not white {tested}: the noise alone does not explain them"
-    return f"white {tested}: what the model leaves looks like noise"
+        return [("residuals", f"not white {tested}: the noise alone does not explain them")]
+    return [("residuals", f"white {tested}: what the model leaves looks like noise")]
 
 
 def robots(result: Comparison, before: Comparison | None = None) -> list[Table]:
