@@ -166,7 +166,7 @@ def next_of_kind(effects: tuple[str, ...], name: str) -> str:
 
 @dataclass(frozen=True)
 class _Point:
-    """Numbers (N,) that a fit has come to, its (W, 3) errors, cost, and damping of the next step."""
+    """Numbers (N,) that a fit has come to, (W, 3) errors, cost, and damping of the next step."""
 
     value: np.ndarray
     errors: np.ndarray
@@ -174,13 +174,16 @@ class _Point:
     damping: float
 
 
-def _stepped(h: Guess, at: _Point, pull: np.ndarray, curved: np.ndarray, cost_at: CostAt) -> _Point:
+def _stepped(
+    h: Guess, at: _Point, *, pull: np.ndarray, curved: np.ndarray, cost_at: CostAt
+) -> _Point:
     """After a step of Levenberg and Marquardt, damped until it is likelier there, if it is.
 
     Args:
         h: for its bounds.
         at: where the step begins.
-        pull, curved: (N,), (N, N) gradient and curvature of the log posterior there.
+        pull: (N,) gradient of the log posterior there.
+        curved: (N, N) its curvature.
         cost_at: errors and cost at some numbers.
     """
     for _ in range(TRIES):
@@ -261,7 +264,7 @@ class Fitter:
                 pull = white @ self.whiten(at.errors) - precision @ (at.value - h.mean)
                 if 0.5 * pull @ np.linalg.solve(curved, pull) < SETTLED:
                     break
-                before, at = at, _stepped(h, at, pull, curved, cost_at)
+                before, at = at, _stepped(h, at, pull=pull, curved=curved, cost_at=cost_at)
                 if before.cost - at.cost < SETTLED:
                     break
             if at.cost == cost:
