@@ -21,6 +21,7 @@ from twinmill.fitting.compare import comparison
 from twinmill.fitting.fit import fit
 from twinmill.fitting.opening import open_measurements
 from twinmill.inference.always import always_of
+from twinmill.inference.keeping import with_its_error
 from twinmill.inference.kept import as_table, kept, with_kept
 from twinmill.inference.planar import problem_of
 from twinmill.inference.robots import shared
@@ -406,6 +407,23 @@ def test_logs_whose_clocks_were_set_anew_are_judged_together(
     found = infer(runs, base)
     assert not [f for f in found.answer.findings if f.certainty == "sure"]
     assert found.answer.nothing > 1 - SURE
+
+
+def test_no_log_tells_a_delay_from_a_clock_that_was_set_anew(
+    measure, tanh_robot, model_file, tmp_path
+):
+    """All that tells them apart is their prior: a delay is positive, so that it is twice as dense.
+
+    That the robot rolls on, which its base always lacked, changes nothing.
+    """
+    own, late = (
+        measure(tanh_robot(offset_s=s, coast_mps2=0.6), seed, 60.0)
+        for s, seed in ((0.1, 1), (0.15, 5))
+    )
+    fit([own], model_file(), tmp_path / "base.toml", "")
+    base = with_its_error(ModelFile.load(str(tmp_path / "base.toml")), [own])
+    chance = infer([late], base).answer.effects
+    assert chance["input_delay"] / chance["clock_offset"] == pytest.approx(2, rel=0.2)
 
 
 HIDDEN = {  # the README's answers, and those that were sealed when these logs came
