@@ -147,6 +147,10 @@ class Linear:
         inverse = np.linalg.inv(self.low)
         return inverse.T @ inverse
 
+    def stds(self, ways: np.ndarray) -> np.ndarray:
+        """(M,) posterior standard deviations of sums of d with weights (M, P)."""
+        return np.linalg.norm(_through(self.low, ways.T), axis=0)
+
     @cached_property
     def residuals(self) -> np.ndarray:
         """(R,) y less the posterior mean's prediction."""

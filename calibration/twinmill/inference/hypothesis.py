@@ -141,8 +141,12 @@ class Hypothesis(Guess):
 
     def log_evidence(self, linear: Linear, cov: np.ndarray | None = None) -> float:
         """Log evidence, with what was integrated on grids, of numbers that end at their bounds."""
-        before = self.mean, self.cov if cov is None else cov
-        within = self.log_share(*self.posterior(linear, cov)) - self.log_share(*before)
+        cov = self.cov if cov is None else cov
+        root = np.linalg.cholesky(cov)[self.named]  # weights have no bounds
+        ways = np.pad(root, ((0, 0), (0, len(linear.mean) - root.shape[1])))
+        mean = self.mean[self.named] + ways @ linear.mean
+        after = log_within(self.low[self.named], self.high[self.named], mean, linear.stds(ways))
+        within = float(after.sum()) - self.log_share(self.mean, cov)
         return linear.log_evidence + sum(self.grid.values()) + within
 
     def log_share(self, mean: np.ndarray, cov: np.ndarray) -> float:
