@@ -28,7 +28,7 @@ from twinmill.inference.noise import usual_after
 from twinmill.inference.planar import PlanarProblem, problem_of
 from twinmill.inference.prior import Always, weight_labels
 from twinmill.inference.problem import View
-from twinmill.inference.search import Search, evidence
+from twinmill.inference.search import Search, evidence, log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.inference.table import BEYOND, WORTH, noise_of
 from twinmill.model.model_file import ModelFile
@@ -55,6 +55,33 @@ class _Grown:
     view: View
 
 
+@dataclass(frozen=True)
+class _Lack:
+    """A set of effects with the kernels that its own log asks for beside it.
+
+    Attributes:
+        h: with the effects.
+        each: kernels under each noise.
+        grown: those of the likeliest.
+        log_posterior: of the set with these, up to a constant.
+    """
+
+    h: Hypothesis
+    each: list[_Grown]
+    grown: _Grown
+    log_posterior: float
+
+    @classmethod
+    def of(cls, p: PlanarProblem, view: View, h: Hypothesis) -> "_Lack":
+        """Three noises: a first one, what the set leaves alone, and with its kernels."""
+        each = [_grown(p, h, view), _grown(p, h, p.view(noise_of(h, p)))]
+        if beside := each[0].kernels:
+            each.append(_grown(p, h, p.view(noise_of(h, p, _columns(beside)))))
+        grown = max(each, key=lambda g: g.log_evidence)
+        price = log_prior_of_effects(len(h.effects), len(p.names))
+        return cls(h, each, grown, grown.log_evidence + price)
+
+
 def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Always:
     """Lasting errors of a model, told by the logs that it was fitted to.
 
@@ -65,11 +92,14 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     p = problem_of(measurements, model_file, sheet=True)
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
-    each = [_grown(p, h, search.view), _grown(p, h, p.view(noise_of(h, p)))]
-    if beside := each[0].kernels:
-        each.append(_grown(p, h, p.view(noise_of(h, p, _columns(beside)))))
-    likely = max(each, key=lambda g: g.log_evidence)
-    return _conditioned(p, h, likely, _chances(p, h, each, _sizes(p, h, likely)))
+    best = _Lack.of(p, search.view, h)
+    while h.effects:
+        fewer = [_Lack.of(p, search.view, search.without(h.effects, name)) for name in h.effects]
+        likely = max(fewer, key=lambda lack: lack.log_posterior)
+        if likely.log_posterior <= best.log_posterior:
+            break
+        best, h = likely, likely.h
+    return _conditioned(p, h, best.grown, _chances(p, h, best.each, _sizes(p, h, best.grown)))
 
 
 def _columns(found: list[tuple[Kernel, float]]) -> np.ndarray | None:

@@ -133,11 +133,28 @@ class Search:
                     if (names, name) not in asked:
                         asked.add((names, name))
                         others = [n for n in self.problem.names if n != name]
-                        self._grow(self._without(names, name), INSTEAD, 1, others)
+                        self._grow(self.without(names, name), INSTEAD, 1, others)
             if self.likely()[0] == order[0]:
                 return
 
-    def _without(self, names: tuple[str, ...], name: str) -> Hypothesis:
+    def joined(self, names: tuple[str, ...], more: Sequence[str]) -> tuple[str, ...]:
+        """A fitted set with some effects more, fitted if it was not; those it has are not added."""
+        for name in more:
+            if name in names:
+                continue
+            known = {tuple(sorted(k)): k for k in self.fitted}
+            both = tuple(sorted((*names, name)))
+            if both not in known:
+                h = self.fitted[names].hypothesis
+                told, columns, each = self._screened(h, (name,))
+                found = self._fitted(h, told, columns[name], each[name])
+                self._keep(found)
+                known[both] = found.effects
+            names = known[both]
+        return names
+
+    def without(self, names: tuple[str, ...], name: str) -> Hypothesis:
+        """A fitted set less one effect, fitted if it was not."""
         rest = tuple(n for n in names if n != name)
         for own in self.fitted:
             if sorted(own) == sorted(rest):
