@@ -86,12 +86,16 @@ class PlanarProblem(Problem):
             return None
         return self.always.hidden.explained(h, effects, self._known(self.always))
 
-    def lasting(self, kernel: str, slopes: np.ndarray) -> tuple[Lasting, np.ndarray] | None:
+    def lasting(self, kernel: str) -> Lasting | None:
+        """As the model's file keeps it."""
+        return None if self.always is None else self.always.lasting.get(kernel)
+
+    def in_own_log(self, slopes: np.ndarray) -> np.ndarray:
         """Numbers that this log has not, such as weights of no use in it, have no slopes."""
-        if self.always is None or kernel not in self.always.lasting:
-            return None
+        if self.always is None:
+            return slopes
         known = self._known(self.always)
-        return self.always.lasting[kernel], slopes[known] * (known >= 0)[:, None]
+        return slopes[known] * (known >= 0)[:, None]
 
     def _known(self, always: Always) -> np.ndarray:
         """(N,) places of the own log's numbers among those of this log; -1 where it has none."""

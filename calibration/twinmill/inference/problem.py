@@ -167,19 +167,13 @@ class Problem(ABC):
         """
         return None
 
-    def lasting(self, kernel: str, slopes: np.ndarray) -> tuple[Lasting, np.ndarray] | None:
-        """Evidence of the base's own log on a kernel of this name that was not found in it.
-
-        None where there is none.
-
-        Args:
-            kernel: its name.
-            slopes: (N, R) white ones of a hypothesis' numbers.
-
-        Returns:
-            That, and (N', R) the slopes of the numbers that the own log had.
-        """
+    def lasting(self, kernel: str) -> Lasting | None:
+        """Evidence of the base's own log on a kernel that was not found in it; None if none."""
         return None
+
+    def in_own_log(self, slopes: np.ndarray) -> np.ndarray:
+        """(N', R) slopes of the numbers that the base's own log had, of (N, R) of a hypothesis."""
+        return slopes
 
     @property
     def has_moments(self) -> bool:

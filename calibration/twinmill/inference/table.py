@@ -16,7 +16,7 @@ from twinmill.inference.hypothesis import Fitter, Hypothesis
 from twinmill.inference.moments import MOMENTS, Moment, Rate
 from twinmill.inference.noise import Noise, fit_noise
 from twinmill.inference.problem import Kinds, Problem, View
-from twinmill.inference.search import Evidence, Search, evidence
+from twinmill.inference.search import Evidence, Search, evidence, log_prior_of_effects
 from twinmill.inference.settings import PRIORS
 from twinmill.model.parameters import (
     catalogue_name,
@@ -139,7 +139,8 @@ def table_of(search: Search) -> Table:
     """Evidence of the likely sets, each under the noise that suits it best of two.
 
     Two noises: what the best set leaves with its likeliest dependence, and what the base leaves.
-    With one noise for all, slow drive noise is told as a dependence on time.
+    With one noise for all, slow drive noise is told as a dependence on time. What the base always
+    lacked is no choice of one set: each competes with it, too.
     """
     p, order = search.problem, search.likely(BEYOND)
     inside = [k for k in search.fitted if set(k) < set(order[0])]
@@ -151,14 +152,14 @@ def table_of(search: Search) -> Table:
     for h, beside in ((fitted[order[0]], _likeliest_columns(best_set, p)), (fitted[()], None)):
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
-    compared: dict[tuple[str, ...], _Compared] = {}
-    for names, h in fitted.items():
-        search.progress("comparing hypotheses")
-        own = _Compared.of(search, h, views, names in whole)
-        if (start := own.best.better_start) is not None:
-            h = views[0].fitter.fit(replace(h, value=start))
-            own = _Compared.of(search, h, views, names in whole)
-        compared[names] = own
+    compared = {n: _compared(search, h, views, n in whole) for n, h in fitted.items()}
+    joined: set[tuple[str, ...]] = {()}
+    while (always := max(own.likeliest_always() for own in compared.values())[1]) not in joined:
+        joined.add(always)
+        for names in kept:
+            more = search.joined(names, always)
+            if more not in compared:
+                compared[more] = _compared(search, search.fitted[more].hypothesis, views, False)
     entries = _likeliest_of_each([e for own in compared.values() for e in own.entries])
     first = _likeliest_of_each([e for own in compared.values() for e in own.first])
     falls = {key: entry.fall for key, entry in first.items()}
@@ -207,6 +208,24 @@ class _Compared:
             owns.append((own.entries(whole), own))
         best = max(owns, key=lambda o: max(entry.log_evidence for entry in o[0]))[1]
         return cls([e for own, _ in owns for e in own], owns[0][0], each[0], best)
+
+    def likeliest_always(self) -> tuple[float, tuple[str, ...]]:
+        """Log posterior, up to a constant, and which of its effects the base always lacked."""
+        count, names = len(self.best.h.effects), len(self.best.problem.names)
+        log = max(entry.log_evidence for entry in self.entries)
+        each = [(odds, own) for own, _, _, odds, _ in self.best.always]
+        return max(
+            (log + odds + log_prior_of_effects(count - len(own), names), own) for odds, own in each
+        )
+
+
+def _compared(search: Search, h: Hypothesis, views: Sequence[View], whole: bool) -> _Compared:
+    """A set compared from its best numbers, which another prior may lead to."""
+    search.progress("comparing hypotheses")
+    own = _Compared.of(search, h, views, whole)
+    if (start := own.best.better_start) is None:
+        return own
+    return _Compared.of(search, views[0].fitter.fit(replace(h, value=start)), views, whole)
 
 
 _Case = tuple[tuple[str, ...], bool, frozenset[str]]  # effects, stale base, dependences
@@ -372,7 +391,7 @@ class _Comparison:
     def no_news(self) -> list[NoNews]:
         """Effects that the base always lacked, or that an error of the others' formulas may be."""
         found, sized = [], self.problem.kinds.sized
-        for always, h, linear, log_odds, log_own in self._always:
+        for always, h, linear, log_odds, log_own in self.always:
             found.append(NoNews(always, (), (), log_odds, log_own))
             for names in subsets(tuple(n for n in self.h.effects if n not in always)):
                 kin = {n: self._kin(n, names) for n in names if catalogue_name(n) in sized}
@@ -417,11 +436,12 @@ class _Comparison:
 
         A fit may end beside the optimum, and another prior's lead to it.
         """
-        starts = (told.value for names, told, *_ in self._always if names)
+        starts = (told.value for names, told, *_ in self.always if names)
         return next((v for v in starts if self.view.fitter.is_better(self.h, v)), None)
 
     @cached_property
-    def _always(self) -> list[tuple[tuple[str, ...], Hypothesis, Linear, float, float]]:
+    def always(self) -> list[tuple[tuple[str, ...], Hypothesis, Linear, float, float]]:
+        """Each subset that the base may always have lacked, as `_of_always` gives it."""
         return [*self._of_always()]
 
     def _of_always(self) -> Iterator[tuple[tuple[str, ...], Hypothesis, Linear, float, float]]:
@@ -602,21 +622,20 @@ class _Comparison:
         """
         name, white = self.view.kernels[f].name, self.view.white(f)
         chance, gains = self.problem.wander.get(name, 0 * CHANCE), own.gains[f]
-        if gains.max() > 0 and (told := self.problem.lasting(name, self._slopes)):
-            lasting, slopes = told
-            columns = lasting.columns(white, slopes)
+        if gains.max() > 0 and (lasting := self.problem.lasting(name)):
+            columns = lasting.columns(white, self._own_slopes)
             columns = columns - columns @ own.span.T @ own.span
             chance, gains = lasting.chance, lasting.gains(own.linear, columns)
         with np.errstate(divide="ignore"):
             return gains + np.log(chance)
 
     @cached_property
-    def _slopes(self) -> np.ndarray:
-        """(N, R) white slopes of all numbers."""
+    def _own_slopes(self) -> np.ndarray:
+        """(N', R) white slopes of the numbers that the base's own log had."""
         named, fitter = self.h.named, self.view.fitter
         found = np.empty((len(named), self._rows.shape[1]))
         found[named], found[~named] = self._rows[: named.sum()], fitter.always
-        return found
+        return self.problem.in_own_log(found)
 
     def _of_noise(self, beside: _Beside) -> list[Entry]:
         """An entry in which the noise itself is a thing that comes and goes, and new."""
