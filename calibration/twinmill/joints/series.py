@@ -196,5 +196,5 @@ def lagged(u: np.ndarray, lag_s: float, step_s: float) -> np.ndarray:
 
 
 def _stacked(parts: list[np.ndarray]) -> csr_matrix:
-    """Block diagonal of dense blocks."""
-    return csr_matrix(block_diag(parts))
+    """Block diagonal of blocks that are mostly zeros, which `block_diag` of dense ones stores."""
+    return block_diag([csr_matrix(part) for part in parts], format="csr")
