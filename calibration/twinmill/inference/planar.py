@@ -183,7 +183,7 @@ def problem_of(
     usual = always.noise if always is not None else Usual.about(noise)
     kinds, missed = planar_kinds(), []
     if always is not None:
-        prior = with_always(prior, always, found)
+        prior = with_always(prior, always, found, same_clock=same_clock)
         changes = _changes(steps, model, always.effects)
         missed = [
             *(Missed(kinds.told_by[n], c) for n, c in zip(always.effects, changes, strict=True)),

@@ -276,15 +276,19 @@ def drift(names: Sequence[str], value: np.ndarray) -> np.ndarray:
     return np.diag((np.array(share) * value[: len(names)]) ** 2 + LEAST_STD**2)
 
 
-def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
+def with_always(
+    prior: Prior, always: Always, found: Sequence[Kernel], *, same_clock: bool
+) -> Prior:
     """The prior of a later log: numbers and discrepancy as the base's own log gave them.
 
-    Of a discrepancy that is not lasting only the size is known.
+    Of a discrepancy that is not lasting only the size is known, and of an offset of clocks nothing
+    where they may have been set anew.
 
     Args:
         prior: from the model file.
         always: of the base's own log.
         found: kernels of the later log.
+        same_clock: the offset of the clocks is that of the own log.
     """
     size = dict(always.kernels)
     there = [k for k in found if k.name in size]
@@ -295,7 +299,7 @@ def with_always(prior: Prior, always: Always, found: Sequence[Kernel]) -> Prior:
     cov = np.diag(np.r_[np.zeros(count), np.ones(len(labels) - count)])
     cov[:count, :count] = prior.cov
     known = {n: k for k, n in enumerate(always.labels)}
-    own = [k for k, n in enumerate(labels) if n in known]
+    own = [k for k, n in enumerate(labels) if n in known and (same_clock or n != CLOCK)]
     index = [known[labels[k]] for k in own]
     mean[own] = always.mean[index]
     cov[np.ix_(own, own)] = always.cov[np.ix_(index, index)]

@@ -409,6 +409,23 @@ def test_logs_whose_clocks_were_set_anew_are_judged_together(
     assert found.answer.nothing > 1 - SURE
 
 
+def test_a_later_log_of_clocks_set_anew_keeps_nothing_of_the_offset_before(
+    measure, tanh_robot, model_file, tmp_path
+):
+    """The offset was 0.1 s in the own log, whose base says nothing of it, and is -0.2 s."""
+    own, later = (measure(tanh_robot(offset_s=s), seed, 60.0) for s, seed in ((0.1, 1), (-0.2, 5)))
+    fit([own], model_file(), tmp_path / "base.toml", "")
+    document = tomlkit.parse(
+        with_its_error(ModelFile.load(str(tmp_path / "base.toml")), [own]).text
+    )
+    del document["clock"]
+    base = ModelFile.of(tmp_path / "base.toml", tomlkit.dumps(document))
+    found = problem_of([later], base, kept(base)).base
+    number = dict(zip(found.labels, found.value, strict=True))
+    assert number["clock.offset_s"] == pytest.approx(-0.2, abs=0.01)
+    assert number["base.motor_lag_s"] == pytest.approx(tanh_robot().lag_s, abs=0.01)
+
+
 def test_no_log_tells_a_delay_from_a_clock_that_was_set_anew(
     measure, tanh_robot, model_file, tmp_path
 ):
