@@ -839,6 +839,7 @@ class Fleet:
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
         self.url, self._prefix, self.key, self._hold_s = url, channel_prefix, key, 0.0
+        self._deaf = ""
         self._hold_seq = secrets.randbelow(2**31)  # by it what is said from here is known
         self._looked_s = _time_passed_s()
         self._empty_s = time.monotonic()  # nothing waited here then
@@ -857,14 +858,19 @@ class Fleet:
         if hasattr(self.bus, "close"):
             self.bus.close()
 
-    def hear(self) -> str:
-        """Begins to hear where the bus only spoke. Returns a sentence on why it cannot, if so."""
+    def hear(self) -> None:
+        """Begins to hear where the bus only spoke; `deaf` says why it cannot, if so."""
         try:
             if hasattr(self.bus, "hear"):
                 self.bus.hear()
         except OSError as error:
-            return f"No robot can be heard: {why_no_socket(error, self.bus.group[1])}"
-        return ""
+            self._deaf = f"No robot can be heard: {why_no_socket(error, self.bus.group[1])}"
+
+    @property
+    def deaf(self) -> str:
+        """Sentence on why robots of all networks, or of some, cannot be heard now; else empty."""
+        on = getattr(self.bus, "unheard", "")
+        return self._deaf or (f"No robot can be heard on {on}." if on else "")
 
     def _on_message(self, channel: str, data: bytes) -> None:
         name, _, kind = channel.removeprefix(self._prefix).partition("_")
