@@ -5,10 +5,11 @@ import errno
 import os
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 STDOUT_NAME, STDERR_NAME = "standard output", "standard error"
 STDOUT, STDERR = 1, 2  # their handles
+NULL = os.makedev(1, 3)  # device of /dev/null, from Linux's admin-guide/devices.txt
 closed_at_first: set[int] = set()  # those that this program began without (`>&-`)
 
 
@@ -28,7 +29,18 @@ def leads_nowhere(handle: int) -> bool:
         file = os.fstat(handle)
     except OSError:
         return True
-    return stat.S_ISCHR(file.st_mode) and file.st_rdev == os.stat(os.devnull).st_rdev
+    return stat.S_ISCHR(file.st_mode) and file.st_rdev == NULL
+
+
+def open_nowhere() -> int:
+    """Handle of /dev/null, or where that cannot be opened of memory that nobody reads.
+
+    Raises:
+        OSError: no file more can be opened.
+    """
+    with suppress(OSError):
+        return os.open(os.devnull, os.O_RDWR)
+    return os.memfd_create("nowhere")
 
 
 def refuse_closed(handle: int, stream: str) -> None:

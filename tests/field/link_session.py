@@ -117,7 +117,7 @@ def on_the_second_network(machine: Machine, robot: Robot, key: bytes) -> bool:
     machine.cable("wlan0", 9)
     fleet = drive(robot, key)
     heard_by = fleet.robots[ID].senders.hosts
-    fleet.bus._joined &= {index for index, name in socket.if_nameindex() if name == "op-wlan0"}
+    fleet.bus._names = {i: name for i, name in socket.if_nameindex() if name == "op-wlan0"}
     fleet.bus._renew = lambda: None
     fleet.bus.tell = lambda *_: None
     tell.stop(fleet, {ID}, timeout_s=2)

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bus of the tools on this machine alone: waiting ends in time whatever else is said on it."""
 
+import errno
 import json
 import os
 import resource
 import socket
+import struct
 import time
 
 import pytest
@@ -21,6 +23,8 @@ from twinmill.data.bus import (
     too_many_files,
 )
 from twinmill.robots.fleet import Fleet
+from twinmill.robots.tell import why_unheard
+from twinmill_cli.swarm_verdict import Saying, of_stop
 
 WAIT_MS = 200
 SLACK_S = 0.3  # the machine may be busy with other tests
@@ -146,7 +150,7 @@ def test_a_stop_that_cannot_be_heard_tells_who_has_the_port(
 
 
 def test_a_stop_can_wait_for_a_network(monkeypatch):
-    monkeypatch.setattr(UdpBus, "_member", lambda *_: False)
+    monkeypatch.setattr(buses, "_networks", lambda _: {})
     with pytest.raises(RuntimeError, match=r"no network.*a route for multicast"):
         open_bus("udpm://239.255.76.67:7998?ttl=0")
     waits = open_bus("udpm://239.255.76.67:7998?ttl=0", needs_network=False)
@@ -154,6 +158,63 @@ def test_a_stop_can_wait_for_a_network(monkeypatch):
         waits.publish("A", b"")
     waits._ear.close()
     waits._mouth.close()
+
+
+@pytest.fixture
+def full(monkeypatch, bus):
+    """A bus on two networks, each of whose sockets can be in one group, and those that joined."""
+    bus, _ = bus
+    ears = []
+
+    def member(_, ear, what, index):
+        if index == 3 and ear in ears:
+            raise OSError(errno.ENOBUFS, "No buffer space available")
+        ears.append(ear)
+        return ear
+
+    monkeypatch.setattr(buses, "_networks", lambda _: {2: "docker0", 3: "wlan0"})
+    monkeypatch.setattr(UdpBus, "_kind", lambda *_: "out")
+    monkeypatch.setattr(UdpBus, "_member", member)
+    monkeypatch.setattr(bus, "_joined", {})
+    monkeypatch.setattr(bus, "_join_s", 0.0)
+    return bus, ears
+
+
+def test_where_a_socket_can_join_no_more_networks_another_does(full):
+    bus, ears = full
+    bus._renew()
+    assert len(ears) == 2 and bus._joined == {2: ears[0], 3: ears[1]} and not bus.unheard
+
+
+def test_what_can_be_said_does_not_depend_on_what_can_be_heard(monkeypatch, full):
+    """With many networks of containers a stop left by all but the newest one, a laptop's Wi-Fi."""
+    bus, _ = full
+    monkeypatch.setattr(bus, "_join", lambda index: bus._member(bus._ear, 0, index))
+    bus._renew()
+    spoken = []
+    monkeypatch.setattr(bus, "_mouth", Mouth(spoken))
+    bus.publish("STOP", b"")
+    assert [*bus._joined] == [2] and spoken == [2, 3]
+    fleet = Fleet("", connect=lambda _: bus)
+    assert "heard on wlan0: No buffer space available (ENOBUFS)." in why_unheard(fleet)
+    how = Saying(reach=bus.reach, is_deaf=True, key_fault=fleet.deaf)
+    assert fleet.deaf in of_stop([], how).sentence
+
+
+class Mouth:
+    """Takes note of the networks that something is said on."""
+
+    def __init__(self, spoken):
+        self._spoken, self._network = spoken, 0
+
+    def setsockopt(self, _level, _option, interface):
+        *_, self._network = struct.unpack("=4s4si", interface)
+
+    def sendto(self, *_):
+        self._spoken.append(self._network)
+
+    def close(self):
+        """Nothing is open."""
 
 
 @pytest.fixture

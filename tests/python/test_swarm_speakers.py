@@ -29,11 +29,11 @@ class Bus:
 
 @pytest.fixture
 def air(clock):
-    """Fleet, a function by which somebody speaks as R01, and one that lets time pass."""
+    """Fleet, a function by which somebody speaks as a robot, and one that stops R01."""
     fleet = Fleet("", connect=lambda _: Bus(), key=KEY)
     begin_s = time.monotonic()
 
-    def hear(sender, kind, message) -> None:
+    def hear(sender, kind, message, number=1) -> None:
         fleet.bus.sender = sender
         message.utime_us = time.time_ns() // 1000
         if hasattr(message, "session"):
@@ -41,16 +41,16 @@ def air(clock):
             message.tag = bytes(keys.TAG_BYTES)
         data = message.encode()
         if hasattr(message, "session"):
-            data = keys.sign(keys.of_robot(KEY, 1), data)
-        fleet.bus.hear(f"R01_{kind}", data)
+            data = keys.sign(keys.of_robot(KEY, number), data)
+        fleet.bus.hear(f"R{number:02d}_{kind}", data)
 
-    def speak(sender, session=None, mode=STOPPED, flags=TELEMETRY.STATUS_TELLS_START) -> None:
+    def speak(sender, session=None, mode=STOPPED, flags=TELEMETRY.STATUS_TELLS_START, number=1):
         for kind, message in (("TELEMETRY", turbopi.telemetry_t()), ("LINK", turbopi.link_t())):
             message.mode, message.status_flags = mode, flags
             if kind == "LINK":
                 message.session, message.stands, message.armed = session or 0, mode == STOPPED, 1
             if kind == "TELEMETRY" or session:
-                hear(sender, kind, message)
+                hear(sender, kind, message, number)
                 clock(0.01)
 
     def stop(sender, session):
@@ -127,6 +127,22 @@ def test_a_program_that_was_started_anew_is_one_robot_where_its_machine_shows_th
     clock(GONE_S + 1)
     speak(sender, session)
     assert fleet.robots[1].is_double != is_anew
+
+
+@pytest.mark.parametrize("is_signed", [True, False])
+def test_robots_that_exchanged_their_numbers_are_each_one(air, clock, is_signed):
+    """Both stood, started anew, and it was said that two have one number, and one may drive on."""
+    fleet, speak, stop = air
+    speak(ROBOT, FIRST, DRIVES)
+    speak(CLONE, SECOND, DRIVES, number=2)
+    clock(GONE_S + 1)
+    speak((ROBOT[0], 40000), 17 if is_signed else None, number=2)
+    clock(GONE_S + 1)
+    speak((CLONE[0], 40000), 18)
+    assert bool(fleet.robots[1].lost) != is_signed and not fleet.robots[2].lost
+    told = stop((CLONE[0], 40000), 18)
+    assert told.ok == is_signed
+    assert is_signed or "Two robots said that they are number 1" in told.sentence
 
 
 def test_two_programs_of_one_machine_are_two_robots_where_both_go_on(air, clock):

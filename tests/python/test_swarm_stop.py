@@ -12,6 +12,7 @@ import socket
 import sys
 import time
 from contextlib import suppress
+from unittest.mock import Mock
 
 import pytest
 
@@ -19,7 +20,7 @@ from twinmill.data.bus import Reach
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.robots.key import load
-from twinmill_cli import swarm_door, swarm_stop
+from twinmill_cli import ending, swarm_door, swarm_stop
 from twinmill_cli.lazy import asks_for_help
 from twinmill_cli.main import main
 from twinmill_cli.swarm_door import key_fault
@@ -96,6 +97,23 @@ def test_a_word_that_nobody_reads_keeps_no_stop_waiting():
         os.dup2(kept, 2)
     for handle in (reads, writes, kept):
         os.close(handle)
+
+
+@pytest.mark.parametrize("is_lost", ["/dev/null", "every file"])
+def test_a_stop_needs_no_dev_null(monkeypatch, tmp_path, twinmill, is_lost):
+    """It ended with a traceback before it had said anything."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(os, "devnull", str(tmp_path / "none"))
+    if is_lost == "every file":
+        monkeypatch.setattr(ending, "open_nowhere", Mock(side_effect=OSError(errno.EMFILE, "full")))
+    code, out, _ = twinmill("swarm", "stop", "--lcm-url", "memq://", "--timeout-s", "0.5")
+    assert code == 1 and "stop was said all the time" in " ".join(out.split())
+
+
+def test_whatever_fails_before_a_stop_is_told_with_what_became_of_robots(monkeypatch, twinmill):
+    monkeypatch.setattr(ending, "_take_standard_files", Mock(side_effect=RuntimeError("broken")))
+    code, _, err = twinmill("swarm", "stop", "--lcm-url", "memq://")
+    assert code == 1 and "broken" in err and "NOTHING WAS STOPPED" in err
 
 
 @pytest.mark.parametrize(

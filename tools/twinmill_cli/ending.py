@@ -17,7 +17,7 @@ import typer
 
 from twinmill.extras import LAB, MissingExtra, missing
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import STDERR, STDOUT, closed_at_first
+from twinmill.streams import STDERR, STDOUT, closed_at_first, open_nowhere
 from twinmill_cli import done, early
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.output import begin_telling, has_told, print_object, say
@@ -56,13 +56,9 @@ def leave(
         verbs: words that may stand behind `swarm`, beside those to robots.
     """
     sys.excepthook = sys.__excepthook__  # all that every command needs is imported
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a degree sign in ASCII is no reason to fail
-    _take_standard_files()
-    begin_telling()
     words = (in_order(sys.argv[1:]) if verbs else sys.argv[1:]) or ["--help"]
     try:
+        _prepare()
         if not _is_stop(words):
             _check_encoding(words)
         result = run(words)
@@ -84,6 +80,17 @@ def leave(
         # PYTHONINSPECT: an interpreter would take the end for an error, whatever the code is
         exit_now(code)
     sys.exit(code)
+
+
+def _prepare() -> None:
+    """Readies the streams; a robot is stopped all the same where that cannot be done."""
+    begin_telling()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            with suppress(OSError, ValueError):  # a degree sign in ASCII is no reason to fail
+                stream.reconfigure(errors="replace")
+    with suppress(OSError):
+        _take_standard_files()
 
 
 def _say(sentence: str, program: str) -> None:
@@ -126,7 +133,7 @@ def _written(program: str, code: int) -> int:
         except ValueError:  # closed
             continue
         except OSError as error:
-            nowhere = os.open(os.devnull, os.O_WRONLY)
+            nowhere = open_nowhere()
             os.dup2(nowhere, stream.fileno())
             os.close(nowhere)
             if code == 0:
@@ -137,7 +144,7 @@ def _written(program: str, code: int) -> int:
 
 def _take_standard_files() -> None:
     """Else what is opened first has a number of theirs, and gets what is printed."""
-    while (handle := os.open(os.devnull, os.O_RDWR)) <= STDERR:
+    while (handle := open_nowhere()) <= STDERR:
         closed_at_first.add(handle)
         os.set_inheritable(handle, True)
     os.close(handle)

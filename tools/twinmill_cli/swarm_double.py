@@ -26,8 +26,9 @@ def doubles(fleet: Fleet, robots: Iterable[int]) -> str:
 def _told(robot: Robot, several: set[str]) -> str:
     hosts = robot.hosts
     who = "A robot and a twin" if robot.source == "robot, twin" else "Two robots"
+    say = "say" if robot.is_double_now else "said"
     return (
-        f"{who} say that they are number {robot.robot_id} ({', '.join(hosts)}): "
+        f"{who} {say} that they are number {robot.robot_id} ({', '.join(hosts)}): "
         f"{_remedy(robot, several)}."
     )
 

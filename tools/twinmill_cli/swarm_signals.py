@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from twinmill.defaults import URL
 from twinmill.foreign_text import MESSAGE_MAX, plain_line
-from twinmill.streams import STDERR, STDOUT, STDOUT_NAME, refuse_closed
+from twinmill.streams import STDERR, STDOUT, STDOUT_NAME, open_nowhere, refuse_closed
 from twinmill_cli import done
 from twinmill_cli.ctrl_c import has_terminal, key_reaches
 from twinmill_cli.exit_now import STOPPED
@@ -259,7 +259,7 @@ def saying_nothing() -> Iterator[Callable[[str], None]]:
     """
     kept, nowhere = STDERR, None
     with suppress(OSError):  # so many files are open that libraries keep their stderr
-        nowhere = os.open(os.devnull, os.O_WRONLY)
+        nowhere = open_nowhere()
         kept = os.dup(STDERR)
         os.dup2(nowhere, STDERR)
 

@@ -158,9 +158,9 @@ def stop(
         fleet = _say_first(lcm_url, prefix, asked)
         begin_s = time.monotonic()
         fleet.key, fault = key_if_there(key)
-        deaf = fleet.hear()
+        fleet.hear()
         with saying_nothing() as say:
-            for words in filter(None, [misread, fault, deaf]):
+            for words in filter(None, [misread, fault, fleet.deaf]):
                 say(words)
             hosts = tell.Hosts([name.strip() for name in host or () if name.strip()])
             given = tell.stop(
@@ -176,7 +176,7 @@ def stop(
             reached_s = tell.reached_s(fleet, passed_s)
             if asked:  # who drives besides
                 fleet.listen(tell.OTHERS_S)
-        beside = driving(fleet, asked)
+        beside, deaf = driving(fleet, asked), fleet.deaf
         fleet.close()
         is_cut_short = _ends_a_stop(signals) and passed_s < timeout_s
         how = Saying(

@@ -108,7 +108,7 @@ class Saying:
         reach: how far it got.
         key_fault: a sentence on why no robot's signature could be checked; empty: they were.
         to_all: to all that hear it, none by its number.
-        is_deaf: this computer could hear no robot, and `key_fault` says why.
+        is_deaf: this computer could hear no robot of some network, and `key_fault` says why.
     """
 
     passed_s: float = 10.0
@@ -258,7 +258,7 @@ def _reasons(given: list[Answer], how: Saying) -> list[str]:
 def _of_standing(given: list[Answer], how: Saying, *, is_of_some: bool) -> Verdict:
     """All that answered have confirmed the stop; others may be there."""
     names = f"{_names(given)} {several.of(given, 'stands')}"
-    more = _joined(_besides(given), how.lost)
+    more = _joined(_besides(given), how.lost, how.key_fault if how.is_deaf else "")
     if how.unheard:
         words = f"NOT ALL STAND: {how.hint} {BY_HAND} Whoever was heard stands: {_names(given)}."
         return Verdict(False, _joined(words, more, how.cut))

@@ -248,7 +248,8 @@ class UdpBus:
         self._handlers: list[tuple[re.Pattern, Handler]] = []
         self._sequence = 0
         self._ear: socket.socket | None = None
-        self._joined: set[int] = set()
+        self._joined: dict[int, socket.socket] = {}
+        self._no_joins: dict[str, str] = {}
         self._join_s = 0.0
         try:
             self._mouth = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -272,10 +273,9 @@ class UdpBus:
 
     def close(self) -> None:
         """Says and hears nothing any more."""
-        self._mouth.close()
-        if self._ear:
-            self._ear.close()
-            self._ear = None
+        for one in {self._mouth, self._ear, *self._joined.values()} - {None}:
+            one.close()
+        self._ear = None
 
     @property
     def has_network(self) -> bool:
@@ -290,6 +290,12 @@ class UdpBus:
             return ""
         return _not_connected(kinds)
 
+    @property
+    def unheard(self) -> str:
+        """Networks that lead out of this computer and cannot be heard, each with why; or empty."""
+        out = {n: why for n, why in self._no_joins.items() if self._kind(n) == "out"}
+        return ", ".join(f"{name}: {why}" for name, why in out.items())
+
     def _renew(self) -> None:
         """Joins the group on networks that are new, and forgets those that are gone."""
         now_s = time.monotonic()
@@ -297,22 +303,40 @@ class UdpBus:
             return
         self._join_s = now_s + REJOIN_S
         self._names = _networks(self._mouth)
-        present = set(self._names)
         if self._ear is None:
             return
-        for index in self._joined - present:
-            self._member(socket.IP_DROP_MEMBERSHIP, index)
-        self._joined &= present
-        self._joined |= {i for i in present if self._member(socket.IP_ADD_MEMBERSHIP, i)}
+        for index in self._joined.keys() - self._names.keys():
+            with suppress(OSError):
+                self._member(self._joined.pop(index), socket.IP_DROP_MEMBERSHIP, index)
+        self._no_joins = {}
+        for index in sorted(self._names.keys() - self._joined.keys()):
+            try:
+                self._joined[index] = self._join(index)
+            except OSError as error:
+                code = errno.errorcode.get(error.errno or 0, "")
+                self._no_joins[self._names[index]] = f"{error.strerror} ({code})"
 
-    def _member(self, what: int, index: int) -> bool:
-        assert self._ear
+    def _join(self, index: int) -> socket.socket:
+        """Has a socket of this bus join the group on a network, and gives it.
+
+        Linux lets one socket be in few groups (net.ipv4.igmp_max_memberships, 20): where that is
+        full another joins. The ear hears what any of them brings.
+        """
+        for ear in dict.fromkeys([self._ear, *self._joined.values()]):
+            try:
+                return self._member(ear, socket.IP_ADD_MEMBERSHIP, index)
+            except OSError as error:
+                if error.errno != errno.ENOBUFS:
+                    raise
+        return self._member(
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM), socket.IP_ADD_MEMBERSHIP, index
+        )
+
+    def _member(self, ear: socket.socket | None, what: int, index: int) -> socket.socket:
+        assert ear
         request = struct.pack("=4s4si", socket.inet_aton(self.group[0]), bytes(4), index)
-        try:
-            self._ear.setsockopt(socket.IPPROTO_IP, what, request)
-        except OSError:
-            return index in self._joined
-        return True
+        ear.setsockopt(socket.IPPROTO_IP, what, request)
+        return ear
 
     def _kind(self, name: str) -> str:
         """A network: this computer's "own", "out" of it, "lost" its carrier, or "none"."""
@@ -342,14 +366,14 @@ class UdpBus:
         """
         packet, errors, took = self._packet(channel, data), {}, set()
         names = self._names
-        for index in sorted(self._joined if self._ear else names):
+        for index in sorted(names):
             interface = struct.pack("=4s4si", bytes(4), bytes(4), index)
             try:
                 self._mouth.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
                 self._mouth.sendto(packet, self.group)
-                took.add(names.get(index, ""))
+                took.add(names[index])
             except OSError as error:
-                errors[names.get(index, "")] = error.strerror
+                errors[names[index]] = error.strerror
         self._note(took, errors)
         if not took:
             raise OSError(f"the bus cannot be reached: {self.reach.fault}")

@@ -180,6 +180,7 @@ class Robot:
         speakers: what is last known of each that speaks as it, as of a robot of its own; by its
             session, or by its address where it signs nothing.
         sessions: that were signed last, by the address from which.
+        peers: all that are heard, by number: a program may go on as another of them.
         addresses: from which a speaker spoke.
     """
 
@@ -203,6 +204,7 @@ class Robot:
     commands: dict[int, Heard] = field(default_factory=dict)
     speakers: dict[int | Address | None, "Robot"] = field(default_factory=dict)
     sessions: dict[Address | None, int] = field(default_factory=dict)
+    peers: dict[int, "Robot"] = field(default_factory=dict, repr=False, compare=False)
     addresses: set[Address] = field(default_factory=set)
 
     @property
@@ -287,11 +289,22 @@ class Robot:
         )
 
     @property
-    def lost(self) -> list["Robot"]:
-        """Those of several speakers that fell silent and may drive."""
+    def _known(self) -> list["Robot"]:
+        """Each of its speakers once, whatever it was known under."""
         named = {self._who(who): speaker for who, speaker in self.speakers.items()}
-        known = [self.speakers.get(who, speaker) for who, speaker in named.items()]
-        alive = [s for s in known if not any(other.is_anew(s) for other in known)]
+        return [self.speakers.get(who, speaker) for who, speaker in named.items()]
+
+    @property
+    def lost(self) -> list["Robot"]:
+        """Those of several speakers that fell silent and may drive.
+
+        One that was started anew is not lost, be it as a robot of another number.
+        """
+        known = self._known
+        if len(known) < 2:
+            return []
+        heirs = [s for robot in self.peers.values() for s in robot._known] or known
+        alive = [s for s in known if not any(heir.is_anew(s) for heir in heirs)]
         return [s for s in alive if s.may_drive] if len(alive) > 1 else []
 
     @property
@@ -616,9 +629,14 @@ class Robot:
 
         One that is heard on two ways hears itself.
         """
+        return self.is_double_now or bool(self.lost)
+
+    @property
+    def is_double_now(self) -> bool:
+        """Both speak."""
         flags = self.telemetry.status_flags if self.telemetry and not self.is_old_news else 0
         hears_one = bool(flags & TELEMETRY.STATUS_DOUBLE) and not self.senders.on_two_ways
-        return self.senders.are_double or hears_one or bool(self.lost)
+        return self.senders.are_double or hears_one
 
     @property
     def alarms(self) -> list[str]:
@@ -839,6 +857,7 @@ class Fleet:
         # From where stops of others came, and when, by the robot that was told; the newest last.
         self._stops: dict[int, str] = {}
         self.url, self._prefix, self.key, self._hold_s = url, channel_prefix, key, 0.0
+        self._deaf = ""
         self._hold_seq = secrets.randbelow(2**31)  # by it what is said from here is known
         self._looked_s = _time_passed_s()
         self._empty_s = time.monotonic()  # nothing waited here then
@@ -857,14 +876,19 @@ class Fleet:
         if hasattr(self.bus, "close"):
             self.bus.close()
 
-    def hear(self) -> str:
-        """Begins to hear where the bus only spoke. Returns a sentence on why it cannot, if so."""
+    def hear(self) -> None:
+        """Begins to hear where the bus only spoke; `deaf` says why it cannot, if so."""
         try:
             if hasattr(self.bus, "hear"):
                 self.bus.hear()
         except OSError as error:
-            return f"No robot can be heard: {why_no_socket(error, self.bus.group[1])}"
-        return ""
+            self._deaf = f"No robot can be heard: {why_no_socket(error, self.bus.group[1])}"
+
+    @property
+    def deaf(self) -> str:
+        """Sentence on why robots of all networks, or of some, cannot be heard now; else empty."""
+        on = getattr(self.bus, "unheard", "")
+        return self._deaf or (f"No robot can be heard on {on}." if on else "")
 
     def _on_message(self, channel: str, data: bytes) -> None:
         name, _, kind = channel.removeprefix(self._prefix).partition("_")
@@ -881,7 +905,8 @@ class Fleet:
         for text, most in TEXTS.items():
             if hasattr(message, text):
                 setattr(message, text, plain_line(getattr(message, text), most))
-        robot = self.robots.setdefault(int(name[1:]), Robot(int(name[1:])))
+        robot_id = int(name[1:])
+        robot = self.robots.setdefault(robot_id, Robot(robot_id, peers=self.robots))
         now_s = robot.heard_s = time.monotonic()
         sender = getattr(self.bus, "sender", None)
         if kind == "TELEMETRY" and robot.senders.is_copy(sender, data):

@@ -193,7 +193,7 @@ def why_unheard(fleet: Fleet) -> str:
     """Words on what may keep robots from being heard, and what to do."""
     if fleet.fault:
         return f"this computer has no network ({fleet.fault})."
-    return (
+    return fleet.deaf or (
         f"are they switched on and on this network, is {option('lcm_url')} that of their "
         "configuration, with ttl=1 in both (what is said with ttl=0 leaves no computer), and does "
         "the network carry multicast? Where it does not, `twinmill swarm stop` with "
