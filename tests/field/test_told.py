@@ -517,10 +517,10 @@ FAULTS = {
         NEVER,
     ),
     "start_of_robots_that_never_turn": Fault(
-        "`swarm start` of a robot with `duty_cap_pct = 0`; then Ctrl-C",
+        "`swarm start` of a robot with `duty_cap_pct = 0`",
         (
-            "R04 accepted it (no wheel turns: duty_cap_pct is 0 in",
-            "All stand; not all had started.",
+            "Called off: R04 was not able to drive (no wheel turns: duty_cap_pct is 0 in",
+            "All stand.",
         ),
         1,
         NEVER,
