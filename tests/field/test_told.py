@@ -129,7 +129,7 @@ FAULTS = {
         NEVER,
     ),
     "stopped_by_another": Fault(
-        "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 0
+        "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 1
     ),
     "untethered_and_one_is_deaf": Fault(
         "R03 hears nothing from then on that it has accepted an untethered start; then Ctrl-C in "
@@ -653,7 +653,7 @@ def test_who_takes_over_is_told_that_somebody_drove(session):
     assert said.index("R01 drives already, held by another operator or terminal") < said.index(
         "Started at"
     )
-    assert code == 0 and "All stand: R01: stopped by another command." in said
+    assert code == 1 and "All stand: R01: stopped by another command." in said
 
 
 def test_a_count_that_another_stopped_ends_with_it(session):
