@@ -129,7 +129,7 @@ FAULTS = {
         NEVER,
     ),
     "stopped_by_another": Fault(
-        "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 0
+        "`swarm stop` from elsewhere", ("All stand: R01, R02: stopped by another command.",), 1
     ),
     "untethered_and_one_is_deaf": Fault(
         "R03 hears nothing from then on that it has accepted an untethered start; then Ctrl-C in "
@@ -517,10 +517,10 @@ FAULTS = {
         NEVER,
     ),
     "start_of_robots_that_never_turn": Fault(
-        "`swarm start` of a robot with `duty_cap_pct = 0`; then Ctrl-C",
+        "`swarm start` of a robot with `duty_cap_pct = 0`",
         (
-            "R04 accepted it (no wheel turns: duty_cap_pct is 0 in",
-            "All stand; not all had started.",
+            "Called off: R04 was not able to drive (no wheel turns: duty_cap_pct is 0 in",
+            "All stand.",
         ),
         1,
         NEVER,
@@ -653,7 +653,7 @@ def test_who_takes_over_is_told_that_somebody_drove(session):
     assert said.index("R01 drives already, held by another operator or terminal") < said.index(
         "Started at"
     )
-    assert code == 0 and "All stand: R01: stopped by another command." in said
+    assert code == 1 and "All stand: R01: stopped by another command." in said
 
 
 def test_a_count_that_another_stopped_ends_with_it(session):

@@ -635,14 +635,12 @@ class Field:
         return self._unmoved(begin_s, code)
 
     def start_of_robots_that_never_turn(self) -> dict:
-        """By their configuration: they say so, and drive by all else that they say."""
+        """By their configuration: they say so when they accept a start, and that is called off."""
         self.robots[4] = self.robot(4, "4", settings=("--set", "duty_cap_pct=0"))
         time.sleep(1)
         begin_s = time.monotonic()
         words = ("start", "--arm", "--robots", "4")
         self.operator = operator = Operator(self.key_file, *words, terminal=False)
-        wait_until(lambda: HELD in operator.plain or operator.has_ended, 20)
-        operator.process.send_signal(signal.SIGINT)
         row = self._unmoved(begin_s, operator.end(), [4])
         self.robots.pop(4).process.terminate()
         time.sleep(1)

@@ -687,23 +687,52 @@ def test_ctrl_c_while_it_starts_is_one_sentence(module):
     assert (ended.returncode, ended.stdout, ended.stderr) == (-signal.SIGINT, "", sentence)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("module", ["typer", "twinmill.robots.tell"])
-def test_no_start_begins_that_was_asked_to_end(module, number):
-    """A script's background job has SIGINT ignored, and nohup's SIGHUP: to a start they count."""
+def signalled(number, where, verb):
+    """A command to robots with --json, with a signal as a module is imported, or all are."""
     code = (
-        "import sys, os; sys.argv[0] = 'twinmill'\n"
+        "import gc, os, sys; sys.argv[0] = 'twinmill'\n"
         "def hook(event, args):\n"
-        f"    if event == 'import' and args[0] == '{module}': os.kill(os.getpid(), {int(number)})\n"
+        f"    if {where}: os.kill(os.getpid(), {int(number)})\n"
         "sys.addaudithook(hook)\n"
+        "gc.freeze = lambda: hook('freeze', [])\n"
         "from twinmill_cli.main import main; main()\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code, "swarm", "start", "--json"],
+    return subprocess.run(
+        [sys.executable, "-c", code, "swarm", verb, "--json", "--lcm-url", "memq://"],
         capture_output=True,
         text=True,
         preexec_fn=lambda: signal.signal(number, signal.SIG_IGN),
     )
+
+
+# The last is where a command's own module is there, and it has not taken signals over yet.
+WHERE = [
+    "event == 'import' and args[0] == 'typer'",
+    "event == 'import' and args[0] == 'twinmill.robots.tell'",
+    "event == 'freeze' and 'twinmill_cli.swarm' in sys.modules",
+]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("where", WHERE)
+@pytest.mark.parametrize("verb", ["start", "stop"])
+def test_no_command_to_robots_begins_that_was_asked_to_end(where, number, verb):
+    """A script's background job has SIGINT ignored, and nohup's SIGHUP: to a start they count."""
+    ended = signalled(number, where, verb)
     told = strict(ended.stdout)
-    assert ended.returncode == -signal.SIGINT and (told["verb"], told["ok"]) == ("start", False)
-    assert "nothing was sent" in told["sentence"] and told["sentence"] in ended.stderr
+    assert (told["verb"], told["ok"], told["robots"]) == (verb, False, [])
+    assert told["sentence"] in ended.stderr or verb == "stop"
+    if (verb, number) == ("stop", signal.SIGHUP):  # a terminal that is lost ends no stop
+        assert ended.returncode == 1 and "No robot was heard" in told["sentence"]
+        return
+    assert ended.returncode == -signal.SIGINT
+    words = "NOTHING WAS STOPPED" if verb == "stop" else "nothing was sent"
+    assert told["sentence"].startswith("Stopped before it began") and words in told["sentence"]
+
+
+@pytest.mark.parametrize("words", [["--json", "strat"], ["strat", "--json"], ["--json"]])
+def test_every_object_of_robots_has_the_same_fields(twinmill, words):
+    code, out, _ = twinmill("swarm", *words)
+    told = strict(out)
+    assert (code, told["ok"], told["robots"]) == (2, False, [])
+    assert told["verb"] == "".join(word for word in words if word != "--json")

@@ -129,6 +129,28 @@ def test_a_stop_of_somebody_else_is_told_with_where_it_came_from(accepted):
     assert fleet.stop_heard({1}).startswith("10.0.0.9 at ")
 
 
+@pytest.mark.parametrize(
+    ("reason", "flags", "timeout_ms", "says"),
+    [
+        ("no wheel turns: duty_cap_pct is 0 in its file", 0, 2000, "not able to drive (no wheel"),
+        ("", TELEMETRY.STATUS_DRY_RUN, 2000, "not able to drive (dry run"),
+        ("", 0, 0, "about to drive on for ever without this command"),
+        ("", 0, 1500, "about to drive on for 1.5 s without this command"),
+        ("", 0, 2000, ""),
+    ],
+)
+def test_what_would_make_a_start_fail_and_is_known_before_calls_it_off(
+    accepted, reason, flags, timeout_ms, says
+):
+    """The others drove on untethered, behind a script that took exit code 1 for "or none"."""
+    fleet, robot = accepted
+    robot.signed_acks[SEQ].reason = reason
+    robot.link = link(status_flags=flags, link_timeout_ms=timeout_ms)
+    out = dropouts(fleet, link_timeout_ms=2000)
+    assert bool(out) == bool(says) and says in out.words.get(1, "") and not out.taken
+    assert not dropouts(fleet, only_stopped=True, link_timeout_ms=2000)
+
+
 def test_what_was_signed_before_the_start_speaks_against_nothing(accepted):
     """A link that came before the answer: armed and started since."""
     fleet, robot = accepted

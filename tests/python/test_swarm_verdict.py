@@ -16,6 +16,7 @@ from twinmill.robots.fleet import DRY_RUN, Fleet, Heard
 from twinmill.robots.hold import (
     BY_BUTTON,
     BY_COMMAND,
+    BY_UNHEARD,
     DRIVES,
     DRIVES_ANEW,
     LINK_LOST,
@@ -250,7 +251,9 @@ SENTENCES = [
         1,
     ),
     (of_end(WELL, {"R01": DRIVES_ANEW}, WELL), "All stand; R01 drove after its program was", 1),
-    (of_end(WELL, {"R01": BY_COMMAND, "R02": BY_BUTTON}, None), "All stand: R01: stopped", 0),
+    (of_end(WELL, {"R01": BY_COMMAND, "R02": BY_BUTTON}, None), "All stand: R01: stopped", 1),
+    (of_end(WELL, {"R01": BY_UNHEARD}, None), "All stand: R01: it obeyed another operator", 1),
+    (of_end(WELL, {"R01": BY_BUTTON}, None), "All stand: R01: its button was pressed.", 0),
     (of_end(WELL, {"R01": BY_COMMAND, "R02": LINK_LOST}, None), "All stand: R01: stopped", 1),
 ]
 
@@ -483,6 +486,8 @@ def test_a_stop_says_that_a_robot_has_another_key():
         (of_end(None, {}, WELL), [signal.SIGTERM], 1),
         (of_end(WELL, {"R01": DRIVES}, ILL), [signal.SIGINT], 1),
         (of_end(WELL, {"R01": RESTARTED}, WELL), [signal.SIGINT], 1),
+        (of_end(WELL, {"R01": BY_COMMAND, "R02": DRIVES}, WELL), [signal.SIGINT], 130),
+        (of_end(WELL, {"R01": BY_COMMAND, "R02": DRIVES}, WELL), [signal.SIGTERM], 1),
         (of_start(begun(LOOSE, link_timeout_ms=0)), [signal.SIGINT], 0),
     ],
 )

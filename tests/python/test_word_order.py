@@ -57,6 +57,7 @@ def test_every_command_to_the_swarm_has_its_options_on_either_side(commands):
         ("swarm --json -- stop", "swarm stop --json"),
         ("swarm stop -- --robots 1", "swarm stop -- --robots 1"),
         ("swarm robot03 --json stop", "swarm robot03 --json stop"),
+        ("SWARM --json stop", "swarm stop --json"),
         ("swarm -h", "swarm -h"),
         ("--help", "--help"),
         ("import --robots 1 swarm stop", "import --robots 1 swarm stop"),

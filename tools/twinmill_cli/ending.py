@@ -21,7 +21,7 @@ from twinmill.streams import STDERR, STDOUT, closed_at_first, open_nowhere
 from twinmill_cli import done, early
 from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.output import begin_telling, has_told, print_object, say
-from twinmill_cli.word_order import TO_ROBOTS, in_order
+from twinmill_cli.word_order import GROUP, TO_ROBOTS, in_order, verb_of
 
 WRONG_COMMAND_LINE = 2
 LIKE_STOP = 0.75  # difflib's ratio of stpo, two letters of which are exchanged
@@ -65,14 +65,17 @@ def leave(
         code = result if isinstance(result, int) else 0
         _end_untouched()
     except KeyboardInterrupt:  # before the command, or after it
+        if early.verb() in TO_ROBOTS and not done.is_decided():
+            early.tell_end()
         code = done.decided_or(STOPPED)
     except Exception as error:
         code, sentence = _told(error)
         if sentence:
             sentence += _of_no_stop(words, verbs) if code == WRONG_COMMAND_LINE else ""
             sentence += _of_robots(error, sentence)
+            done.decide(code)
             _say(sentence, program)
-            _print_failure(sentence, error, words)
+            _print_failure(sentence, error, words, verbs)
     if code == STOPPED and stopped:
         say(stopped, program)
     code = _written(program, code)
@@ -238,20 +241,23 @@ def _short(sentence: str) -> str:
     return re.sub(long, r"'\1...'", plain_line(sentence, MESSAGE_MAX))
 
 
-def _print_failure(sentence: str, error: Exception, words: list[str]) -> None:
+def _print_failure(
+    sentence: str, error: Exception, words: list[str], verbs: Collection[str]
+) -> None:
     """The object of a command that failed before it had printed one."""
     if "--json" not in words or has_told():
         return
     findings = [] if {*words[:2]} & {*OF_TABLES} else _findings(error)
     with suppress(OSError):  # stdout itself may be what failed
         told = {"verdict": "bad_input", "sentence": sentence, "input": findings}
-        print_object({**_as_of_robots(words), **told})
+        print_object({**_as_of_robots(words, verbs), **told})
 
 
-def _as_of_robots(words: list[str]) -> dict[str, Any]:
-    """Fields that every object of a command to robots has."""
-    verb = words[1] if words[0] == "swarm" else ""
-    return {"verb": verb, "ok": False, "robots": []} if verb in TO_ROBOTS else {}
+def _as_of_robots(words: list[str], verbs: Collection[str]) -> dict[str, Any]:
+    """Fields that every object of a command to robots has, be it one that is misspelled."""
+    verb = verb_of(words)
+    is_other = words[0] != GROUP or verb in verbs
+    return {} if is_other else {"verb": verb, "ok": False, "robots": []}
 
 
 def _findings(error: Exception) -> list[dict[str, Any]]:

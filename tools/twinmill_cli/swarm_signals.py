@@ -243,6 +243,7 @@ def _tell_end(verb: str, sentence: str, signals: Sequence[int], *, as_json: bool
     """Tells how it was ended, and does not wait for a terminal: no signal would end that."""
     from twinmill_cli.voice import Voice  # not for --help
 
+    done.decide(STOPPED, sentence)
     voice, data = Voice(as_json=as_json), {"verb": verb, "ok": False, "sentence": sentence}
     if as_json:
         voice.tell(lambda: print_object({**data, "robots": []}))

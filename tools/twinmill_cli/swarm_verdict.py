@@ -753,7 +753,8 @@ def _of_end(
     elif not begun.ok:
         told.append("not all had started")
     is_meant = all(state.is_meant for state in early)
-    ok = begun is not None and begun.ok and is_meant
+    is_asked = not any(state.is_by_other for state in early)  # an end that the caller asked for
+    ok = begun is not None and begun.ok and is_meant and is_asked
     ends_well = is_meant and (begun is None or begun.ok)
     if not told:
         return Verdict(ok, "All stand.", ends_well)

@@ -23,13 +23,22 @@ LIKE_OPTION = 0.8  # difflib's ratio of behaviour and behavior is 0.94, of in an
 def in_order(words: Sequence[str]) -> list[str]:
     """Words of a command line, the group's and the command's name before options they stand behind.
 
-    `swarm --robots 1 stop` and `--robots 1 swarm stop` are `swarm stop --robots 1`. A word that is
+    `swarm --robots 1 stop` and `--robots 1 Swarm stop` are `swarm stop --robots 1`. A word that is
     the value of an option is no name; other words stay as they are.
     """
     first = _with_first(words, {GROUP})
-    if first[:1] != [GROUP]:
+    if "".join(first[:1]).lower() != GROUP:
         return [*words]
     return [GROUP, *_with_first(first[1:], VERBS)]
+
+
+def verb_of(words: Sequence[str]) -> str:
+    """The first word behind the group's name that is no option, be it no command; may be empty."""
+    words = in_order(words)
+    place = 1 if words[:1] == [GROUP] else len(words)
+    while place < len(words) and words[place].startswith("-"):
+        place += 2 if _takes_value(words[place].lower()) else 1
+    return "".join(words[place : place + 1]).lower()
 
 
 def _with_first(words: Sequence[str], names: Collection[str]) -> list[str]:

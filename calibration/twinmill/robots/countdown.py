@@ -8,7 +8,16 @@ from typing import Any
 
 import turbopi
 
-from twinmill.robots.fleet import GONE_S, NO_MORE, SIGNED_S, TELEMETRY, Fleet, Heard, Robot
+from twinmill.robots.fleet import (
+    DRY_RUN,
+    GONE_S,
+    NO_MORE,
+    SIGNED_S,
+    TELEMETRY,
+    Fleet,
+    Heard,
+    Robot,
+)
 
 ARM = turbopi.signed_command_t.VERB_ARM
 STOPPED = "stopped by another command"
@@ -22,7 +31,7 @@ HELD_BY_ANOTHER = "taken over by another operator or terminal, whose command was
 
 @dataclass(frozen=True)
 class Dropouts:
-    """Robots that will not begin a start: they accepted it, or another's word came before that.
+    """Robots that will not begin a start as it was meant, though they may have accepted it.
 
     Attributes:
         words: why, by number, to go on behind "was" or "were".
@@ -57,7 +66,8 @@ def find_dropouts(
 
     Or as they turn out to be two of one number, of whom nothing else is known then.
 
-    Who refuses it for a reason of his own is none of them.
+    Who refuses it for a reason of his own is none of them; but who accepts it and says that he will
+    not do it is, as one whose motor board is not opened.
 
     Args:
         fleet: where they are.
@@ -73,6 +83,7 @@ def find_dropouts(
         ack = robot.signed_acks.get(seq)
         whose = _whose(fleet, robot, ack, link_timeout_ms) if seq in fleet.said else ""
         why = whose or (_why(fleet, robot, ack) if ack else "")
+        why = why or (_unfit(robot, ack, link_timeout_ms) if ack and ack.accepted else "")
         if why and (why == STOPPED or not only_stopped):
             words[robot.robot_id] = why
             taken |= {robot.robot_id} if whose else set()
@@ -160,6 +171,21 @@ def _why(fleet: Fleet, robot: Robot, ack: Any) -> str:
     if now_s - robot.heard_s > GONE_S or now_s - robot.link_s > SIGNED_S:
         return "not heard any more"
     return ""
+
+
+def _unfit(robot: Robot, ack: Any, link_timeout_ms: int | None) -> str:
+    """Words on one that has accepted, and not what was meant, by its own word; may be empty.
+
+    By these a start fails in any case: known before the instant, they keep the others from it.
+    """
+    if ack.reason or DRY_RUN in robot.alarms:
+        return f"not able to drive ({ack.reason or DRY_RUN})"
+    link = robot.link
+    is_since = link.session == ack.session and link.session_us > ack.session_us
+    if link_timeout_ms is None or not is_since or link.link_timeout_ms == link_timeout_ms:
+        return ""
+    lasts = f"for {link.link_timeout_ms / 1e3:g} s" if link.link_timeout_ms else "for ever"
+    return f"about to drive on {lasts} without this command"
 
 
 def _obeyed_a_stop(

@@ -2,7 +2,7 @@
 """Fate of robots that were started, by their signed words, until they stand."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import turbopi
 
@@ -32,6 +32,7 @@ class State:
         before: the same of one that has been stopped since, if that was not as it should be.
         stands: it has signed so, and will not drive on by itself.
         is_meant: somebody wished it so: it drives, or was stopped by a person or its script.
+        is_by_other: that was another operator, and not who holds it.
         is_taken: another operator has commanded it since, and it is his.
     """
 
@@ -39,6 +40,7 @@ class State:
     before: str = ""
     stands: bool = False
     is_meant: bool = False
+    is_by_other: bool = False
     is_taken: bool = False
 
     def told_of(self, name: str) -> str:
@@ -91,13 +93,14 @@ UNCONFIRMED = State(
 RESTARTED = State("its program was started anew", stands=True)
 LINK_LOST = State("it had lost its link to this command", stands=True)
 LINK_LOST_TO_OTHER = State("it had lost its link to that command", stands=True)
-BY_COMMAND = State("stopped by another command", stands=True, is_meant=True)
+BY_COMMAND = State("stopped by another command", stands=True, is_meant=True, is_by_other=True)
 SCRIPT_OVER = State("its script is over, or its button was pressed", stands=True, is_meant=True)
 BY_BUTTON = State("its button was pressed", stands=True, is_meant=True)
 BY_UNHEARD = State(
     "it obeyed another operator or terminal whose words were not heard here",
     stands=True,
     is_meant=True,
+    is_by_other=True,
 )
 
 
@@ -210,9 +213,7 @@ class Held:
             return WAITS
         if not others:
             return BY_UNHEARD
-        return State(
-            f"another operator or terminal said {others[0].words}", stands=True, is_meant=True
-        )
+        return replace(BY_UNHEARD, words=f"another operator or terminal said {others[0].words}")
 
     def _taken(self, robot: Robot) -> Heard | None:
         """The start of another operator that it obeyed last."""
