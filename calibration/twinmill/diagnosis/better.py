@@ -21,6 +21,7 @@ from twinmill.fitting.compare import Comparison, comparison
 from twinmill.fitting.fit import noise_of
 from twinmill.fitting.opening import open_measurements
 from twinmill.inference.duties import refined, written_on
+from twinmill.inference.formula import Formula
 from twinmill.inference.found_model import found_model, with_formula
 from twinmill.inference.keeping import with_its_error
 from twinmill.model.child_file import Fitted, child_of
@@ -84,9 +85,14 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
                 f"better model is written for all; take that table out of a copy, and give the "
                 f"copy."
             )
-    fitted, added = _fitted(found, model_file, found.before.score)
-    child = child_of(model_file, fitted, path, command)
-    after = comparison(child, open_measurements(found.measurements, child))
+    forms = [found.formula, None] if found.formula and found.formula.lasting else [None]
+
+    def judged(formula: Formula | None) -> tuple[Comparison, Fitted, tuple[str, ...]]:
+        fitted, added = _fitted(found, model_file, found.before.score, formula)
+        child = child_of(model_file, fitted, path, command)
+        return comparison(child, open_measurements(found.measurements, child)), fitted, added
+
+    after, fitted, added = min(map(judged, forms), key=lambda each: each[0].score)
     fitted = replace(fitted, score_after=after.score, noise=noise_of(after))
     child = child_of(model_file, fitted, path, command)
     kept = with_its_error(child, found.measurements)
@@ -94,16 +100,16 @@ def better(found: Inference, model_file: ModelFile, path: Path, command: str) ->
 
 
 def _fitted(
-    found: Inference, model_file: ModelFile, score: float
+    found: Inference, model_file: ModelFile, score: float, formula: Formula | None
 ) -> tuple[Fitted, tuple[str, ...]]:
     """Fit to be written, and its new instances of effects; the score is not known yet."""
     always = found.always.effects if found.always else ()
     lasting = [n for n in always if not with_role(n, "moment")]
-    numbers = found.answer.numbers if found.holds or found.formula else found.answer.refit
+    numbers = found.answer.numbers if found.holds or formula else found.answer.refit
     common = written_on(model_file, found.curved)
     own = found_model(common, numbers, [*lasting, *found.added])
-    if found.formula and found.formula.lasting:
-        own = with_formula(own, found.formula)
+    if formula:
+        own = with_formula(own, formula)
     kept = [e for e in own.estimates if instance_of(e.name) != "clock"]
     clock = {e.name: e for e in own.estimates if e.name in (CLOCK, CLOCK_RATE)}
     logs = [m for m in found.measurements if isinstance(m, Measurement)]

@@ -159,6 +159,16 @@ def test_a_gain_that_swings_with_the_heading_is_drawn_and_told_as_it_is(swinging
     assert found.after.score < 1.3 < found.refitted.score
 
 
+@pytest.mark.parametrize("times, written", [(1.0, ("equation",)), (10.0, ())])
+def test_a_formula_is_written_where_the_model_predicts_better_with_it(
+    swinging, known_base, tmp_path, times, written
+):
+    """Ten times the swing that is there is farther from it than none."""
+    wrong = replace(swinging.formula, values=tuple(times * v for v in swinging.formula.values))
+    new = better(replace(swinging, formula=wrong), known_base, tmp_path / "better.toml", "")
+    assert new.added == written
+
+
 def test_what_a_formula_of_the_model_drifts_is_no_news(
     measure, turning, known_base, swinging, tmp_path
 ):
