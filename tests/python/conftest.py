@@ -25,7 +25,8 @@ from twinmill.diagnosis import diagnose, infer
 from twinmill.experiment import design
 from twinmill.inference import always
 from twinmill.robots.key import load_or_make
-from twinmill_cli import ending, main
+from twinmill_cli import early, ending, main
+from twinmill_cli.handlers import put_back
 
 sys.path.insert(0, str(Path(__file__).parent))
 from asked_once import AlwaysOnce, AskedOnce, DesignedOnce
@@ -172,9 +173,9 @@ def coasting_robot(tmp_path_factory, model_text) -> CoastingRobot:
 @pytest.fixture(autouse=True)
 def own_ctrl_c():
     """A program that ends ignores Ctrl-C from then on; the tests are one that goes on."""
-    before = signal.getsignal(signal.SIGINT)
+    before = {number: signal.getsignal(number) for number in early.ENDING}
     yield
-    signal.signal(signal.SIGINT, before)
+    put_back(before)
 
 
 @pytest.fixture(scope="module")

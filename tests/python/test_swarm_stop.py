@@ -20,7 +20,7 @@ from twinmill.data.bus import Reach
 from twinmill.robots import tell
 from twinmill.robots.fleet import Fleet
 from twinmill.robots.key import load
-from twinmill_cli import ending, swarm_door, swarm_stop
+from twinmill_cli import early, ending, swarm_door, swarm_stop
 from twinmill_cli.lazy import asks_for_help
 from twinmill_cli.main import main
 from twinmill_cli.swarm_door import key_fault
@@ -52,6 +52,7 @@ def test_a_stop_that_nobody_hears_says_at_once_what_it_waits_for(monkeypatch, tm
 def test_a_stop_outlives_the_terminal_that_it_came_from(monkeypatch, tmp_path, twinmill, number):
     """As where ssh breaks off while robots out of reach have not yet signed."""
     monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr(early, "COUNTING", ())  # the handlers before it are those of this test
     ended = []
     monkeypatch.setattr(swarm_stop, "waiting_words", lambda *_: os.kill(os.getpid(), number) or "")
     before = signal.signal(number, lambda *_: ended.append("hung up"))
