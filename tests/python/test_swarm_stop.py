@@ -415,6 +415,7 @@ def test_a_name_server_that_is_away_knows_of_no_machine(monkeypatch, code, says)
         ("ab" * 32, 0o644, "others may read it (mode 644): `chmod 600"),
         ("ab" * 20, 0o600, "this has 40 characters"),
         ("zz" * 32, 0o600, "hexadecimal digits (0-9, a-f)"),
+        ("AB" * 32, 0o600, "in small letters"),  # robots read no capitals
         ("\udcff\udcfe", 0o600, "this has 2 characters"),
     ],
 )
@@ -437,6 +438,15 @@ def test_a_key_that_cannot_be_used_is_named_with_its_remedy(
         assert "No robot's signature could be checked: " in said["sentence"]
     if verb == "status":
         assert says in said["key_fault"]
+
+
+@pytest.mark.parametrize("verb", ["start", "stop", "status"])
+def test_a_key_that_is_a_link_to_itself_is_there(tmp_path, twinmill, verb):
+    key = tmp_path / "swarm.key"
+    key.symlink_to(key)
+    more = ["--timeout-s", "0.5"] if verb == "stop" else []
+    code, out, err = twinmill("swarm", verb, "--lcm-url", "memq://", "--key", key, "--json", *more)
+    assert code == 1 and f"{key}: {os.strerror(errno.ELOOP)}." in out + err
 
 
 @pytest.mark.parametrize(

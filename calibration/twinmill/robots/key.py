@@ -41,7 +41,7 @@ def of_operator(path: Path | None, on_new: Callable[[str], None]) -> bytes:
     if path:
         return load(path)
     file = default_path()
-    is_new = not file.exists()
+    is_new = not _is_there(file)
     key = load_or_make(file)
     if is_new:
         on_new(
@@ -60,7 +60,7 @@ def load_or_make(path: Path | None = None) -> bytes:
         OSError: it cannot be read.
     """
     file = path or default_path()
-    if not file.exists():
+    if not _is_there(file):
         try:
             _make(file)
         except OSError as error:
@@ -80,7 +80,7 @@ def load(path: Path | None = None) -> bytes:
     """
     file = path or default_path()
     told = option("key", str(file)) if path else f"the operator's key, {file}"
-    if not file.exists():
+    if not _is_there(file):
         named = f" {told}" if path else ""
         if str(path).startswith("~"):
             raise ValueError(
@@ -109,10 +109,18 @@ def load(path: Path | None = None) -> bytes:
     if not re.fullmatch(rb"[0-9a-f]{%d}" % (2 * KEY_BYTES), text):
         raise ValueError(
             f"{told}: is no key, which is {2 * KEY_BYTES} hexadecimal digits "
-            f"(0-9, a-f), and this has {len(text)} characters; copy the operator's file again, or "
-            "make a new one (remove it, and flash the robots again)."
+            f"(0-9, a-f) in small letters, and this has {len(text)} characters; "
+            "copy the operator's file again, or make a new one (remove it, and flash the "
+            "robots again)."
         )
     return bytes.fromhex(text.decode())
+
+
+def _is_there(file: Path) -> bool:
+    """Raises OSError where that cannot be told, as of a link that leads to itself."""
+    with suppress(FileNotFoundError, NotADirectoryError):
+        return bool(file.stat())
+    return False
 
 
 def _make(file: Path) -> None:
