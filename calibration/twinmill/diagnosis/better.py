@@ -105,7 +105,7 @@ def _fitted(
     """Fit to be written, and its new instances of effects; the score is not known yet."""
     always = found.always.effects if found.always else ()
     lasting = [n for n in always if not with_role(n, "moment")]
-    numbers = found.answer.numbers if found.holds or formula else found.answer.refit
+    numbers = found.answer.numbers if found.holds or found.formula else found.answer.refit
     common = written_on(model_file, found.curved)
     own = found_model(common, numbers, [*lasting, *found.added])
     if formula:
