@@ -17,8 +17,9 @@ from twinmill_cli.exit_now import STOPPED, exit_now
 from twinmill_cli.own_path import PROGRAMS, is_program
 from twinmill_cli.word_order import TO_ROBOTS, verb_of
 
-MOVING = ("start", "arm", "select")  # below `swarm`: they begin only if nobody has asked for an end
-COUNTING = (*MOVING, "stop")  # these take signals over themselves, and never leave them to defaults
+# Below `swarm`: these take signals over themselves, and never leave them to defaults; what moves
+# robots begins only if nobody has asked for an end.
+COUNTING = ("start", "arm", "select", "stop")
 # As a background job of a script has SIGINT, and `nohup` SIGHUP, these are ignored at first.
 ENDING = (_signal.SIGINT, _signal.SIGTERM, _signal.SIGHUP)
 

@@ -93,13 +93,14 @@ def always_of(measurements: Sequence[Measurement], model_file: ModelFile) -> Alw
     search = Search(p).run()
     h = search.fitted[next(filter(_lasts, search.likely()))].hypothesis
     best = _Lack.of(p, search.view, h)
-    while h.effects:
-        fewer = [_Lack.of(p, search.view, search.without(h.effects, name)) for name in h.effects]
+    while own := best.h.effects:
+        fewer = [_Lack.of(p, search.view, search.without(own, name)) for name in own]
         likely = max(fewer, key=lambda lack: lack.log_posterior)
         if likely.log_posterior <= best.log_posterior:
             break
-        best, h = likely, likely.h
-    return _conditioned(p, h, best.grown, _chances(p, h, best.each, _sizes(p, h, best.grown)))
+        best = likely
+    h, grown = best.h, best.grown
+    return _conditioned(p, h, grown, _chances(p, h, best.each, _sizes(p, h, grown)))
 
 
 def _columns(found: list[tuple[Kernel, float]]) -> np.ndarray | None:

@@ -138,27 +138,28 @@ class Search:
                 return
 
     def joined(self, names: tuple[str, ...], more: Sequence[str]) -> tuple[str, ...]:
-        """A fitted set with some effects more, fitted if it was not; those it has are not added."""
-        for name in more:
-            if name in names:
-                continue
-            known = {tuple(sorted(k)): k for k in self.fitted}
-            both = tuple(sorted((*names, name)))
-            if both not in known:
+        """A fitted set with some effects more, fitted if it was not.
+
+        What it has, or its model cannot have, is not added.
+        """
+        for name in (n for n in more if n not in names):
+            both = self._known((*names, name))
+            if both is None:
                 h = self.fitted[names].hypothesis
                 told, columns, each = self._screened(h, (name,))
+                if name not in each:
+                    continue
                 found = self._fitted(h, told, columns[name], each[name])
                 self._keep(found)
-                known[both] = found.effects
-            names = known[both]
+                both = found.effects
+            names = both
         return names
 
     def without(self, names: tuple[str, ...], name: str) -> Hypothesis:
         """A fitted set less one effect, fitted if it was not."""
-        rest = tuple(n for n in names if n != name)
-        for own in self.fitted:
-            if sorted(own) == sorted(rest):
-                return self.fitted[own].hypothesis
+        rest = self._known([n for n in names if n != name])
+        if rest is not None:
+            return self.fitted[rest].hypothesis
         less = self.view.fitter.without(self.fitted[names].hypothesis, name)
         self._keep(less)
         return less
@@ -168,10 +169,9 @@ class Search:
         (_, linear), _, alone = self._beside_base
         best = max(alone, key=lambda n: alone[n].gain, default="")
         gains = gains_of_pairs(linear, {n: own.white for n, own in alone.items() if n != best})
-        known = {tuple(sorted(k)) for k in self.fitted}
         for pair in sorted(gains, key=lambda p: -gains[p])[:PAIRS]:
             first, second = sorted(pair, key=lambda n: -alone[n].gain)
-            if tuple(sorted(pair)) not in known:
+            if self._known(pair) is None:
                 if (first,) not in self.fitted:
                     self._grow(self.problem.base, 1, 0, (first,))
                 if (first,) in self.fitted:
@@ -194,11 +194,10 @@ class Search:
             more = sorted(other, key=lambda n: -other[n].gain)[:beside]
             each = each | {n: other[n] for n in more if n not in order}
             order += [n for n in more if n not in order]
-        known = {tuple(sorted(k)) for k in self.fitted}
         grown = []
         for name in order:
-            seen, more_of = each[name], tuple(sorted((*h.effects, next_of_kind(h.effects, name))))
-            if seen.gain < WORTH or more_of in known:
+            seen, more_of = each[name], (*h.effects, next_of_kind(h.effects, name))
+            if seen.gain < WORTH or self._known(more_of) is not None:
                 continue
             found = self._fitted(h, told, columns[name], seen)
             self._keep(found)
@@ -277,6 +276,10 @@ class Search:
         left = linear.y + self.view.fitter.whiten(errors[1:] - errors[0])
         squares = (left**2).sum(axis=1) - (linear.taken(left)[0] ** 2).sum(axis=1)
         return sizes[1:][[np.argmin(squares)]]
+
+    def _known(self, effects: Sequence[str]) -> tuple[str, ...] | None:
+        """The fitted set of these effects, in whichever order it was fitted; None if none was."""
+        return next((own for own in self.fitted if sorted(own) == sorted(effects)), None)
 
     def _keep(self, h: Hypothesis) -> None:
         self.fitted[h.effects] = evidence(h, self.view, h.linear(self.view.fitter))

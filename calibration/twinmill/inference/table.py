@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of evidence: sets of effects, each alone and with nameless dependences."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -139,8 +139,7 @@ def table_of(search: Search) -> Table:
     """Evidence of the likely sets, each under the noise that suits it best of two.
 
     Two noises: what the best set leaves with its likeliest dependence, and what the base leaves.
-    With one noise for all, slow drive noise is told as a dependence on time. What the base always
-    lacked is no choice of one set: each competes with it, too.
+    With one noise for all, slow drive noise is told as a dependence on time.
     """
     p, order = search.problem, search.likely(BEYOND)
     inside = [k for k in search.fitted if set(k) < set(order[0])]
@@ -152,14 +151,7 @@ def table_of(search: Search) -> Table:
     for h, beside in ((fitted[order[0]], _likeliest_columns(best_set, p)), (fitted[()], None)):
         search.progress("noise")
         views.append(p.view(noise_of(h, p, beside)))
-    compared = {n: _compared(search, h, views, n in whole) for n, h in fitted.items()}
-    joined: set[tuple[str, ...]] = {()}
-    while (always := max(own.likeliest_always() for own in compared.values())[1]) not in joined:
-        joined.add(always)
-        for names in kept:
-            more = search.joined(names, always)
-            if more not in compared:
-                compared[more] = _compared(search, search.fitted[more].hypothesis, views, False)
+    compared = _all_compared(search, fitted, views, whole)
     entries = _likeliest_of_each([e for own in compared.values() for e in own.entries])
     first = _likeliest_of_each([e for own in compared.values() for e in own.first])
     falls = {key: entry.fall for key, entry in first.items()}
@@ -194,7 +186,16 @@ class _Compared:
     best: "_Comparison"
 
     @classmethod
-    def of(cls, search: Search, h: Hypothesis, views: Sequence[View], whole: bool) -> "_Compared":
+    def at_best(cls, search: Search, h: Hypothesis, views: Sequence[View], whole: bool) -> Self:
+        """A set compared from its best numbers, which another prior may lead to."""
+        search.progress("comparing hypotheses")
+        own = cls.of(search, h, views, whole)
+        if (start := own.best.better_start) is None:
+            return own
+        return cls.of(search, views[0].fitter.fit(replace(h, value=start)), views, whole)
+
+    @classmethod
+    def of(cls, search: Search, h: Hypothesis, views: Sequence[View], whole: bool) -> Self:
         """Evidence of a fitted set; if `whole`, also of a stale base, and with two dependences."""
         p, changes = search.problem, _changes(search.problem, h)
         forms = [p.forms(change) for change in changes]
@@ -219,13 +220,30 @@ class _Compared:
         )
 
 
-def _compared(search: Search, h: Hypothesis, views: Sequence[View], whole: bool) -> _Compared:
-    """A set compared from its best numbers, which another prior may lead to."""
-    search.progress("comparing hypotheses")
-    own = _Compared.of(search, h, views, whole)
-    if (start := own.best.better_start) is None:
-        return own
-    return _Compared.of(search, views[0].fitter.fit(replace(h, value=start)), views, whole)
+def _all_compared(
+    search: Search,
+    fitted: dict[tuple[str, ...], Hypothesis],
+    views: Sequence[View],
+    whole: Collection[tuple[str, ...]],
+) -> dict[tuple[str, ...], _Compared]:
+    """Sets compared, and each with what the base most probably always lacked: no set chooses that.
+
+    Args:
+        search: in which sets were fitted.
+        fitted: some of them.
+        views: under each noise.
+        whole: sets compared beside a stale base, and with two dependences, as well.
+    """
+    compared = {n: _Compared.at_best(search, h, views, n in whole) for n, h in fitted.items()}
+    joined: set[tuple[str, ...]] = {()}
+    while (always := max(own.likeliest_always() for own in compared.values())[1]) not in joined:
+        joined.add(always)
+        for names in fitted:
+            more = search.joined(names, always)
+            if more not in compared:
+                h = search.fitted[more].hypothesis
+                compared[more] = _Compared.at_best(search, h, views, False)
+    return compared
 
 
 _Case = tuple[tuple[str, ...], bool, frozenset[str]]  # effects, stale base, dependences
