@@ -28,7 +28,7 @@ from twinmill.inference.robots import shared
 from twinmill.inference.screening import nearby, screened
 from twinmill.inference.steps import Steps, StepsOfLog
 from twinmill.model.model_file import ModelError, ModelFile
-from twinmill.report.inference import sentence_on
+from twinmill.report.inference import of_rest, sentence_on
 
 from .conftest import STEP_S
 
@@ -157,6 +157,7 @@ def test_a_gain_that_swings_with_the_heading_is_drawn_and_told_as_it_is(swinging
     assert told["p1"]["value"] == pytest.approx(0.15, abs=0.01)
     assert told["p0"]["value"] == pytest.approx(0.0, abs=0.01)
     assert found.after.score < 1.3 < found.refitted.score
+    assert "so they do not add up to 100 %" in of_rest(found.answer)
 
 
 @pytest.mark.parametrize("times, written", [(1.0, ("equation",)), (10.0, ())])
