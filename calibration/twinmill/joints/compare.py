@@ -100,15 +100,20 @@ def _windows(t_s: np.ndarray, whole: slice) -> list[slice]:
 
 
 def _run(model: Any, log: JointLog, speed: np.ndarray, part: slice) -> np.ndarray:
-    """(N, J) errors of a part of a log, from its first state on; a command holds until the next."""
-    data, stamps = mujoco.MjData(model), log.t_s[part]
+    """(N, J) errors of a part of a log, from its first state on; a command holds until the next.
+
+    Forces of a hook may depend on the time since the run began, which is MuJoCo's.
+    """
+    (begin,) = (run.start for run in log.runs if run.start <= part.start < run.stop)
+    data, stamps = mujoco.MjData(model), log.t_s[part] - log.t_s[begin]
+    data.time = stamps[0]
     data.qpos[:], data.qvel[:] = log.qpos[part][0], speed[part][0]
-    step_s, out, begin_s = float(model.opt.timestep), np.zeros_like(log.qpos[part]), stamps[0]
+    step_s, out = float(model.opt.timestep), np.zeros_like(log.qpos[part])
     for k in range(1, len(stamps)):
         data.ctrl[:] = log.ctrl[part][k - 1]
-        while data.time + step_s / 2 < stamps[k] - begin_s:
+        while data.time + step_s / 2 < stamps[k]:
             mujoco.mj_step(model, data)
         # to the stamp, which is seldom a whole number of steps away
-        rest = stamps[k] - begin_s - data.time
+        rest = stamps[k] - data.time
         out[k] = log.qpos[part][k] - (data.qpos + rest * data.qvel)
     return out
