@@ -77,7 +77,7 @@ def explain_joints(
     numbers, base = _likeliest(found)
     each = [(of[catalogue_name(instance)], own) for instance, own in numbers.items()]
     forces = [
-        (mjcf.joints[card.joint], (card.name, own), card.hook(own))
+        ([mjcf.joints[d] for d in card.joints], (card.name, own), card.hook(own))
         for card, own in each
         if card.held_in == "hook"
     ]

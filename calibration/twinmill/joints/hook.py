@@ -70,15 +70,19 @@ def read_hook(model: Path | str) -> tuple[Held, ...]:
         ) from error
 
 
-def hook_text(model: str, forces: Sequence[tuple[str, Held, str]]) -> str:
+def hook_text(model: str, forces: Sequence[tuple[Sequence[str], Held, str]]) -> str:
     """The file; empty without any force.
 
     Args:
         model: name of the MJCF.
-        forces: joint, effect, and its force as a Python expression of q, v, t, and f.
+        forces: joints, effect, and its force on each as a Python expression of q, v, t, and f.
     """
     if not forces:
         return ""
-    lines = [LINE.format(joint=joint, force=force, effect=held[0]) for joint, held, force in forces]
+    lines = [
+        LINE.format(joint=joint, force=force, effect=held[0])
+        for joints, held, force in forces
+        for joint in joints
+    ]
     effects = [f"    ({name!r}, {dict(own)!r})," for _, (name, own), _ in forces]
     return TEXT.format(model=model, effects="\n".join(effects), lines="\n".join(lines))

@@ -224,15 +224,26 @@ class Saturation(ActuatorEffect):
 
 
 class SupplyDrift(ActuatorEffect):
-    """A supply that falls, or a motor that warms up, over a log."""
+    """A supply that falls over a log, of one actuator or all alike, or a motor that warms up."""
 
     kind = "supply_drift"
-    summary = "The actuator becomes weaker over the log, in proportion to time."
+    summary = "The actuator becomes weaker over the log, in proportion to time; or all do, alike."
     equation = "force *= 1 - loss * t / duration"
     source = "Maxon 2023, Motor data and operating ranges: torque constant and voltage"
     told_by = ("time",)
     held_in = "hook"
     changes = "force"
+
+    @classmethod
+    def all_of(cls, plant: Plant) -> list[Effect]:
+        """One for each actuator, and one for all of several: robots mostly have one supply."""
+        each = super().all_of(plant)
+        return [*each, cls(plant, 0, "")] if len(each) > 1 else each
+
+    @property
+    def joints(self) -> list[int]:
+        """Those whose actuators it weakens."""
+        return super().joints if self.place else np.unique(self.plant.mjcf.moves).tolist()
 
     @property
     def parameters(self) -> list[Number]:
@@ -243,8 +254,8 @@ class SupplyDrift(ActuatorEffect):
         """A force that takes away what is lost."""
         since_s = action.series.since_s
         share = since_s / max(since_s.max(), 1e-9)
-        own = self.plant.usual.torque[:, self.joint]
-        action.force[:, self.joint] -= values["loss"] * share * own
+        own = self.plant.usual.torque[:, self.joints]
+        action.force[:, self.joints] -= values["loss"] * share[:, None] * own
 
     def hook(self, values: Mapping[str, float]) -> str:
         """Python source of that force, from the joint's state and command."""

@@ -74,7 +74,7 @@ class Effect(ABC):
         self.act(action, values)
 
     def hook(self, values: Mapping[str, float]) -> str:
-        """Force on the joint as a Python expression of q, v, t, and f, its actuators' force.
+        """Force on each joint as a Python expression of q, v, t, and f, its actuators' force.
 
         Raises:
             NotImplementedError: a hook does not hold the effect.
@@ -92,6 +92,11 @@ class Effect(ABC):
         return self.at
 
     @property
+    def joints(self) -> list[int]:
+        """All joints that it acts on."""
+        return [self.joint]
+
+    @property
     def unit(self) -> str:
         """Unit of a force on the joint: N of a slide, N m of a hinge."""
         return "N m" if self.plant.mjcf.units[self.joint] == "rad" else "N"
@@ -107,9 +112,9 @@ class Effect(ABC):
         return "N m/rad" if self.plant.mjcf.units[self.joint] == "rad" else "N/m"
 
     def words(self) -> tuple[str, ...]:
-        """Dependences for which it may be mistaken, with the joint."""
-        return tuple(f"{word} of {plain(self.plant.mjcf.joints[self.joint])}"
-                     for word in self.told_by)  # fmt: skip
+        """Dependences for which it may be mistaken, with the joints."""
+        names = [plain(self.plant.mjcf.joints[d]) for d in self.joints]
+        return tuple(f"{word} of {name}" for word in self.told_by for name in names)
 
 
 class JointEffect(Effect):
