@@ -227,7 +227,7 @@ class SupplyDrift(ActuatorEffect):
     """A supply that falls over a log, of one actuator or all alike, or a motor that warms up."""
 
     kind = "supply_drift"
-    summary = "The actuator becomes weaker over the log, in proportion to time; or all do, alike."
+    summary = "The named actuator, or all alike, becomes weaker over the log, as time goes on."
     equation = "force *= 1 - loss * t / duration"
     source = "Maxon 2023, Motor data and operating ranges: torque constant and voltage"
     told_by = ("time",)
