@@ -104,8 +104,7 @@ def _run(model: Any, log: JointLog, speed: np.ndarray, part: slice) -> np.ndarra
 
     Forces of a hook may depend on the time since the run began, which is MuJoCo's.
     """
-    (begin,) = (run.start for run in log.runs if run.start <= part.start < run.stop)
-    data, stamps = mujoco.MjData(model), log.t_s[part] - log.t_s[begin]
+    data, stamps = mujoco.MjData(model), log.since_s[part]
     data.time = stamps[0]
     data.qpos[:], data.qvel[:] = log.qpos[part][0], speed[part][0]
     step_s, out = float(model.opt.timestep), np.zeros_like(log.qpos[part])

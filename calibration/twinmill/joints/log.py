@@ -104,6 +104,11 @@ class JointLog:
         return [slice(a, b) for a, b in pairwise([*self.begins, len(self.t_s)])]
 
     @property
+    def since_s(self) -> np.ndarray:
+        """(N,) time of each sample since its run began."""
+        return np.concatenate([self.t_s[run] - self.t_s[run.start] for run in self.runs])
+
+    @property
     def period_s(self) -> float:
         """Usual time between two samples, of the slowest run."""
         return max(self._period_s(run) for run in self.runs)

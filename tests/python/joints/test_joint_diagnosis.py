@@ -34,7 +34,7 @@ SLIDE = """<mujoco model="slide">
     </body>
   </worldbody>
   <actuator>
-    <motor name="drive" joint="x" {motor}/>
+    <motor name="drive" joint="x"/>
   </actuator>
 </mujoco>
 """
@@ -73,20 +73,29 @@ TWO = """<mujoco model="two">
 PERIOD_S, DURATION_S = 0.004, 16.0
 
 
-def simulated(damping=10, motor="", push=lambda v: 0.0, seed=1):
+def simulated(damping=10, push=lambda v: 0.0, seed=1):
     """A log of a controlled slide, its encoder with 20 um of noise."""
-    model = mujoco.MjModel.from_xml_string(SLIDE.format(damping=damping, motor=motor))
-    data, random = mujoco.MjData(model), np.random.default_rng(seed)
-    t_s = np.arange(0, DURATION_S, PERIOD_S)
-    knots = np.arange(0, DURATION_S + 2, 0.8)
-    wanted = np.interp(t_s, knots, random.uniform(-0.3, 0.3, len(knots)))
-    qpos, ctrl = np.zeros(len(t_s)), np.zeros(len(t_s))
-    data.qpos[0] = wanted[0]
+    return driven(SLIDE.format(damping=damping), DURATION_S, seed, push=push)
+
+
+def driven(text, duration_s, seed, *, push=lambda v: 0.0, loss=0.0):
+    """A log of controlled slides, which something pushes and whose motors lose so much by the end.
+
+    Their encoders have 20 um of noise.
+    """
+    model, random = mujoco.MjModel.from_xml_string(text), np.random.default_rng(seed)
+    data, t_s = mujoco.MjData(model), np.arange(0, duration_s, PERIOD_S)
+    knots = np.arange(0, duration_s + 2, 0.8)
+    ways = [random.uniform(-0.3, 0.3, len(knots)) for _ in range(model.nq)]
+    wanted = np.column_stack([np.interp(t_s, knots, way) for way in ways])
+    qpos, ctrl = np.zeros((2, *wanted.shape))
+    data.qpos[:] = wanted[0]
     for k in range(len(t_s)):
-        qpos[k] = data.qpos[0] + 2e-5 * random.standard_normal()
-        data.ctrl[0] = ctrl[k] = 600 * (wanted[k] - data.qpos[0]) - 60 * data.qvel[0]
+        qpos[k] = data.qpos + 2e-5 * random.standard_normal(model.nq)
+        ctrl[k] = 600 * (wanted[k] - data.qpos) - 60 * data.qvel
+        data.ctrl[:] = ctrl[k] * (1 - loss * t_s[k] / t_s[-1])
         for _ in range(2):
-            data.qfrc_applied[0] = push(data.qvel[0])
+            data.qfrc_applied[:] = [push(v) for v in data.qvel]
             mujoco.mj_step(model, data)
     return JointLog(t_s, ctrl, qpos)
 
@@ -94,7 +103,7 @@ def simulated(damping=10, motor="", push=lambda v: 0.0, seed=1):
 @pytest.fixture
 def slide(tmp_path):
     path = tmp_path / "slide.xml"
-    path.write_text(SLIDE.format(damping=10, motor=""))
+    path.write_text(SLIDE.format(damping=10))
     return path
 
 
@@ -124,7 +133,7 @@ def explained(tmp_path_factory):
     folder = tmp_path_factory.mktemp("explained")
     path, model, better = (folder / name for name in ("run.npz", "slide.xml", "better.xml"))
     simulated(damping=25).saved(path)
-    model.write_text(SLIDE.format(damping=10, motor=""))
+    model.write_text(SLIDE.format(damping=10))
     stale = folder / "better_hook.py"  # of a model that is replaced, which a new one is not with
     stale.write_text("EFFECTS = [('drag@x', {'drag': 9.0})]")
     with redirect_stdout(StringIO()) as out:
@@ -199,7 +208,7 @@ def test_a_supply_that_falls_for_all_motors_is_one_cause_and_is_written_for_each
     """
     path = tmp_path / "two.xml"
     path.write_text(TWO)
-    log = sagging(path, 0.2)
+    log = driven(TWO, 2 * DURATION_S, 3, loss=0.2)
     with threadpool_limits(1, "blas"):
         found = explain_joints(log, path)
     (only,) = found.diagnosis.answer.findings
@@ -210,22 +219,6 @@ def test_a_supply_that_falls_for_all_motors_is_one_cause_and_is_written_for_each
     worse = compare_joints(log, path).window_rms
     assert np.all(compare_joints(log, better, hook).window_rms < worse / 10)
     assert found.hook.count("qfrc_passive[i] +=") == 2 and found.hook.count("'loss'") == 1
-
-
-def sagging(path, loss):
-    """A log of the two carriages of a file, each led by a controller."""
-    model, random = mujoco.MjModel.from_xml_path(str(path)), np.random.default_rng(3)
-    data, t_s = mujoco.MjData(model), np.arange(0, 2 * DURATION_S, PERIOD_S)
-    knots = np.arange(0, t_s[-1] + 2, 0.8)
-    wanted = [np.interp(t_s, knots, random.uniform(-0.3, 0.3, len(knots))) for _ in range(2)]
-    qpos, ctrl = np.zeros((2, len(t_s), 2))
-    data.qpos[:] = [w[0] for w in wanted]
-    for k, t in enumerate(t_s):
-        qpos[k] = data.qpos + 2e-5 * random.standard_normal(2)
-        ctrl[k] = 600 * ([w[k] for w in wanted] - data.qpos) - 60 * data.qvel
-        data.ctrl[:] = ctrl[k] * (1 - loss * t / t_s[-1])
-        mujoco.mj_step(model, data, 2)
-    return JointLog(t_s, ctrl, qpos)
 
 
 @cache
